@@ -1,0 +1,1 @@
+"""Turns traces into verdicts; pure functions over plain data."""

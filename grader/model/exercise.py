@@ -1,0 +1,107 @@
+"""Exercises: what a rubric file says, as values; and the contract between a trace and a check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from fractions import Fraction
+from typing import Any, Protocol
+
+from grader.model.scenario import Scenario
+from grader.model.trace import Trace
+
+
+class Outcome(str, Enum):
+    """What judging a criterion came to."""
+
+    MET = "met"
+    PARTLY = "partly"
+    NOT_MET = "not_met"
+    BLOCKED = "blocked"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """A place in a student's file; lines count from 1."""
+
+    file: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a check found in a trace.
+
+    Attributes:
+        credit: Share of the points earned, in [0, 1].
+        reason: One sentence in the form `where: what was found, what was expected`; no markup.
+        evidence: Plain JSON values behind the reason; keys in a fixed order.
+        location: Place in the student's file, if the trace names one.
+        hint: One thing to do; empty if nothing is very likely right.
+        blocked_by: Id of the criterion without which this question cannot be asked; credit is then 0.
+    """
+
+    credit: Fraction
+    reason: str
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    location: Location | None = None
+    hint: str = ""
+    blocked_by: str | None = None
+
+
+class Check(Protocol):
+    """A typed question about a trace: a frozen dataclass whose fields are the rubric's parameters."""
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return what the trace says; pure, and never raises for anything a student can do."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """One row of a rubric.
+
+    Attributes:
+        id: Unique within the exercise, fixed for ever.
+        title: What a reader sees.
+        points: Above 0.
+        scenario: Id of the scenario whose trace is judged.
+        check: The question.
+        needs: Ids of criteria that must be met or partly met for this one to make sense.
+        hint: What to tell a student who did not meet it, if the check has nothing better.
+    """
+
+    id: str
+    title: str
+    points: Fraction
+    scenario: str
+    check: Check
+    needs: tuple[str, ...] = ()
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Exercise:
+    """One rubric file.
+
+    Attributes:
+        id: Unique, e.g. `velocity_publisher`.
+        number: Number in the chapter, as text.
+        title: What a reader sees.
+        required: Whether the chapter requires it.
+        files: File names a submission must hold, in order.
+        scenarios: What is recorded, in order.
+        criteria: What is judged, in order.
+        digest: `sha256:` over the rubric file's bytes.
+    """
+
+    id: str
+    number: str
+    title: str
+    required: bool
+    files: tuple[str, ...]
+    scenarios: tuple[Scenario, ...]
+    criteria: tuple[Criterion, ...]
+    digest: str

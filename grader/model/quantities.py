@@ -1,0 +1,38 @@
+"""Nanoseconds and comparisons: how time is counted and how numbers are compared everywhere."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+NS_PER_S = 1_000_000_000
+NS_PER_MS = 1_000_000
+
+#: Slack of every comparison, relative to the magnitudes compared: `abs(1.1 - 1.0) <= 0.1` is False in floating point.
+SLACK = 1e-9
+
+
+def seconds(t_ns: int) -> float:
+    """Return nanoseconds as seconds, for text and arithmetic on rates."""
+    return t_ns / NS_PER_S
+
+
+def nanoseconds(seconds_: float) -> int:
+    """Return seconds as whole nanoseconds."""
+    return round(seconds_ * NS_PER_S)
+
+
+def within(got: float, want: float, tolerance: float) -> bool:
+    """Return whether `got` lies in `want ± tolerance`, the edges inside; NaN never does."""
+    return abs(got - want) <= tolerance + SLACK * max(1.0, abs(want), abs(tolerance))
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Marks an annotated number as a quantity that people write with its unit, e.g. `20 Hz` or `10 s`."""
+
+    symbol: str
+
+
+#: A duration as whole nanoseconds; written in rubrics as `10 s`, `200 ms` or `2 min`.
+DurationNs = Annotated[int, Unit("s")]
+#: A frequency; written in rubrics as `20 Hz`.
+Hertz = Annotated[float, Unit("Hz")]

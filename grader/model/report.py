@@ -1,0 +1,149 @@
+"""Reports: the judged result of a submission, ready to be shown; version 1 of the report format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from grader.model.exercise import Location, Outcome
+from grader.model.trace import ClockKind, GraphSnapshot
+
+SCHEMA = "grader/report/v1"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What one criterion came to.
+
+    Attributes:
+        id: Criterion id.
+        title: Criterion title.
+        outcome: See Outcome.
+        score: Points earned.
+        max_score: Points to be had.
+        reason: One sentence, no markup.
+        hint: One thing to do; empty if there is none.
+        location: Place in the student's file.
+        evidence: Plain JSON values.
+    """
+
+    id: str
+    title: str
+    outcome: Outcome
+    score: Fraction
+    max_score: Fraction
+    reason: str
+    hint: str = ""
+    location: Location | None = None
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedFault:
+    """A fault as the report shows it; `t_ns` since the start of its scenario, `frames` the student's own."""
+
+    kind: str
+    file: str
+    line: int
+    text: str
+    t_ns: int
+    scenario: str
+    frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ExerciseReport:
+    """One exercise's part of a report.
+
+    Attributes:
+        id: Exercise id.
+        number: Number in the chapter, as text.
+        title: Exercise title.
+        required: Whether the chapter requires it.
+        clock: The wall clock if any of its scenarios ran on it.
+        clock_reason: Why it was not the virtual one; empty if it was.
+        verdicts: In rubric order.
+        faults: In order of scenario and time.
+        notes: Sentences a reader must know.
+        graph: The live graph that the exercise is about, if one was recorded with all its processes.
+    """
+
+    id: str
+    number: str
+    title: str
+    required: bool
+    clock: ClockKind
+    clock_reason: str
+    verdicts: tuple[Verdict, ...]
+    faults: tuple[ReportedFault, ...] = ()
+    notes: tuple[str, ...] = ()
+    graph: GraphSnapshot | None = None
+
+    @property
+    def score(self) -> Fraction:
+        """Points earned."""
+        return sum((v.score for v in self.verdicts), Fraction(0))
+
+    @property
+    def max_score(self) -> Fraction:
+        """Points to be had."""
+        return sum((v.max_score for v in self.verdicts), Fraction(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """What a report was made with; `isolation` names the sandbox tier."""
+
+    grader: str
+    ros_distro: str
+    rclpy: str
+    rmw: str
+    python: str
+    isolation: str
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The result of grading one submission.
+
+    Attributes:
+        name: Submission name.
+        path: Where it came from, as the user typed it.
+        digest: Submission digest.
+        environment: What it was made with.
+        seed: The seed of every drawn value, printed so that a run can be repeated.
+        exercises: In the order graded.
+        duration_s: Wall time of the run; the only figure that differs between two runs.
+        notes: Sentences about the intake.
+    """
+
+    name: str
+    path: str
+    digest: str
+    environment: Environment
+    seed: int
+    exercises: tuple[ExerciseReport, ...]
+    duration_s: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def score(self) -> Fraction:
+        """Points earned."""
+        return sum((e.score for e in self.exercises), Fraction(0))
+
+    @property
+    def max_score(self) -> Fraction:
+        """Points to be had."""
+        return sum((e.max_score for e in self.exercises), Fraction(0))
+
+    @property
+    def final(self) -> bool:
+        """Whether every criterion was decided."""
+        return all(v.outcome is not Outcome.UNDECIDED for e in self.exercises for v in e.verdicts)
+
+    @property
+    def all_met(self) -> bool:
+        """Whether every criterion is fully met."""
+        return all(v.outcome is Outcome.MET for e in self.exercises for v in e.verdicts)

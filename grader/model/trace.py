@@ -1,0 +1,222 @@
+"""Traces: everything observed in one run, in order; the only thing that judging reads.
+
+Times are integer nanoseconds since the scenario started. Within one instant observations are in the order
+`(t_ns, phase, source, seq)`, stimuli before what the student's nodes did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+
+class ClockKind(str, Enum):
+    """Which clock the student's nodes ran on."""
+
+    VIRTUAL = "virtual"
+    WALL = "wall"
+
+
+class FaultKind(str, Enum):
+    """What went wrong in a student's process, before the stop signal."""
+
+    SYNTAX_ERROR = "syntax_error"  # the file could not be compiled
+    EXCEPTION = "exception"  # an uncaught exception ended the process or one of its threads
+    EXITED = "exited"  # the process ended by itself
+    HUNG = "hung"  # it used up its processor time, or blocked outside the virtual clock
+    KILLED = "killed"  # a signal or a limit ended it
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message that a student's node published.
+
+    Attributes:
+        t_ns: When it was published.
+        topic: As on the wire, absolute.
+        type: e.g. `geometry_msgs/msg/Twist`.
+        value: Fields as plain JSON values, nested by name; NaN and infinities are floats.
+        cdr: The bytes as they came over the wire.
+    """
+
+    t_ns: int
+    topic: str
+    type: str
+    value: Mapping[str, Any]
+    cdr: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """One message that the grader published to the student's nodes; `value` and `type` as for Message."""
+
+    t_ns: int
+    topic: str
+    type: str
+    value: Mapping[str, Any]
+    cdr: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class LogRecord:
+    """One record written through an rclpy logger.
+
+    Attributes:
+        t_ns: When it was written.
+        process: File name of the student process, e.g. `odom_subscriber.py`.
+        severity: DEBUG, INFO, WARN, ERROR or FATAL.
+        logger: Logger name, usually the node's.
+        text: The message; may hold line breaks.
+        file: Where it was logged, relative to the submission; empty if unknown.
+        line: Line in that file, from 1; 0 if unknown.
+    """
+
+    t_ns: int
+    process: str
+    severity: str
+    logger: str
+    text: str
+    file: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class OutputLine:
+    """One line that a process wrote to `stdout` or `stderr` without the logger."""
+
+    t_ns: int
+    process: str
+    stream: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """One publisher or subscription in the live graph.
+
+    Attributes:
+        kind: `publisher` or `subscription`.
+        topic: Absolute name.
+        type: Message type.
+        node: Fully qualified node name, e.g. `/odom_subscriber`.
+        participant: Number of the DDS participant in order of appearance; two processes never share one. -1 is the grader.
+        reliability: `reliable` or `best_effort`.
+        durability: `volatile` or `transient_local`.
+        depth: History depth, 0 if unknown.
+    """
+
+    kind: str
+    topic: str
+    type: str
+    node: str
+    participant: int
+    reliability: str
+    durability: str
+    depth: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GraphSnapshot:
+    """The live ROS graph at one moment, without the grader's own nodes; endpoints sorted."""
+
+    t_ns: int
+    nodes: tuple[str, ...]
+    endpoints: tuple[Endpoint, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A student's process raised, hung or exited before the stop signal.
+
+    Attributes:
+        t_ns: When.
+        process: File name of the student process.
+        kind: What happened.
+        text: One line, e.g. `AttributeError: 'NoneType' object has no attribute 'pose'` or `exited with code 0`.
+        file: File of the innermost frame that is the student's own, relative to the submission; empty if unknown.
+        line: Its line, from 1; 0 if unknown.
+        frames: The student's own frames, outermost first, as `file:line in function`.
+    """
+
+    t_ns: int
+    process: str
+    kind: FaultKind
+    text: str
+    file: str = ""
+    line: int = 0
+    frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A moment of the scenario itself.
+
+    Names: `stream_starts` and `stream_stops` (detail: the topic of the stimulus), `limit` (detail: a sentence).
+    """
+
+    t_ns: int
+    name: str
+    detail: str = ""
+
+
+Observation = Message | Delivery | LogRecord | OutputLine | GraphSnapshot | Fault | Mark
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What one scenario's run left behind.
+
+    Attributes:
+        scenario: Scenario id.
+        clock: Which clock the nodes ran on.
+        clock_reason: Why it was not the virtual one; empty if it was.
+        stop_ns: When observation ended; the window is [0, stop_ns).
+        observations: In order.
+        notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
+        harness_problem: What failed on our side or the machine's; empty if nothing. A trace with a problem is never judged.
+    """
+
+    scenario: str
+    clock: ClockKind
+    stop_ns: int
+    observations: tuple[Observation, ...]
+    clock_reason: str = ""
+    notes: tuple[str, ...] = ()
+    harness_problem: str = ""
+
+    def messages(self, topic: str | None = None) -> tuple[Message, ...]:
+        """Return the messages published by student nodes, on one topic or on all."""
+        return tuple(o for o in self.observations if isinstance(o, Message) and topic in (None, o.topic))
+
+    def deliveries(self, topic: str) -> tuple[Delivery, ...]:
+        """Return what the grader published on a topic."""
+        return tuple(o for o in self.observations if isinstance(o, Delivery) and o.topic == topic)
+
+    def records(self, process: str | None = None) -> tuple[LogRecord, ...]:
+        """Return the records written through rclpy loggers, by one process or by all."""
+        return tuple(o for o in self.observations if isinstance(o, LogRecord) and process in (None, o.process))
+
+    def lines(self, process: str | None = None) -> tuple[OutputLine, ...]:
+        """Return the lines written without the logger, by one process or by all."""
+        return tuple(o for o in self.observations if isinstance(o, OutputLine) and process in (None, o.process))
+
+    def faults(self, process: str | None = None) -> tuple[Fault, ...]:
+        """Return the faults, of one process or of all."""
+        return tuple(o for o in self.observations if isinstance(o, Fault) and process in (None, o.process))
+
+    def graphs(self) -> tuple[GraphSnapshot, ...]:
+        """Return the snapshots of the live graph; a new one is there whenever the graph had changed."""
+        return tuple(o for o in self.observations if isinstance(o, GraphSnapshot))
+
+    def marks(self, name: str, detail: str | None = None) -> tuple[Mark, ...]:
+        """Return the marks of a name, with one detail or with any."""
+        return tuple(
+            o for o in self.observations if isinstance(o, Mark) and o.name == name and detail in (None, o.detail)
+        )
+
+    def endpoints(self, kind: str, topic: str | None = None) -> tuple[Endpoint, ...]:
+        """Return every `publisher` or `subscription` that was ever in the graph, each once, in order of appearance."""
+        seen = (e for g in self.graphs() for e in g.endpoints if e.kind == kind and topic in (None, e.topic))
+        return tuple(dict.fromkeys(seen))

@@ -1,0 +1,1 @@
+"""Walls around processes: what a worker and a student's process may see and reach."""

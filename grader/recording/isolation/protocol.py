@@ -1,0 +1,104 @@
+"""The seam between recording and sandboxes: what every isolation tier offers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class PythonRuntime:
+    """The interpreter and the ROS installation that children run with.
+
+    Attributes:
+        executable: Absolute path of the Python interpreter.
+        read_paths: Absolute files and folders that the interpreter, its packages and ROS need, read-only.
+        library_paths: Value of LD_LIBRARY_PATH, in order.
+        python_paths: Folders for sys.path beyond the interpreter's own, in order.
+        environment: Further variables that ROS needs (AMENT_PREFIX_PATH, ROS_DISTRO, RMW_IMPLEMENTATION ...).
+    """
+
+    executable: Path
+    read_paths: tuple[Path, ...]
+    library_paths: tuple[Path, ...]
+    python_paths: tuple[Path, ...]
+    environment: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class StudentProcess:
+    """One student process to be started.
+
+    Attributes:
+        runtime: Interpreter and ROS.
+        host_folder: The folder of the `host` package; the only part of the grader that the process may read.
+        submission: The staged copy; seen read-only by the process at `submission_seen_at`.
+        arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/launcher.py")`; paths as the process sees them.
+        environment: Variables beyond those of the sandbox and the runtime.
+        pass_fds: Descriptors the process inherits besides 0, 1 and 2, same numbers inside.
+    """
+
+    runtime: PythonRuntime
+    host_folder: Path
+    submission: Path
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str]
+    pass_fds: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one student process may use."""
+
+    memory_bytes: int = 2 << 30
+    processes: int = 64
+    open_files: int = 256
+    file_bytes: int = 32 << 20
+    scratch_bytes: int = 16 << 20
+    processor_s: int = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A process ready for `subprocess.Popen`; `close_fds` frees what `opened_fds` lists once it has started.
+
+    Attributes:
+        argv: Full argument list.
+        environment: The whole environment of the launched program.
+        pass_fds: Descriptors to be inherited.
+        opened_fds: Descriptors that the isolation opened for this start; the caller closes them afterwards.
+    """
+
+    argv: tuple[str, ...]
+    environment: Mapping[str, str]
+    pass_fds: tuple[int, ...]
+    opened_fds: tuple[int, ...] = ()
+
+
+class Isolation(Protocol):
+    """One tier of isolation. Instances are plain values that survive a trip through JSON by their `name`."""
+
+    @property
+    def name(self) -> str:
+        """Short name that reports show, e.g. `bubblewrap-root`."""
+        ...
+
+    @property
+    def submission_seen_at(self) -> str:
+        """Absolute folder at which a student process sees its submission."""
+        ...
+
+    @property
+    def host_seen_at(self) -> str:
+        """Absolute folder at which a student process sees the `host` package."""
+        ...
+
+    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+        """Return the command that starts the trusted worker: full view of files, a network of its own with only `lo`."""
+        ...
+
+    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
+        """Return the command that starts a student process from inside the worker, sharing only its network."""
+        ...
