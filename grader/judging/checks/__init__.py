@@ -1,1 +1,1 @@
-"""."""
+"""The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
