@@ -1,0 +1,64 @@
+"""The live ROS graph drawn in text, as rqt_graph would: node, topic, node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.cells import cell_len
+
+from grader.model.trace import Endpoint, GraphSnapshot
+from grader.reports.escape import shown
+
+#: Topics that every node has.
+_EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
+_NOBODY = "(nobody)"
+_MOST_EDGES = 40
+_NAME_LIMIT = 100
+
+Edge = tuple[str, str, str, str]
+
+
+def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
+    """Return the lines of the drawing, each edge on one line, or on two where `width` columns do not hold it.
+
+    A topic that only one side knows leads from or to `(nobody)`; a topic whose two sides disagree on the type is
+    marked, for no message goes through it.
+    """
+    edges = list(dict.fromkeys(_edges(graph)))
+    lines = [line for edge in edges[:_MOST_EDGES] for line in _drawn(edge, width)]
+    if len(edges) > _MOST_EDGES:
+        lines.append(f"and {len(edges) - _MOST_EDGES} more")
+    joined = {name for source, _, target, _ in edges for name in (source, target)}
+    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in graph.nodes if node not in joined]
+
+
+def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
+    visible = [e for e in graph.endpoints if not _hidden(e.topic)]
+    publishers = [e for e in visible if e.kind == "publisher"]
+    subscriptions = [e for e in visible if e.kind == "subscription"]
+    for publisher in publishers:
+        takers = [s for s in subscriptions if s.topic == publisher.topic]
+        for taker in takers:
+            yield publisher.node, publisher.topic, taker.node, _quarrel(publisher, taker)
+        if not takers:
+            yield publisher.node, publisher.topic, _NOBODY, ""
+    served = {p.topic for p in publishers}
+    for subscription in subscriptions:
+        if subscription.topic not in served:
+            yield _NOBODY, subscription.topic, subscription.node, ""
+
+
+def _hidden(topic: str) -> bool:
+    return topic in _EVERYWHERE or "/_" in topic
+
+
+def _quarrel(publisher: Endpoint, taker: Endpoint) -> str:
+    return "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
+
+
+def _drawn(edge: Edge, width: int) -> list[str]:
+    source, topic, target, quarrel = (shown(part, limit=_NAME_LIMIT) for part in edge)
+    arrow = f"──{topic}──▶ {target}"
+    line = f"{source} {arrow}"
+    lines = [line] if cell_len(line) <= width else [source, f"  {arrow}"]
+    return [*lines, f"  {quarrel}"] if quarrel else lines
