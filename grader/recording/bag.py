@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,6 +27,8 @@ _STORAGE = (".mcap", ".db3")
 _CDR_LITTLE_ENDIAN = b"\x00\x01"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _ROS_1_MAGIC = b"#ROSBAG V"
+_SQLITE_MAGIC = b"SQLite format 3\x00"
+_SQLITE_HEAD = 18  # the magic, then the page size as two bytes, of which 1 stands for 65536
 #: Characters that mean something in an SQLite address, into which rosbags puts the path as it is.
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
@@ -136,19 +139,30 @@ def _source_file(path: Path) -> Path:
     if path.name == "metadata.yaml":
         return _source_in(path.parent)
     if path.suffix not in _STORAGE:
-        raise RecordingError(
-            f"{_line(path)}: expected a .mcap or .db3 file, found the ending {_line(path.suffix) or 'of nothing'}",
-            _HINT_SOURCE,
-        )
+        found = f"the ending {_line(path.suffix)}" if path.suffix else "no ending"
+        raise RecordingError(f"{_line(path)}: expected a .mcap or .db3 file, found {found}", _HINT_SOURCE)
     if not head:
         raise RecordingError(f"{_line(path)}: expected a recording, found an empty file", _HINT_DAMAGED)
     return path
 
 
 def _probe(path: Path) -> bytes:
-    """Return the first bytes of a file; raises OSError where it cannot be read."""
+    """Return the first bytes of a file, once it is known to be readable and whole pages if it has any.
+
+    Raises:
+        OSError: It cannot be read.
+        RecordingError: It is an SQLite file whose last page is cut; SQLite itself would read zeros there.
+    """
     with path.open("rb") as file:
-        return file.read(len(_ROS_1_MAGIC))
+        head = file.read(_SQLITE_HEAD)
+        size = file.seek(0, os.SEEK_END)
+    page_size = int.from_bytes(head[16:18], "big") if head.startswith(_SQLITE_MAGIC) else 0
+    if size % max(1, page_size):
+        raise RecordingError(
+            f"{_line(path)}: expected a complete rosbag2 recording, found a damaged one (cut after {size} bytes)",
+            _HINT_DAMAGED,
+        )
+    return head
 
 
 @contextmanager
@@ -257,7 +271,7 @@ def _unfit(path: Path, topic: str, what: str) -> RecordingError:
     )
 
 
-def _line(text: object, *, source: Path | None = None, limit: int = 300) -> str:
+def _line(text: object, *, source: Path | None = None, limit: int = 5000) -> str:
     """Return foreign text as one printable line; the name of a temporary source is left out."""
     plain = str(text)
     if source is not None:
