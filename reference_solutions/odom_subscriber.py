@@ -1,0 +1,44 @@
+"""Tells once a second where the robot is, as far as its odometry knows."""
+
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+REPORT_PERIOD_S = 1.0
+
+
+class OdomSubscriber(Node):
+    """Remembers the last position heard on /odom; a timer of its own logs it."""
+
+    def __init__(self):
+        super().__init__("odom_subscriber")
+        self.position = None
+        self.create_subscription(Odometry, "/odom", self.remember, 10)
+        self.create_timer(REPORT_PERIOD_S, self.report)
+
+    def remember(self, msg):
+        """Keep the position of a message for the next report."""
+        self.position = msg.pose.pose.position
+
+    def report(self):
+        """Log the last position; say nothing before there is one."""
+        if self.position is not None:
+            self.get_logger().info(f"robot at x={self.position.x:.3f} m, y={self.position.y:.3f} m")
+
+
+def main(args=None):
+    """Run the node until Ctrl-C."""
+    rclpy.init(args=args)
+    node = OdomSubscriber()
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
