@@ -1,0 +1,260 @@
+"""The command line: what is asked for, what is printed where, and the exit code."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import grader
+from grader.model.errors import GraderError, HarnessError
+from grader.model.report import Report
+from grader.reports.delivery import FORMATS, Output, deliver, prepared
+from grader.reports.escape import shown
+
+if TYPE_CHECKING:
+    from grader.session import Progress
+
+ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
+
+_EPILOG = (
+    "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
+    "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
+)
+# Stands for "no subcommand was named"; no argument of a process can hold a NUL.
+_EVERYDAY = "\0"
+_PATH = click.Path(path_type=Path)
+
+
+class CommandLine(click.Group):
+    """Subcommands, and the everyday command that runs when the first argument names none of them."""
+
+    def __init__(self, everyday: click.Command, **attributes: Any) -> None:  # noqa: ANN401  passed on as it is
+        super().__init__(**attributes)
+        self.everyday = everyday
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Mark the arguments that no subcommand claims."""
+        named = bool(args) and args[0] in self.commands
+        return super().parse_args(ctx, args if named else [_EVERYDAY, *args])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command to run, its name and its arguments."""
+        if args[0] == _EVERYDAY:
+            return None, self.everyday, args[1:]
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> None:
+        """Run the command and leave with its exit code; every problem becomes a line on standard error."""
+        ctx.exit(_guarded(lambda: super(CommandLine, self).invoke(ctx)))
+
+    def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Describe the everyday command, then the others."""
+        formatter.write_usage(ctx.command_path, "[OPTIONS] SUBMISSION")
+        self.everyday.format_help_text(ctx, formatter)
+        self.everyday.format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
+        self.everyday.format_epilog(ctx, formatter)
+
+
+class _Everyday(click.Command):
+    def get_help(self, ctx: click.Context) -> str:
+        return ctx.parent.get_help() if ctx.parent else super().get_help(ctx)
+
+
+def _parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
+    del ctx, param
+    return tuple(_parse_output(value) for value in values)
+
+
+def _parse_output(value: str) -> Output:
+    format_, equals, path = value.partition("=")
+    if not equals or not path:
+        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
+    if format_ not in FORMATS:
+        raise click.BadParameter(f"{format_!r} is no format{_nearest(format_, list(FORMATS))}")
+    return Output(format_, None if path == "-" else Path(path))
+
+
+def _parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
+    del ctx, param
+    if value is None:
+        return None
+    if not 0 <= value <= 100:  # NaN loses
+        raise click.BadParameter(f"expected 0 to 100, found {value}")
+    return Fraction(str(value))
+
+
+@click.command(cls=_Everyday, epilog=_EPILOG)
+@click.argument("submission")
+@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from the files' digest.")
+@click.option("--odom-bag", type=_PATH, help="Play this /odom recording, not the built-in one.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FORMAT=PATH",
+    multiple=True,
+    callback=_parse_outputs,
+    help=f"Write a report ({', '.join(FORMATS)}); `-` is standard output; repeatable.",
+)
+@click.option("--rubric", "rubrics", type=_PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option(
+    "--min-score",
+    type=float,
+    metavar="P",
+    callback=_parse_percent,
+    help="Exit with 0 if the score is at least P percent.",
+)
+@click.option(
+    "--clock",
+    type=click.Choice(["virtual", "wall", "auto"]),
+    default="auto",
+    help="The clock of the student's nodes; auto: virtual, and wall where that cannot hold.",
+)
+@click.option(
+    "--isolation",
+    type=click.Choice(["auto", "none"]),
+    default="auto",
+    help="auto: the best sandbox that works here; none: run the student's code without one.",
+)
+@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+@click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
+def _grade(  # noqa: PLR0913  one parameter an option
+    *,
+    submission: str,
+    exercises: tuple[str, ...],
+    seed: int | None,
+    odom_bag: Path | None,
+    as_json: bool,
+    outputs: tuple[Output, ...],
+    rubrics: tuple[Path, ...],
+    min_score: Fraction | None,
+    clock: str,
+    isolation: str,
+    no_progress: bool,
+) -> int:
+    """Grade a SUBMISSION, a folder or a .py file, and explain the score.
+
+    A folder with the name of a command is graded as ./NAME.
+    """
+    wanted = prepared((*outputs, Output("json")) if as_json else outputs)
+    _check_exercises(exercises, rubrics)
+    from grader import session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+
+    request = session.Request(
+        submission=submission,
+        exercises=tuple(dict.fromkeys(exercises)),
+        rubrics=rubrics,
+        seed=seed,
+        odom_bag=odom_bag,
+        clock=clock,
+        isolation=isolation,
+    )
+    with _progress(wanted=not no_progress) as progress:
+        report = session.grade(request, progress)
+    deliver(report, wanted)
+    return exit_code(report, min_score)
+
+
+#: The command `grade`; further subcommands are added to it.
+app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
+_grade.context_settings = app.context_settings
+
+
+def main() -> None:
+    """Run the command line of this process, and exit."""
+    app(prog_name="grade")
+
+
+def exit_code(report: Report, min_score: Fraction | None) -> int:
+    """Return what the exit code says about a report.
+
+    Args:
+        report: The result.
+        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
+    """
+    if not report.final:
+        return UNDECIDED
+    reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score
+    return ALL_MET if reached else NOT_ALL_MET
+
+
+def _guarded(run: Callable[[], object]) -> int:
+    """Return the exit code of a command, whatever becomes of it."""
+    try:
+        code = run()
+    except click.exceptions.Exit:
+        raise
+    except click.ClickException as error:
+        _complain(error.format_message().rstrip("."), "grade --help lists the options")
+        return UNUSABLE
+    except GraderError as error:
+        _complain(error.message, error.hint)
+        return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted: no report was made", err=True)
+        return INTERRUPTED
+    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+        if os.environ.get("GRADER_DEBUG") == "1":
+            traceback.print_exc()
+        _complain(f"the grader failed: {type(error).__name__}: {error}", "GRADER_DEBUG=1 shows where")
+        return UNDECIDED
+    return code if isinstance(code, int) else ALL_MET
+
+
+def _complain(message: str, hint: str = "") -> None:
+    # A rubric may have several mistakes, one a line.
+    for line in message.splitlines() or [""]:
+        click.echo(f"error: {shown(line)}", err=True)
+    if hint:
+        click.echo(f"hint: {shown(hint)}", err=True)
+
+
+def _nearest(found: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
+    return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+
+
+def _check_exercises(wanted: Sequence[str], rubrics: Sequence[Path]) -> None:
+    if not wanted:
+        return
+    known = _known_exercises(rubrics)
+    for id_ in wanted:
+        if id_ not in known:
+            raise GraderError(f"--exercise: {id_!r} is no exercise{_nearest(id_, known)}")
+
+
+def _known_exercises(rubrics: Sequence[Path]) -> list[str]:
+    from grader.reading.rubric_file import builtin_rubrics, read_rubric  # noqa: PLC0415  pydantic, a slow start
+
+    return [read_rubric(path).id for path in rubrics] if rubrics else list(builtin_rubrics())
+
+
+def _say_nothing(step: str) -> None:
+    del step
+
+
+@contextmanager
+def _progress(*, wanted: bool) -> Iterator[Progress]:
+    """Show on a terminal what is being done, and leave no trace of it there."""
+    if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
+        yield _say_nothing
+        return
+    from rich.console import Console  # noqa: PLC0415  only for a terminal
+    from rich.text import Text  # noqa: PLC0415
+
+    with Console(stderr=True).status("starting") as status:
+        yield lambda step: status.update(Text(shown(step)))

@@ -1,0 +1,141 @@
+"""Where reports go: to files and to standard output, in the formats that exist."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from grader.model.errors import GraderError
+from grader.model.report import Report
+from grader.reports.destination import check_writable, write_whole
+from grader.reports.escape import encoded
+
+_FILE_WIDTH = 100
+# Longer lines are hard to read, however wide the terminal is.
+_WIDEST = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a text is laid out; formats for programs do not care."""
+
+    width: int
+    colour: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """One report to deliver; without a path it goes to standard output."""
+
+    format: str
+    path: Path | None = None
+
+
+def _json(report: Report, layout: Layout) -> str:
+    from grader.reports.json_report import dumps  # noqa: PLC0415  only after a run, not for --help
+
+    del layout
+    return dumps(report)
+
+
+def _text(report: Report, layout: Layout) -> str:
+    from grader.reports.text import render_text  # noqa: PLC0415  rich costs more than all the rest of the start
+
+    return render_text(report, width=layout.width, colour=layout.colour)
+
+
+#: Every format that a report can be delivered in.
+FORMATS: dict[str, Callable[[Report, Layout], str]] = {"json": _json, "text": _text}
+
+
+def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
+    """Return all that is to be delivered, files first, after making sure that it can be.
+
+    If nothing goes to standard output, the text does.
+
+    Raises:
+        GraderError: A file cannot be written, or two reports would go to one place.
+    """
+    printed = [output for output in outputs if output.path is None]
+    if len(printed) > 1:
+        raise GraderError("standard output: expected one report, found more", "write the others to files")
+    files = [output for output in outputs if output.path is not None]
+    _refuse_twins([output.path for output in files if output.path is not None])
+    for output in files:
+        _check(output)
+    return (*files, *(printed or [Output("text")]))
+
+
+def deliver(report: Report, outputs: Sequence[Output]) -> None:
+    """Deliver every report; one that cannot be does not keep the others back.
+
+    Raises:
+        GraderError: A report could not be written.
+    """
+    problems = [problem for output in outputs if (problem := _delivered(report, output))]
+    if problems:
+        raise problems[0]
+
+
+def _refuse_twins(paths: Sequence[Path]) -> None:
+    targets = [os.path.realpath(path) for path in paths]
+    for path, target in zip(paths, targets, strict=True):
+        if targets.count(target) > 1:
+            raise GraderError(f"{path}: expected one report, found more", "give each report its own file")
+
+
+def _check(output: Output) -> None:
+    assert output.path is not None
+    try:
+        check_writable(output.path)
+    except OSError as error:
+        raise _unwritable(output, error) from error
+
+
+def _delivered(report: Report, output: Output) -> GraderError | None:
+    try:
+        _write(report, output)
+    except OSError as error:
+        return _unwritable(output, error)
+    return None
+
+
+def _unwritable(output: Output, error: OSError) -> GraderError:
+    where = output.path or "standard output"
+    return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
+
+
+def _write(report: Report, output: Output) -> None:
+    render = FORMATS[output.format]
+    if output.path is not None:
+        write_whole(output.path, render(report, Layout(_FILE_WIDTH, colour=False)).encode("utf-8"))
+    elif sys.stdout is not None:
+        layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
+        _print(encoded(render(report, layout), "utf-8" if output.format == "json" else sys.stdout.encoding))
+
+
+def _coloured(stream: TextIO) -> bool:
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def _print(data: bytes) -> None:
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.flush()
+    except OSError as error:
+        # What is still buffered must not fail once more when Python ends.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        # A reader that had enough, such as `head`, is no problem.
+        if not isinstance(error, BrokenPipeError):
+            raise
