@@ -1,0 +1,63 @@
+"""Describes what ended a student's program: the kind, one line, and the student's own frames."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from types import FrameType
+from typing import Any
+
+
+class Describer:
+    """Turns exceptions and stacks into faults.
+
+    Args:
+        root: The submission's folder; frames of files below it are the student's own.
+    """
+
+    def __init__(self, root: str) -> None:
+        self._root = os.path.join(os.path.realpath(root), "")
+
+    def exception(self, error: BaseException) -> dict[str, Any]:
+        """Return an uncaught exception as a fault."""
+        if isinstance(error, SyntaxError) and self._inside(error.filename or ""):
+            return self.syntax_error(error)
+        frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
+        return {"kind": "exception", "text": one_line(error), **self._place(frames)}
+
+    def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
+        """Return a file that cannot be compiled as a fault."""
+        version = ".".join(map(str, sys.version_info[:2]))
+        text = f"{type(error).__name__}: {error.msg} (read by Python {version})"
+        file = os.path.realpath(error.filename or "")
+        return {"kind": "syntax_error", "text": text, "file": self._relative(file), "line": error.lineno or 0, "frames": []}
+
+    def stack(self, frame: FrameType | None, kind: str, text: str) -> dict[str, Any]:
+        """Return where a thread stands as a fault."""
+        frames = []
+        while frame is not None:
+            frames.append((frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name))
+            frame = frame.f_back
+        return {"kind": kind, "text": text, **self._place(frames[::-1])}
+
+    def _place(self, frames: list[tuple[str, int, str]]) -> dict[str, Any]:
+        own = [(self._relative(file), line, name) for file, line, name in frames if self._inside(file)]
+        file, line, _ = own[-1] if own else ("", 0, "")
+        return {"file": file, "line": line, "frames": [f"{f}:{n} in {name}" for f, n, name in own][-20:]}
+
+    def _inside(self, file: str) -> bool:
+        return os.path.realpath(file).startswith(self._root)
+
+    def _relative(self, file: str) -> str:
+        path = os.path.realpath(file)
+        return path[len(self._root) :] if path.startswith(self._root) else os.path.basename(path)
+
+
+def one_line(error: BaseException) -> str:
+    """Return an exception as its last line in a traceback, without line breaks and not longer than 500 characters."""
+    try:
+        text = "".join(traceback.format_exception_only(type(error), error)).strip()
+    except Exception:  # noqa: BLE001 - the student's own __str__ may raise anything
+        text = type(error).__name__
+    return " ".join(text.split())[:500]

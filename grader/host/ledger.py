@@ -1,0 +1,205 @@
+"""Counts what this process has sent and still expects, and lists its endpoints, so that the grader can settle an instant.
+
+The counts only settle; no verdict rests on them.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections import Counter
+from typing import Any
+
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from . import originals
+
+#: Topics that every node has; nobody waits for them.
+BACKGROUND = frozenset({"/rosout", "/parameter_events"})
+BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
+#: How long, in real time, a message that was announced is waited for before it is given up as lost.
+ARRIVAL_S = 1.0
+#: How long, in real time, a new endpoint is waited for to be matched.
+MATCH_S = 5.0
+
+
+def type_name(interface: Any) -> str:
+    """Return a message or service class as ROS writes it, e.g. `geometry_msgs/msg/Twist`."""
+    package, kind = interface.__module__.split(".")[:2]
+    return f"{package}/{kind}/{interface.__name__}"
+
+
+class Ledger:
+    """The endpoints of one process and the traffic on them."""
+
+    def __init__(self) -> None:
+        self.sent: Counter[str] = Counter()
+        self._expected: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+        self._endpoints: dict[str, list[weakref.ref[Any]]] = {
+            kind: [] for kind in ("publisher", "subscription", "client", "service")
+        }
+        self.changed = False
+        self.lost: Counter[str] = Counter()
+        self.contexts: list[weakref.ref[Any]] = []
+
+    def add(self, kind: str, endpoint: Any) -> None:
+        """Remember a new endpoint."""
+        self._endpoints[kind].append(weakref.ref(endpoint))
+        self.changed = True
+
+    def alive(self, kind: str) -> list[Any]:
+        """Return the endpoints of a kind that still exist, oldest first."""
+        found = []
+        for reference in self._endpoints[kind]:
+            endpoint = reference()
+            if endpoint is not None and _valid(endpoint):
+                found.append(endpoint)
+        return found
+
+    def claims(self) -> list[dict[str, Any]]:
+        """Return what the grader needs to know of every endpoint, as plain JSON values."""
+        self.changed = False
+        claims: list[dict[str, Any]] = []
+        for kind in ("publisher", "subscription"):
+            for endpoint in self.alive(kind):
+                if endpoint.topic_name in BACKGROUND:
+                    continue
+                qos = endpoint.qos_profile
+                claims.append({
+                    "kind": kind,
+                    "name": endpoint.topic_name,
+                    "type": type_name(endpoint.msg_type),
+                    "reliable": _reliable(qos, kind),
+                    "latched": qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+                })
+        claims += [
+            {"kind": kind, "name": service_name(endpoint), "type": type_name(endpoint.srv_type)}
+            for kind in ("client", "service")
+            for endpoint in self.alive(kind)
+            if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
+        ]
+        return claims
+
+    def expect(self, arrivals: dict[str, int]) -> None:
+        """Add what the grader says is on its way, and wait until it is here."""
+        for channel, count in arrivals.items():
+            for receiver in self._receivers(channel):
+                depth = _depth(receiver)
+                self._expected[receiver] = min(self._expected.get(receiver, 0) + count, depth)
+        self.await_arrivals(list(self._expected))
+
+    def took(self, receiver: Any) -> None:
+        """Note that one message was taken from a subscription, client or service."""
+        if self._expected.get(receiver, 0) > 0:
+            self._expected[receiver] -= 1
+
+    def await_arrivals(self, receivers: list[Any]) -> bool:
+        """Wait, in real time, until everything expected by some receivers can be taken; return whether any can be."""
+        arrived = False
+        context = self._context()
+        for receiver in receivers:
+            if self._expected.get(receiver, 0) <= 0 or not _valid(receiver) or context is None:
+                continue
+            if _await_ready(receiver, context):
+                arrived = True
+            else:
+                self.lost[_channel(receiver)] += self._expected[receiver]
+                self._expected[receiver] = 0
+        return arrived
+
+    def expects_anything(self) -> bool:
+        """Return whether anything is on its way."""
+        return any(self._expected.values())
+
+    def _context(self) -> Any:
+        contexts = (reference() for reference in reversed(self.contexts))
+        return next((context for context in contexts if context is not None and context.ok()), None)
+
+    def handles(self) -> dict[int, Any]:
+        """Return the receivers by the address of their handles, as a wait set knows them."""
+        return {
+            endpoint.handle.pointer: endpoint
+            for kind in ("subscription", "client", "service")
+            for endpoint in self.alive(kind)
+        }
+
+    def await_matches(self, expected: dict[str, dict[str, int]]) -> list[str]:
+        """Wait, in real time, until endpoints have the counterparts the grader knows of; return those that have not.
+
+        Args:
+            expected: Kind of endpoint -> name -> number of counterparts.
+        """
+        deadline = originals.perf_counter() + MATCH_S
+        missing = self._unmatched(expected)
+        while missing and originals.perf_counter() < deadline:
+            originals.sleep(0.0005)
+            missing = self._unmatched(expected)
+        return missing
+
+    def _unmatched(self, expected: dict[str, dict[str, int]]) -> list[str]:
+        missing = []
+        for kind, names in expected.items():
+            for endpoint in self.alive(kind):
+                name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
+                if _matches(kind, endpoint) < names.get(name, 0):
+                    missing.append(f"{kind} {name}")
+        return missing
+
+    def _receivers(self, channel: str) -> list[Any]:
+        kind, _, name = channel.partition(" ")
+        if kind == "topic":
+            return [s for s in self.alive("subscription") if s.topic_name == name]
+        return [e for e in self.alive("service" if kind == "request" else "client") if service_name(e) == name]
+
+
+def _valid(endpoint: Any) -> bool:
+    try:
+        with endpoint.handle:
+            return True
+    except _rclpy.InvalidHandle:
+        return False
+
+
+def service_name(endpoint: Any) -> str:
+    """Return the resolved name of a service or client."""
+    with endpoint.handle:
+        name = endpoint.handle.service_name if hasattr(endpoint.handle, "service_name") else endpoint.handle.name
+    return str(name)
+
+
+def _channel(receiver: Any) -> str:
+    return str(receiver.topic_name) if hasattr(receiver, "topic_name") else service_name(receiver)
+
+
+def _reliable(qos: Any, kind: str) -> bool:
+    if qos.reliability in (ReliabilityPolicy.SYSTEM_DEFAULT, ReliabilityPolicy.UNKNOWN):
+        return kind == "publisher"  # the defaults of DDS: a writer is reliable, a reader is not
+    return bool(qos.reliability != ReliabilityPolicy.BEST_EFFORT)
+
+
+def _depth(receiver: Any) -> int:
+    depth = getattr(receiver.qos_profile, "depth", 1)
+    return max(1, int(depth))
+
+
+def _matches(kind: str, endpoint: Any) -> int:
+    with endpoint.handle:
+        if kind == "publisher":
+            return int(endpoint.handle.get_subscription_count())
+        if kind == "subscription":
+            return int(endpoint.handle.get_publisher_count())
+        return int(endpoint.handle.service_server_is_available()) if kind == "client" else 1
+
+
+def _await_ready(receiver: Any, context: Any) -> bool:
+    """Wait, in real time, until one message can be taken from a receiver."""
+    kind = "subscription" if hasattr(receiver, "topic_name") else "client" if hasattr(receiver, "call_async") else "service"
+    with context.handle, receiver.handle:
+        wait_set = REAL_WAIT_SET(kind == "subscription", 0, 0, kind == "client", kind == "service", 0, context.handle)
+        wait_set.clear_entities()
+        getattr(wait_set, f"add_{kind}")(receiver.handle)
+        wait_set.wait(round(ARRIVAL_S * 1e9))
+        return receiver.handle.pointer in wait_set.get_ready_entities(kind)
+
+
+REAL_WAIT_SET: Any = _rclpy.WaitSet

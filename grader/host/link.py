@@ -1,0 +1,36 @@
+"""The line to the grader: one JSON object a line over an inherited socket, the host's report first, then an answer."""
+
+import json
+import socket
+from typing import Any
+
+from . import originals
+
+
+class Link:
+    """The host's end of the line.
+
+    Args:
+        descriptor: Number of the inherited socket.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._socket = socket.socket(fileno=descriptor)
+        self._socket.setblocking(True)
+        self._lines = self._socket.makefile("rb")
+        self._sending = originals.allocate_lock()
+
+    def send(self, report: dict[str, Any]) -> None:
+        """Send one report; a lost line ends the process, as there is nobody left to run for."""
+        line = json.dumps(report).encode() + b"\n"
+        with self._sending:
+            self._socket.sendall(line)
+
+    def ask(self, report: dict[str, Any]) -> dict[str, Any]:
+        """Send one report and return the answer; raises ConnectionError if the grader is gone."""
+        self.send(report)
+        line = self._lines.readline()
+        if not line:
+            raise ConnectionError("the grader is gone")
+        answer: dict[str, Any] = json.loads(line)
+        return answer

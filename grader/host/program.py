@@ -1,0 +1,109 @@
+"""Runs the student's file from start to end, and tells the grader how it ended."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import random
+import sys
+import threading
+from typing import Any
+
+from . import entry
+from .faults import Describer
+from .link import Link
+from .virtual import VirtualTime
+from .watchdog import Watchdog
+
+
+def run(request: dict[str, Any]) -> None:
+    """Run the file a request names; never returns.
+
+    Args:
+        request: `fd` of the line, `root` and `file` of the submission, `clock`, `seed` (hex), `limits`.
+    """
+    link = Link(request["fd"])
+    describer = Describer(request["root"])
+    time = VirtualTime(link, lambda error: link.send({"kind": "fault", **describer.exception(error)}))
+    time.install_ros()
+    preload()
+    seed_randomness(request["seed"])
+    os.register_at_fork(after_in_child=lambda: os._exit(70))
+    start = link.ask({"kind": "ready", "python": sys.version.split()[0]})
+    time.start(start["now_ns"])
+    watchdog = Watchdog(link, time, describer, request["limits"])
+    watchdog.start()
+    ending = play(request, describer, link)
+    watchdog.stop()
+    flush()
+    link.send({"kind": "exited", **ending, **time.summary()})
+    os._exit(0)
+
+
+def play(request: dict[str, Any], describer: Describer, link: Link) -> dict[str, Any]:
+    """Run the file and the end of the interpreter, and return how it ended: `code` and perhaps `fault`."""
+    ending: dict[str, Any] = {"code": 0}
+    try:
+        entry.run_file(request["root"], request["file"], lambda text: link.send({"kind": "note", "text": text}))
+    except SystemExit as leaving:
+        ending["code"] = exit_code(leaving)
+    except KeyboardInterrupt:
+        ending["code"] = 130
+    except BaseException as error:  # noqa: BLE001 - whatever the student's code raises becomes a fault
+        ending = {"code": 1, "fault": describer.exception(error)}
+        sys.excepthook(type(error), error, error.__traceback__)
+    with contextlib.suppress(BaseException):
+        finish_threads()
+        atexit._run_exitfuncs()
+    return ending
+
+
+def finish_threads() -> None:
+    """Wait for the threads that keep a Python process alive, as the interpreter does at its end."""
+    for call in reversed(getattr(threading, "_threading_atexits", [])):
+        call()
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
+
+
+def exit_code(leaving: SystemExit) -> int:
+    """Return the exit code that Python gives for an exit, printing its message as Python does."""
+    if leaving.code is None:
+        return 0
+    if isinstance(leaving.code, int):
+        return leaving.code & 0xFF
+    print(leaving.code, file=sys.stderr)  # noqa: T201 - this is what the interpreter does
+    return 1
+
+
+def seed_randomness(seed: str) -> None:
+    """Make every source of randomness in this process repeat for the same seed."""
+    source = random.Random(seed)  # noqa: S311 - it has to repeat
+
+    def urandom(count: int, /) -> bytes:
+        return source.randbytes(count)
+
+    os.urandom = urandom
+    random._urandom = urandom  # type: ignore[attr-defined]
+    random.seed(seed + "/random")
+    numpy = sys.modules.get("numpy")
+    if numpy is not None:
+        numpy.random.seed(int(seed[:8], 16))
+
+
+def preload() -> None:
+    """Import what nearly every node imports, before time starts."""
+    import geometry_msgs.msg
+    import nav_msgs.msg
+    import sensor_msgs.msg
+    import std_msgs.msg
+    import std_srvs.srv
+
+
+def flush() -> None:
+    """Write out what Python still buffers."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(Exception):
+            stream.flush()

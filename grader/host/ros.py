@@ -1,0 +1,296 @@
+"""Makes rclpy live in virtual time: its clocks, its wait sets, what it publishes and takes.
+
+Every spin variant of rclpy blocks in one place, `WaitSet.wait`. It polls here; if nothing is ready, the strand pauses.
+"""
+
+from __future__ import annotations
+
+import functools
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+import rclpy.client
+import rclpy.clock
+import rclpy.context
+import rclpy.executors
+import rclpy.impl.rcutils_logger
+import rclpy.node
+import rclpy.publisher
+import rclpy.service
+import rclpy.subscription
+import rclpy.task
+import rclpy.time_source
+import rclpy.utilities
+from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.time import Time
+
+from .clock import VirtualClock
+from .ledger import BACKGROUND, REAL_WAIT_SET, Ledger, service_name
+from .scheduler import Scheduler
+
+#: So many messages published in a row are let arrive before the next one, so that none is overwritten.
+MESSAGES_PER_FLUSH = 8
+KINDS = ("subscription", "guard_condition", "timer", "client", "service")
+
+
+class RosClocks:
+    """Every clock of rclpy, whatever its type, as a ROS clock whose time the grader sets."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
+        self._made: weakref.WeakSet[Clock] = weakref.WeakSet()
+
+    def new(self, cls: type[Clock] = Clock, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
+        """Stand for `Clock.__new__`."""
+        if not isinstance(clock_type, (ClockType, _rclpy.ClockType)):
+            raise TypeError("Clock type must be a ClockType enum")
+        if clock_type is ClockType.ROS_TIME and not issubclass(cls, ROSClock):
+            cls = ROSClock
+        made = object.__new__(cls)
+        made._Clock__clock = _rclpy.Clock(ClockType.ROS_TIME)
+        made._clock_type = clock_type
+        with made.handle:
+            made.handle.set_ros_time_override_is_enabled(True)
+            made.handle.set_ros_time_override(self._time()._time_handle)
+        self._made.add(made)
+        return made
+
+    def move(self) -> None:
+        """Set every clock to the virtual time; timers that are due become ready."""
+        handle = self._time()._time_handle
+        for made in list(self._made):
+            try:
+                with made.handle:
+                    made.handle.set_ros_time_override(handle)
+            except _rclpy.InvalidHandle:
+                continue
+
+    def _time(self) -> Time:
+        return Time(nanoseconds=self._clock.now_ns, clock_type=ClockType.ROS_TIME)
+
+
+def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock) -> None:
+    """Replace rclpy's clocks, and what sleeps on them."""
+    Clock.__new__ = staticmethod(clocks.new)
+    ROSClock.__new__ = staticmethod(lambda cls: clocks.new(cls, clock_type=ClockType.ROS_TIME))
+    ROSClock._set_ros_time_is_active = lambda self, enabled: None
+    ROSClock.set_ros_time_override = lambda self, time: None
+    rclpy.impl.rcutils_logger.Throttle.params["throttle_time_source_type"] = Clock()
+
+    now = Clock.now
+
+    def looked_at(self: Clock) -> Time:
+        clock.idle_look()
+        return now(self)
+
+    def sleep_until(self: Clock, until: Time, context: Any = None) -> bool:
+        context = context or rclpy.utilities.get_default_context()
+        if not context.ok():
+            raise rclpy.exceptions.NotInitializedException()
+        if until.clock_type != self._clock_type:
+            raise ValueError("until's clock type does not match this clock's type")
+        while clock.now_ns < until.nanoseconds and context.ok():
+            scheduler.pause(until.nanoseconds)
+        return bool(context.ok())
+
+    Clock.now = looked_at
+    Clock.sleep_until = sleep_until
+
+
+def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> type:
+    """Return the class that stands for rclpy's wait set."""
+
+    class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
+        """A wait set that blocks in virtual time."""
+
+        def __init__(self, *counts: Any) -> None:
+            super().__init__(*counts)
+            self._events = counts[5]
+            self._added: list[tuple[Callable[..., Any], Any]] = []
+            self._timers: list[Any] = []
+            self._receivers: list[int] = []
+
+        def clear_entities(self) -> None:
+            super().clear_entities()
+            self._added.clear()
+            self._timers.clear()
+            self._receivers.clear()
+
+        def _add(self, add: Callable[..., Any], entity: Any) -> Any:
+            self._added.append((add, entity))
+            return add(entity)
+
+        def add_subscription(self, entity: Any) -> Any:
+            self._receivers.append(entity.pointer)
+            return self._add(super().add_subscription, entity)
+
+        def add_client(self, entity: Any) -> Any:
+            self._receivers.append(entity.pointer)
+            return self._add(super().add_client, entity)
+
+        def add_service(self, entity: Any) -> Any:
+            self._receivers.append(entity.pointer)
+            return self._add(super().add_service, entity)
+
+        def add_timer(self, entity: Any) -> Any:
+            self._timers.append(entity)
+            return self._add(super().add_timer, entity)
+
+        def add_guard_condition(self, entity: Any) -> Any:
+            return self._add(super().add_guard_condition, entity)
+
+        def add_event(self, entity: Any) -> Any:
+            return self._add(super().add_event, entity)
+
+        def _ready(self) -> bool:
+            return any(self.get_ready_entities(kind) for kind in KINDS) or any(
+                self.is_ready("event", number) for number in range(self._events)
+            )
+
+        def _expects(self) -> bool:
+            if not ledger.expects_anything():
+                return False
+            known = ledger.handles()
+            return ledger.await_arrivals([known[p] for p in self._receivers if p in known])
+
+        def _next_timer_ns(self) -> int | None:
+            waits = [timer.time_until_next_call() for timer in self._timers if timer]
+            return min((clock.now_ns + max(0, wait) for wait in waits if wait is not None), default=None)
+
+        def wait(self, timeout_ns: int) -> None:
+            deadline_ns = None if timeout_ns < 0 else clock.now_ns + timeout_ns
+            while True:
+                super().wait(0)
+                if self._ready():
+                    scheduler.progress()
+                    return
+                if not self._expects():
+                    if deadline_ns is not None and clock.now_ns >= deadline_ns:
+                        clock.idle_look(50)
+                        return
+                    wakes = [t for t in (deadline_ns, self._next_timer_ns()) if t is not None]
+                    scheduler.pause(min(wakes, default=None), polls=True)
+                # Polling has emptied the set of everything that was not ready.
+                super().clear_entities()
+                for add, entity in self._added:
+                    add(entity)
+
+    return VirtualWaitSet
+
+
+def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> None:
+    """Replace rclpy's wait set."""
+    _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger)
+
+
+def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], None]) -> None:
+    """Count what is published and taken, and let the grader match every endpoint before it is used.
+
+    Args:
+        ledger: Where the counts are kept.
+        clock: Told when something happened.
+        settle: Yields to the grader at the same instant.
+    """
+    _install_endpoints(ledger)
+    in_a_row = 0
+
+    def counted(name: str, send: Callable[[], Any]) -> Any:
+        nonlocal in_a_row
+        if name in BACKGROUND:
+            return send()
+        in_a_row += 1
+        if ledger.changed or in_a_row >= MESSAGES_PER_FLUSH:
+            in_a_row = 0
+            settle()
+        clock.busy_sending()
+        ledger.sent[name] += 1
+        return send()
+
+    publish = rclpy.publisher.Publisher.publish
+    call = rclpy.client.Client.call_async
+    respond = rclpy.service.Service.send_response
+
+    @functools.wraps(publish)
+    def counted_publish(self: Any, msg: Any) -> Any:
+        topic = self.topic_name
+        return publish(self, msg) if topic in BACKGROUND else counted(f"topic {topic}", lambda: publish(self, msg))
+
+    @functools.wraps(call)
+    def counted_call(self: Any, request: Any) -> Any:
+        return counted(f"request {self.service_name}", lambda: call(self, request))
+
+    @functools.wraps(respond)
+    def counted_respond(self: Any, response: Any, header: Any) -> Any:
+        return counted(f"response {service_name(self)}", lambda: respond(self, response, header))
+
+    rclpy.publisher.Publisher.publish = counted_publish
+    rclpy.client.Client.call_async = counted_call
+    rclpy.service.Service.send_response = counted_respond
+    for name in ("_take_subscription", "_take_client", "_take_service"):
+        setattr(rclpy.executors.Executor, name, _counting_take(name, ledger, clock))
+
+
+def _counting_take(name: str, ledger: Ledger, clock: VirtualClock) -> Callable[..., Any]:
+    take = getattr(rclpy.executors.Executor, name)
+
+    def counted_take(self: Any, receiver: Any) -> Any:
+        clock.busy()
+        taken = take(self, receiver)
+        ledger.took(receiver)
+        return taken
+
+    return counted_take
+
+
+def _install_endpoints(ledger: Ledger) -> None:
+    kinds = {
+        "publisher": rclpy.publisher.Publisher,
+        "subscription": rclpy.subscription.Subscription,
+        "client": rclpy.client.Client,
+        "service": rclpy.service.Service,
+    }
+    for kind, cls in kinds.items():
+        _register(ledger, kind, cls)
+    create = rclpy.node.Node.__init__
+
+    def make_node(self: Any, *args: Any, **kwargs: Any) -> None:
+        MADE_NODES.append(weakref.ref(self))
+        create(self, *args, **kwargs)
+        ledger.contexts.append(weakref.ref(self.context))
+
+    rclpy.node.Node.__init__ = functools.wraps(create)(make_node)
+
+
+def _register(ledger: Ledger, kind: str, cls: Any) -> None:
+    make, destroy = cls.__init__, cls.destroy
+
+    def registered(self: Any, *args: Any, **kwargs: Any) -> None:
+        make(self, *args, **kwargs)
+        ledger.add(kind, self)
+
+    def destroyed(self: Any) -> None:
+        ledger.changed = True
+        destroy(self)
+
+    cls.__init__ = functools.wraps(make)(registered)
+    cls.destroy = functools.wraps(destroy)(destroyed)
+
+
+def install_looks(clock: VirtualClock) -> None:
+    """Let time pass for programs that do nothing but look whether something has happened."""
+    watched = ((rclpy.context.Context, "ok"), (rclpy.task.Future, "done"), (rclpy.client.Client, "service_is_ready"),
+               (rclpy.publisher.Publisher, "get_subscription_count"), (rclpy.subscription.Subscription, "get_publisher_count"))
+    for cls, name in watched:
+        original = getattr(cls, name)
+
+        def looked_at(self: Any, _original: Any = original) -> Any:
+            clock.idle_look()
+            return _original(self)
+
+        setattr(cls, name, functools.wraps(original)(looked_at))
+
+
+#: Every node that was made, oldest first, as weak references: the launcher asks whether there was any.
+MADE_NODES: list[weakref.ref[Any]] = []

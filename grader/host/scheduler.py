@@ -1,0 +1,150 @@
+"""Runs the student's threads one at a time and in a fixed order, and knows when all of them are blocked.
+
+Each thread is a strand. The strand that runs holds the baton; it hands it on only where the original program would
+block: in a sleep, a lock, a wait set, a selector. Switching nowhere else makes programs with threads repeatable. When
+no strand can run, time has to move: the one that blocked last asks the grader.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from . import originals
+
+
+class Strand:
+    """One thread of the student's program, and what it waits for."""
+
+    __slots__ = ("deadline_ns", "gate", "native", "parked", "polled_in", "polls")
+
+    def __init__(self) -> None:
+        self.gate = originals.allocate_lock()
+        self.gate.acquire()
+        self.parked = False
+        self.deadline_ns: int | None = None
+        self.polls = False
+        self.polled_in = -1
+        self.native = 0
+
+
+class Scheduler:
+    """Hands the baton from strand to strand.
+
+    Args:
+        now_ns: Returns the virtual time.
+        ask_for_time: Called when nothing can run, with the least deadline or None; returns when time or the world moved.
+    """
+
+    def __init__(self, now_ns: Callable[[], int], ask_for_time: Callable[[int | None], None]) -> None:
+        self._now_ns = now_ns
+        self._ask_for_time = ask_for_time
+        self._strands: dict[int, Strand] = {}
+        self._parked: list[Strand] = []
+        self._runnable: deque[Strand] = deque()
+        self._round = 0
+        self.current = self._adopt()
+
+    def _adopt(self) -> Strand:
+        """Make the calling thread a strand that holds the baton."""
+        strand = Strand()
+        strand.native = originals.get_native_id()
+        self._strands[originals.get_ident()] = strand
+        return strand
+
+    def mine(self) -> Strand | None:
+        """Return the calling thread's strand, or None for a thread that is not the student's."""
+        return self._strands.get(originals.get_ident())
+
+    def running_thread(self) -> int | None:
+        """Return the identifier of the thread that holds the baton."""
+        return next((ident for ident, strand in self._strands.items() if strand is self.current), None)
+
+    def running_native_thread(self) -> int:
+        """Return the system's number of the thread that holds the baton."""
+        return self.current.native
+
+    def progress(self) -> None:
+        """Note that something happened which may have made a wait set ready."""
+        self._round += 1
+
+    def pause(self, deadline_ns: int | None = None, *, polls: bool = False) -> None:
+        """Block the calling strand until its deadline, until `wake`, or, if it polls, until anything happened.
+
+        Args:
+            deadline_ns: Virtual time at which to go on at the latest.
+            polls: Whether to go on after anything happened, to look again.
+        """
+        strand = self.mine()
+        if strand is None:
+            originals.sleep(0.001)
+            return
+        strand.deadline_ns, strand.polls, strand.polled_in, strand.parked = deadline_ns, polls, self._round, True
+        self._parked.append(strand)
+        self._hand_on(strand)
+
+    def wake(self, strand: Strand) -> None:
+        """Make a parked strand runnable."""
+        if strand.parked:
+            self._parked.remove(strand)
+            strand.parked = False
+            self._runnable.append(strand)
+            self._round += 1
+
+    def start(self, body: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[[], None]:
+        """Register a new strand at once, and return the function that its thread must run."""
+        strand = Strand()
+        self._runnable.append(strand)
+        self._round += 1
+
+        def run() -> None:
+            strand.gate.acquire()
+            self._strands[originals.get_ident()] = strand
+            strand.native = originals.get_native_id()
+            try:
+                body(*args, **kwargs)
+            finally:
+                self._end(strand)
+
+        return run
+
+    def _end(self, strand: Strand) -> None:
+        self._strands.pop(originals.get_ident(), None)
+        self._round += 1
+        following = self._choose()
+        self.current = following
+        following.gate.release()
+
+    def _hand_on(self, strand: Strand) -> None:
+        following = self._choose()
+        if following is strand:
+            return
+        self.current = following
+        following.gate.release()
+        try:
+            strand.gate.acquire()
+        except BaseException:
+            # A signal handler raised in the main thread while it was parked: it may go on only with the baton.
+            self.wake(strand)
+            strand.gate.acquire()
+            raise
+
+    def _choose(self) -> Strand:
+        """Return the strand that runs next; when none can, let time move until one can."""
+        while True:
+            if self._runnable:
+                return self._runnable.popleft()
+            strand = self._poller() or self._due()
+            if strand is not None:
+                self._parked.remove(strand)
+                strand.parked = False
+                return strand
+            self._ask_for_time(min((s.deadline_ns for s in self._parked if s.deadline_ns is not None), default=None))
+            self._round += 1
+
+    def _poller(self) -> Strand | None:
+        return next((s for s in self._parked if s.polls and s.polled_in != self._round), None)
+
+    def _due(self) -> Strand | None:
+        now_ns = self._now_ns()
+        due = [s for s in self._parked if s.deadline_ns is not None and s.deadline_ns <= now_ns]
+        return min(due, key=lambda s: s.deadline_ns or 0, default=None)

@@ -1,0 +1,267 @@
+"""Locks, threads, sleeps and selectors that block in virtual time; installed before the student's imports.
+
+Everything in `threading`, `queue` and `concurrent.futures` rests on the plain lock, on starting a thread and on
+joining it, so replacing these three is enough. A lock is handed to whoever has waited longest.
+"""
+
+import _thread
+import concurrent.futures.thread
+import queue
+import select
+import selectors
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from . import originals
+from .clock import VirtualClock
+from .scheduler import Scheduler, Strand
+
+NS_PER_S = 1_000_000_000
+
+
+class Timeouts:
+    """Turns the timeouts that Python's calls take, seconds or None, into virtual deadlines."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
+
+    def deadline_ns(self, seconds: float | None) -> int | None:
+        """Return the deadline of a timeout; None or a negative number waits for ever."""
+        if seconds is None or seconds < 0:
+            return None
+        return self._clock.now_ns + round(seconds * NS_PER_S)
+
+    def over(self, deadline_ns: int | None) -> bool:
+        """Return whether a deadline has come."""
+        return deadline_ns is not None and self._clock.now_ns >= deadline_ns
+
+
+def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
+    """Return the class that stands for `threading.Lock`."""
+    timeouts = Timeouts(clock)
+
+    class VirtualLock:
+        """A lock whose waiters are parked strands."""
+
+        __slots__ = ("__weakref__", "_locked", "_waiters")
+
+        def __init__(self) -> None:
+            self._locked = False
+            self._waiters: deque[Strand] = deque()
+
+        def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+            if not blocking and timeout != -1:
+                raise ValueError("can't specify a timeout for a non-blocking call")
+            if timeout < 0 and timeout != -1:
+                raise ValueError("timeout value must be a non-negative number")
+            if not self._locked:
+                self._locked = True
+                return True
+            if not blocking:
+                clock.idle_look()
+                return False
+            return self._wait(timeouts.deadline_ns(timeout))
+
+        def _wait(self, deadline_ns: int | None) -> bool:
+            strand = scheduler.mine()
+            if strand is None:
+                return self._wait_from_outside()
+            self._waiters.append(strand)
+            try:
+                while strand in self._waiters and not timeouts.over(deadline_ns):
+                    scheduler.pause(deadline_ns)
+            except BaseException:
+                self._leave(strand)
+                raise
+            if strand in self._waiters:
+                self._waiters.remove(strand)
+                return False
+            return True
+
+        def _leave(self, strand: Strand) -> None:
+            """Stop waiting; a lock that was handed over in the same moment is passed on."""
+            if strand in self._waiters:
+                self._waiters.remove(strand)
+            else:
+                self.release()
+
+        def _wait_from_outside(self) -> bool:
+            while self._locked:
+                originals.sleep(0.001)
+            self._locked = True
+            return True
+
+        def release(self) -> None:
+            if not self._locked:
+                raise RuntimeError("release unlocked lock")
+            if self._waiters:
+                scheduler.wake(self._waiters.popleft())
+            else:
+                self._locked = False
+
+        def locked(self) -> bool:
+            clock.idle_look()
+            return self._locked
+
+        def _at_fork_reinit(self) -> None:
+            self._locked = False
+            self._waiters.clear()
+
+        def __enter__(self) -> bool:
+            return self.acquire()
+
+        def __exit__(self, *_: object) -> None:
+            self.release()
+
+        acquire_lock, release_lock, locked_lock = acquire, release, locked
+
+    return VirtualLock
+
+
+def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
+    """Make every lock that is created from now on a virtual one."""
+    virtual = lock_type(scheduler, clock)
+    threading.Lock = virtual  # type: ignore[misc,assignment]
+    threading._allocate_lock = virtual  # type: ignore[attr-defined]
+    threading._CRLock = None  # type: ignore[attr-defined]
+    threading.RLock = threading._PyRLock  # type: ignore[attr-defined,misc]
+    _thread.allocate_lock = virtual  # type: ignore[assignment]
+    _thread.RLock = threading._PyRLock  # type: ignore[attr-defined,misc]
+    queue.SimpleQueue = queue._PySimpleQueue  # type: ignore[attr-defined,misc]
+    concurrent.futures.thread._global_shutdown_lock = virtual()  # type: ignore[attr-defined]
+
+
+def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Callable[[BaseException], None]) -> None:
+    """Make every thread that is started from now on a strand, and joining one a virtual wait."""
+    finished: dict[int, list[Strand]] = {}
+
+    def start_new_thread(function: Callable[..., Any], args: tuple[Any, ...] = (), kwargs: Any = None) -> int:
+        run = scheduler.start(function, tuple(args), kwargs or {})
+        return originals.start_new_thread(run, ())
+
+    _thread.start_new_thread = start_new_thread
+    _thread.start_new = start_new_thread
+    if hasattr(threading, "_start_new_thread"):
+        threading._start_new_thread = start_new_thread
+    else:  # Python 3.13 and later start threads that can be joined without a lock
+        joinable = threading._start_joinable_thread  # type: ignore[attr-defined]
+
+        def start_joinable_thread(function: Callable[[], Any], handle: Any = None, daemon: bool = True) -> Any:
+            return joinable(scheduler.start(function, (), {}), handle=handle, daemon=daemon)
+
+        threading._start_joinable_thread = start_joinable_thread  # type: ignore[attr-defined]
+
+    run_thread = threading.Thread._bootstrap_inner  # type: ignore[attr-defined]
+    join_thread = threading.Thread.join
+    timeouts = Timeouts(clock)
+
+    def bootstrap_inner(self: threading.Thread) -> None:
+        try:
+            run_thread(self)
+        finally:
+            finished[id(self)] = finished.get(id(self), [])
+            for strand in finished[id(self)]:
+                scheduler.wake(strand)
+            self._grader_finished = True  # type: ignore[attr-defined]
+
+    def join(self: threading.Thread, timeout: float | None = None) -> None:
+        if self is threading.current_thread() or not self._started.is_set():  # type: ignore[attr-defined]
+            join_thread(self, timeout)  # raises as the original does
+        strand = scheduler.mine()
+        deadline_ns = timeouts.deadline_ns(None if timeout is None else max(timeout, 0))
+        while strand is not None and not getattr(self, "_grader_finished", False):
+            if timeouts.over(deadline_ns):
+                return
+            finished.setdefault(id(self), []).append(strand)
+            scheduler.pause(deadline_ns)
+        join_thread(self)
+
+    threading.Thread._bootstrap_inner = bootstrap_inner  # type: ignore[attr-defined]
+    threading.Thread.join = join  # type: ignore[method-assign]
+
+    def excepthook(args: Any) -> None:
+        if args.exc_value is not None and not issubclass(args.exc_type, SystemExit):
+            report_fault(args.exc_value)
+        originals.excepthook(args)
+
+    threading.excepthook = excepthook
+
+
+def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
+    """Make sleeping, and every look at a clock of the standard library, virtual."""
+
+    def sleep(seconds: float, /) -> None:
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        end_ns = clock.now_ns + round(seconds * NS_PER_S)
+        if end_ns <= clock.now_ns:
+            clock.idle_look(20)
+            scheduler.pause(clock.now_ns)
+        while clock.now_ns < end_ns:
+            scheduler.pause(end_ns)
+
+    time.sleep = sleep
+    start_ns = clock.now_ns - 1000 * NS_PER_S  # a steady clock does not start at zero, nor at the epoch
+    time.monotonic_ns = lambda: clock.look() - start_ns
+    time.monotonic = lambda: (clock.look() - start_ns) / NS_PER_S
+    time.perf_counter_ns = lambda: clock.look() - start_ns
+    time.perf_counter = lambda: (clock.look() - start_ns) / NS_PER_S
+    threading._time = time.monotonic  # type: ignore[attr-defined]
+    queue.time = time.monotonic  # type: ignore[attr-defined]
+
+
+def install_wall_time(clock: VirtualClock) -> None:
+    """Make `time.time`, `datetime.now` and their relatives virtual, however they were imported."""
+    import time_machine
+
+    traveller = time_machine.travel(clock.now_ns / NS_PER_S, tick=False).start()
+    kind = type(traveller)
+    traveller.__class__ = type(
+        "VirtualTraveller",
+        (kind,),
+        {"time_ns": lambda self: clock.look(), "time": lambda self: clock.look() / NS_PER_S},
+    )
+
+
+def install_selectors(scheduler: Scheduler, clock: VirtualClock) -> None:
+    """Make waiting for file descriptors poll them, and block in virtual time."""
+    timeouts = Timeouts(clock)
+
+    def virtual(poll: Callable[[], Any], timeout: float | None, empty: Callable[[Any], bool]) -> Any:
+        deadline_ns = timeouts.deadline_ns(timeout)
+        while True:
+            ready = poll()
+            if not empty(ready):
+                scheduler.progress()
+                clock.busy()
+                return ready
+            if timeouts.over(deadline_ns):
+                clock.idle_look(20)
+                return ready
+            scheduler.pause(deadline_ns, polls=True)
+
+    for kind in ("SelectSelector", "PollSelector", "EpollSelector"):
+        selector = getattr(selectors, kind, None)
+        if selector is not None:
+            _replace_select(selector, virtual)
+
+    select_now = select.select
+
+    def virtual_select(read: Any, write: Any, error: Any, timeout: float | None = None, /) -> Any:
+        return virtual(lambda: select_now(read, write, error, 0), timeout, lambda ready: not any(ready))
+
+    select.select = virtual_select
+
+
+def _replace_select(selector: Any, virtual: Callable[..., Any]) -> None:
+    select_now = selector.select
+
+    def virtual_select(self: Any, timeout: float | None = None) -> Any:
+        if timeout is not None and timeout < 0:
+            timeout = 0
+        return virtual(lambda: select_now(self, 0), timeout, lambda ready: not ready)
+
+    selector.select = virtual_select

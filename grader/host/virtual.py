@@ -1,0 +1,116 @@
+"""Puts the pieces of virtual time together, and holds the conversation with the grader."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from . import originals, threads
+from .clock import VirtualClock
+from .link import Link
+from .scheduler import Scheduler
+
+if TYPE_CHECKING:
+    from .ledger import Ledger
+    from .ros import RosClocks
+
+#: After the stop signal the host's own clock runs on, at most this far.
+STOPPING_NS = 60_000_000_000
+
+
+class VirtualTime:
+    """The virtual clock of one process and what hangs on it.
+
+    Args:
+        link: The line to the grader.
+        report_fault: Called with an exception that ended one of the student's threads.
+    """
+
+    def __init__(self, link: Link, report_fault: Callable[[BaseException], None]) -> None:
+        self._link = link
+        self.clock = VirtualClock()
+        self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
+        self.clock.let_time_pass = self.scheduler.pause
+        self._ledger: Ledger | None = None
+        self._clocks: RosClocks | None = None
+        self._stopping = False
+        self._end_ns = 0
+        self.resumed_ns = originals.processor_ns()
+        self.running = True
+        self._used_ns = 0
+        threads.install_locks(self.scheduler, self.clock)
+        threads.install_threads(self.scheduler, self.clock, report_fault)
+        threads.install_sleep_and_clocks(self.scheduler, self.clock)
+        threads.install_selectors(self.scheduler, self.clock)
+
+    def install_ros(self) -> None:
+        """Import rclpy and make it virtual."""
+        from . import ros
+        from .ledger import Ledger
+
+        self._ledger = Ledger()
+        self._clocks = ros.RosClocks(self.clock)
+        ros.install_clocks(self._clocks, self.scheduler, self.clock)
+        ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
+        ros.install_traffic(self._ledger, self.clock, lambda: self._converse(self.clock.now_ns))
+        ros.install_looks(self.clock)
+        threads.install_wall_time(self.clock)
+
+    def start(self, now_ns: int) -> None:
+        """Begin to live at a time."""
+        self._move_to(now_ns)
+        self.resumed_ns = originals.processor_ns()
+
+    def summary(self) -> dict[str, Any]:
+        """Return what every report carries: traffic, endpoints if they changed, processor time."""
+        self._used_ns += originals.processor_ns() - self.resumed_ns
+        report: dict[str, Any] = {"cpu_ns": self._used_ns}
+        if self._ledger is not None:
+            report["sent"] = dict(self._ledger.sent)
+            self._ledger.sent.clear()
+            if self._ledger.lost:
+                report["lost"] = dict(self._ledger.lost)
+                self._ledger.lost.clear()
+            if self._ledger.changed:
+                report["endpoints"] = self._ledger.claims()
+        return report
+
+    def _ask_for_time(self, wake_ns: int | None) -> None:
+        if self._stopping:
+            self._run_on(wake_ns)
+        else:
+            self._converse(wake_ns)
+
+    def _converse(self, wake_ns: int | None) -> None:
+        """Report, wait for the answer and do what it says."""
+        if self._stopping:
+            return
+        report = {"kind": "idle", "wake_ns": wake_ns, **self.summary()}
+        self.running = False
+        answer = self._link.ask(report)
+        self.resumed_ns = originals.processor_ns()
+        self.running = True
+        while "match" in answer and self._ledger is not None:
+            missing = self._ledger.await_matches(answer["match"])
+            answer = self._link.ask({"kind": "matched", "missing": missing})
+        if answer.get("stop"):
+            self._stopping = True
+            self._end_ns = self.clock.now_ns + STOPPING_NS
+            os.kill(os.getpid(), signal.SIGINT)
+            return
+        self._move_to(answer["now_ns"])
+        if self._ledger is not None and answer.get("arrivals"):
+            self._ledger.expect(answer["arrivals"])
+
+    def _move_to(self, now_ns: int) -> None:
+        self.clock.move_to(now_ns)
+        if self._clocks is not None:
+            self._clocks.move()
+
+    def _run_on(self, wake_ns: int | None) -> None:
+        """Let time pass after the stop signal, without the grader."""
+        originals.sleep(0.001)
+        if wake_ns is not None and wake_ns <= self._end_ns:
+            self._move_to(wake_ns)

@@ -1,0 +1,77 @@
+"""Watches, in real time, that the student's code comes back; if not, tells the grader where it stands and ends it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+from . import originals
+from .faults import Describer
+from .link import Link
+
+if TYPE_CHECKING:
+    from .virtual import VirtualTime
+
+NS_PER_S = 1_000_000_000
+INTERVAL_S = 0.1
+
+
+class Watchdog:
+    """A thread of the host's own beside the student's.
+
+    Args:
+        link: The line to the grader.
+        time: Says since when the student's code has been running.
+        describer: Names the student's frames.
+        limits: `wake_up_cpu_s`, processor seconds between two reports; `blocked_s`, real seconds blocked elsewhere.
+    """
+
+    def __init__(self, link: Link, time: VirtualTime, describer: Describer, limits: dict[str, float]) -> None:
+        self._link = link
+        self._time = time
+        self._describer = describer
+        self._wake_up_cpu_s = limits["wake_up_cpu_s"]
+        self._blocked_s = limits["blocked_s"]
+        self._stopped = False
+
+    def start(self) -> None:
+        """Start watching."""
+        originals.start_new_thread(self._watch, ())
+
+    def stop(self) -> None:
+        """Stop watching: the program has ended."""
+        self._stopped = True
+
+    def _watch(self) -> None:
+        blocked_s, used_before = 0.0, 0
+        while not self._stopped:
+            originals.sleep(INTERVAL_S)
+            used = originals.processor_ns()
+            if not self._time.running:
+                blocked_s = 0.0
+                continue
+            if used - self._time.resumed_ns > self._wake_up_cpu_s * NS_PER_S:
+                self._give_up("hung", f"did not return within {self._wake_up_cpu_s:g} s of processor time")
+            idle = used - used_before < INTERVAL_S * NS_PER_S / 20 and self._sleeps()
+            blocked_s = blocked_s + INTERVAL_S if idle else 0.0
+            used_before = used
+            if blocked_s > self._blocked_s:
+                self._give_up("hung", f"waited {self._blocked_s:g} s for something outside the ROS graph")
+
+    def _sleeps(self) -> bool:
+        """Return whether the thread that should be running is asleep in the system, rather than waiting for a processor."""
+        thread = self._time.scheduler.running_native_thread()
+        try:
+            with open(f"/proc/self/task/{thread}/stat", encoding="ascii", errors="replace") as stat:
+                return stat.read().rpartition(")")[2].split()[0] == "S"
+        except OSError:
+            return False
+
+    def _give_up(self, kind: str, text: str) -> None:
+        if self._stopped or not self._time.running:
+            return
+        frame = sys._current_frames().get(self._time.scheduler.running_thread() or -1)
+        fault: dict[str, Any] = self._describer.stack(frame, kind, text)
+        self._link.send({"kind": "exited", "code": None, "fault": fault, **self._time.summary()})
+        os._exit(70)

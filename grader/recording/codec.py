@@ -1,0 +1,181 @@
+"""Traces as JSON values and back; reading checks every shape, because a trace crosses a line that is not trusted."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from grader.model.errors import HarnessError
+from grader.model.trace import (
+    ClockKind,
+    Delivery,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Mark,
+    Message,
+    Observation,
+    OutputLine,
+    Trace,
+)
+
+FORMAT = "grader/trace/v1"
+SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+def trace_to_json(trace: Trace) -> dict[str, Any]:
+    """Return a trace as plain JSON values; NaN and infinities become `{"float": "nan"}`."""
+    return {
+        "format": FORMAT,
+        "scenario": trace.scenario,
+        "clock": trace.clock.value,
+        "clock_reason": trace.clock_reason,
+        "stop_ns": trace.stop_ns,
+        "notes": list(trace.notes),
+        "harness_problem": trace.harness_problem,
+        "observations": [observation_to_json(o) for o in trace.observations],
+    }
+
+
+def observation_to_json(observation: Observation) -> list[Any]:
+    """Return one observation as `[kind, field, ...]` in the order of its fields."""
+    if isinstance(observation, (Message, Delivery)):
+        kind = "message" if isinstance(observation, Message) else "delivery"
+        cdr = base64.b64encode(observation.cdr).decode()
+        return [kind, observation.t_ns, observation.topic, observation.type, plain(observation.value), cdr]
+    if isinstance(observation, GraphSnapshot):
+        ends = [[getattr(e, name) for name in Endpoint.__slots__] for e in observation.endpoints]
+        return ["graph", observation.t_ns, list(observation.nodes), ends]
+    if isinstance(observation, Fault):
+        fields = [getattr(observation, name) for name in Fault.__slots__]
+        return ["fault", *fields[:2], observation.kind.value, *fields[3:6], list(observation.frames)]
+    kinds = {LogRecord: "log", OutputLine: "line", Mark: "mark"}
+    return [kinds[type(observation)], *(getattr(observation, name) for name in type(observation).__slots__)]
+
+
+def plain(value: Any) -> Any:
+    """Return message fields as strict JSON values."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"float": str(value)}
+    if isinstance(value, Mapping):
+        return {name: plain(field) for name, field in value.items()}
+    return [plain(field) for field in value] if isinstance(value, (list, tuple)) else value
+
+
+def lively(value: Any) -> Any:
+    """Return what `plain` was given."""
+    if isinstance(value, dict):
+        if value.keys() == {"float"} and isinstance(value["float"], str):
+            return SPECIAL[value["float"]]
+        return {name: lively(field) for name, field in value.items()}
+    return [lively(field) for field in value] if isinstance(value, list) else value
+
+
+def trace_from_json(data: Any) -> Trace:
+    """Return the trace that JSON values hold; raises HarnessError if they hold none."""
+    try:
+        if data["format"] != FORMAT:
+            raise HarnessError(f"trace: expected format {FORMAT}, found {str(data['format'])[:40]}")
+        return Trace(
+            scenario=_text(data["scenario"]),
+            clock=ClockKind(data["clock"]),
+            stop_ns=_whole(data["stop_ns"]),
+            observations=tuple(observation_from_json(o) for o in data["observations"]),
+            clock_reason=_text(data["clock_reason"]),
+            notes=tuple(_text(note) for note in data["notes"]),
+            harness_problem=_text(data["harness_problem"]),
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
+
+
+def observation_from_json(data: list[Any]) -> Observation:
+    """Return one observation; raises ValueError, TypeError, KeyError or IndexError for anything else."""
+    kind, *fields = data
+    return READERS[kind](fields)
+
+
+def _message(fields: list[Any]) -> Message:
+    t_ns, topic, kind, value, cdr = fields
+    return Message(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), base64.b64decode(cdr))
+
+
+def _delivery(fields: list[Any]) -> Delivery:
+    t_ns, topic, kind, value, cdr = fields
+    return Delivery(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), base64.b64decode(cdr))
+
+
+def _log(fields: list[Any]) -> LogRecord:
+    t_ns, *texts, line = fields
+    process, severity, logger, text, file = map(_text, texts)
+    return LogRecord(_whole(t_ns), process, severity, logger, text, file, _whole(line))
+
+
+def _line(fields: list[Any]) -> OutputLine:
+    t_ns, *texts = fields
+    process, stream, text = map(_text, texts)
+    return OutputLine(_whole(t_ns), process, stream, text)
+
+
+def _graph(fields: list[Any]) -> GraphSnapshot:
+    t_ns, nodes, ends = fields
+    return GraphSnapshot(_whole(t_ns), tuple(map(_text, nodes)), tuple(_endpoint(e) for e in ends))
+
+
+def _endpoint(fields: list[Any]) -> Endpoint:
+    kind, topic, interface, node, participant, reliability, durability, depth = fields
+    return Endpoint(
+        _text(kind),
+        _text(topic),
+        _text(interface),
+        _text(node),
+        _whole(participant),
+        _text(reliability),
+        _text(durability),
+        _whole(depth),
+    )
+
+
+def _fault(fields: list[Any]) -> Fault:
+    t_ns, process, kind, text, file, line, frames = fields
+    return Fault(
+        _whole(t_ns), _text(process), FaultKind(kind), _text(text), _text(file), _whole(line), tuple(map(_text, frames))
+    )
+
+
+def _mark(fields: list[Any]) -> Mark:
+    t_ns, name, detail = fields
+    return Mark(_whole(t_ns), _text(name), _text(detail))
+
+
+def _whole(value: Any) -> int:
+    if type(value) is not int:
+        raise TypeError(value)
+    return value
+
+
+def _text(value: Any) -> str:
+    if type(value) is not str:
+        raise TypeError(value)
+    return value
+
+
+def _mapping(value: Any) -> dict[str, Any]:
+    if type(value) is not dict:
+        raise TypeError(value)
+    return value
+
+
+READERS: Mapping[str, Callable[[list[Any]], Observation]] = {
+    "message": _message,
+    "delivery": _delivery,
+    "log": _log,
+    "line": _line,
+    "graph": _graph,
+    "fault": _fault,
+    "mark": _mark,
+}

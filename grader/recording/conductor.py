@@ -1,0 +1,407 @@
+"""Steps student processes and stimuli through virtual time, in lock-step, and writes down what happens.
+
+At every instant: stimuli first, then each process that is due or has something on its way, one at a time, until nothing
+is left to do at that instant. Then time jumps to the next moment at which anybody wants to do anything.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from grader.model.quantities import NS_PER_S
+from grader.model.trace import (
+    ClockKind,
+    Delivery,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    Mark,
+    Message,
+    Observation,
+    Trace,
+)
+from grader.recording.observer import Observer, wait_until
+from grader.recording.plan import Plan
+from grader.recording.stimuli import Due, number_message, numeric_field, schedule
+from grader.recording.student import Student
+
+#: Where the hosts' virtual time starts: 2026-01-01 00:00:00 UTC, as `grader/host/clock.py` has it.
+EPOCH_NS = 1_767_225_600_000_000_000
+#: How long, in real time, an endpoint or a message that was announced is waited for.
+SETTLE_S = 5.0
+#: After so many messages that never came, later ones are waited for only briefly.
+PATIENCE = 3
+IMPATIENT_S = 0.05
+#: What rclpy calls a node whose endpoints are known but whose name is not yet.
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: Limits of one scenario; reaching one ends it with a mark.
+MESSAGES = 50_000
+STEPS = 400_000
+
+
+class Conductor:
+    """Runs one plan on the virtual clock.
+
+    Args:
+        plan: What to run.
+        students: The started processes, each waiting to be told the time.
+        observer: The grader's node.
+    """
+
+    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+        self._plan = plan
+        self._students = students
+        self._observer = observer
+        self._now_ns = 0
+        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._due = schedule(plan.numbers, plan.recordings)
+        self._streams: dict[str, str] = {}
+        self._observations: list[Observation] = []
+        self._notes: list[str] = []
+        self._graph = GraphSnapshot(0, (), ())
+        self._taken: Counter[tuple[str, str]] = Counter()
+        self._requesters: dict[str, list[Student]] = {}
+        self._losses = 0
+        self._messages = 0
+        self._steps = 0
+
+    def run(self) -> Trace:
+        """Run the plan to its end and return the trace."""
+        self._play(phase="before")
+        for student in self._students:
+            self._step(student)
+        while not self._finished():
+            self._settle()
+            if self._now_ns >= self._end_ns:
+                break
+            self._now_ns = self._next_ns()
+        self._look_at_graph()
+        return Trace(
+            scenario=self._plan.scenario,
+            clock=ClockKind.VIRTUAL,
+            stop_ns=self._end_ns,
+            observations=tuple(self._observations),
+            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes])),
+        )
+
+    def _finished(self) -> bool:
+        return all(s.ended for s in self._students) and not self._due
+
+    def _next_ns(self) -> int:
+        moments = [self._end_ns]
+        moments += [s.wake_ns for s in self._students if not s.ended and s.wake_ns is not None]
+        moments += [self._due[0].t_ns] if self._due else []
+        return max(self._now_ns, min(moments))
+
+    def _settle(self) -> None:
+        """Let everything happen that happens at this instant."""
+        if self._now_ns >= self._end_ns:
+            return
+        self._play()
+        while (student := self._next_student()) is not None and self._now_ns < self._end_ns:
+            self._step(student)
+
+    def _next_student(self) -> Student | None:
+        return next(
+            (
+                s
+                for s in self._students
+                if not s.ended and (s.arrivals or (s.wake_ns is not None and s.wake_ns <= self._now_ns))
+            ),
+            None,
+        )
+
+    def _step(self, student: Student) -> None:
+        """Tell one process the time and what is on its way, and handle its report."""
+        arrivals, student.arrivals = student.arrivals, {}
+        student.tell({"now_ns": EPOCH_NS + self._now_ns, "arrivals": arrivals})
+        self._hear(student)
+        self._steps += 1
+        if self._steps >= STEPS:
+            self._stop_early(f"stopped after {STEPS} wake-ups")
+
+    def _hear(self, student: Student) -> None:
+        """Wait until a process has nothing left to do at this instant, or has ended."""
+        while True:
+            report = student.report()
+            kind = None if report is None else report.get("kind")
+            if report is None or kind not in ("note", "fault", "idle", "exited"):
+                self._write_output(student, final=True)
+                self._end(student, student.death(self._now_ns))
+                return
+            if kind == "note":
+                student.notes.append(str(report.get("text", ""))[:500])
+                continue
+            self._write_output(student, final=kind == "exited")
+            if kind == "fault":
+                self._observations.append(self._fault(student, report))
+                continue
+            self._account(student, report)
+            if kind == "exited":
+                self._end(student, *self._endings(student, report))
+                return
+            wake_ns = report.get("wake_ns")
+            student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
+            return
+
+    def _account(self, student: Student, report: Mapping[str, Any]) -> None:
+        """Take what a process has published, let it reach everybody, and match new endpoints."""
+        used_ns = report.get("cpu_ns")
+        student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
+        for channel, count in _counts(report.get("lost")).items():
+            self._notes.append(f"{student.name}: {count} messages on {channel} were overwritten before they were read")
+        sent = _counts(report.get("sent"))
+        self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
+        self._forward(student, sent)
+        if isinstance(report.get("endpoints"), list):
+            student.claims = [c for c in report["endpoints"] if _is_claim(c)]
+            self._match()
+
+    def _collect(self, sent: Mapping[str, int]) -> None:
+        """Wait until everything published has been taken here, and write it down."""
+        expected = Counter({topic: n for topic, n in sent.items() if self._readable(topic)})
+        found = []
+        if expected:
+            patience = SETTLE_S if self._losses < PATIENCE else IMPATIENT_S
+
+            def complete() -> bool:
+                for message in self._observer.take():
+                    found.append(message)
+                    expected[message.topic] -= 1
+                return all(count <= 0 for count in expected.values())
+
+            if not wait_until(complete, patience):
+                self._losses += 1
+                for topic in sorted(t for t, n in expected.items() if n > 0):
+                    self._notes.append(f"some messages on {topic} did not arrive")
+        for message in found:
+            self._record(Message(self._now_ns, message.topic, message.type, message.value, message.cdr))
+
+    def _record(self, message: Message) -> None:
+        self._observations.append(message)
+        self._messages += 1
+        if message.topic == self._plan.first_message_on and not self._taken[(message.topic, "")]:
+            self._end_ns = self._now_ns + self._plan.duration_ns
+        self._taken[(message.topic, "")] += 1
+        if self._messages >= MESSAGES:
+            self._stop_early(f"stopped after {MESSAGES} messages")
+
+    def _stop_early(self, why: str) -> None:
+        if not any(isinstance(o, Mark) and o.name == "limit" for o in self._observations):
+            self._observations.append(Mark(self._now_ns, "limit", why))
+            self._end_ns = self._now_ns
+
+    def _readable(self, topic: str) -> bool:
+        return any(e.topic == topic and e.kind == "publisher" for e in self._graph.endpoints)
+
+    def _forward(self, sender: Student, sent: Mapping[str, int]) -> None:
+        """Tell every process what is on its way to it."""
+        for channel, count in sorted(sent.items()):
+            kind, _, name = channel.partition(" ")
+            if kind == "topic":
+                writers = [c for c in sender.claims if c["kind"] == "publisher" and c["name"] == name]
+                for student in self._students:
+                    if any(_compatible(w, r) for w in writers for r in _readers(student, name)):
+                        _add(student.arrivals, channel, count)
+            elif kind == "request":
+                servers = [s for s in self._students if any(c["kind"] == "service" and c["name"] == name for c in s.claims)]
+                for student in servers:
+                    _add(student.arrivals, channel, count)
+                    self._requesters.setdefault(name, []).extend([sender] * count)
+            elif kind == "response":
+                waiting = self._requesters.get(name, [])
+                for _ in range(min(count, len(waiting))):
+                    _add(waiting.pop(0).arrivals, channel, 1)
+
+    def _match(self) -> None:
+        """Wait until every endpoint that the processes say they have is seen, watched and matched."""
+        claims = [c for s in self._students if not s.ended for c in s.claims]
+        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
+        if not wait_until(lambda: self._sees(ends), SETTLE_S):
+            self._notes.append("an endpoint that a node created was not seen in the graph")
+        self._look_at_graph()
+        unknown = self._observer.watch(self._graph)
+        self._notes += [f"the type of {name} is not known on this machine" for name in unknown]
+        writers = [c for c in ends if c["kind"] == "publisher"]
+        wait_until(lambda: all(self._watched(c, writers) for c in writers), SETTLE_S)
+        for student in self._students:
+            if not student.ended:
+                self._tell_matches(student, claims)
+
+    def _sees(self, ends: list[dict[str, Any]]) -> bool:
+        graph = self._observer.graph(self._now_ns)
+        seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
+        wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
+        named = not any(UNKNOWN_NODE in e.node for e in graph.endpoints)  # names come a little later than endpoints
+        return named and all(seen[key] >= count for key, count in wanted.items())
+
+    def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
+        same = [w for w in writers if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])]
+        matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
+        # A reader that takes best effort also matches reliable writers: it may see more than its own.
+        return matched >= len(same) or not self._readable(claim["name"])
+
+    def _tell_matches(self, student: Student, claims: list[dict[str, Any]]) -> None:
+        """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
+        expected: dict[str, dict[str, int]] = {}
+        for claim in student.claims:
+            count = self._counterparts(claim, claims)
+            if count:
+                names = expected.setdefault(claim["kind"], {})
+                names[claim["name"]] = min(names.get(claim["name"], count), count)
+        if expected in ({}, student.told):
+            return
+        student.told = expected
+        student.tell({"match": expected})
+        answer = student.report()
+        if answer is None or answer.get("kind") != "matched":
+            self._end(student, student.death(self._now_ns))
+            return
+        for name in answer.get("missing", ()):
+            self._notes.append(f"{student.name}: {str(name)[:200]} was not matched in time")
+
+    def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
+        kind, name = claim["kind"], claim["name"]
+        if kind == "publisher":
+            students = sum(_compatible(claim, c) for c in claims if c["kind"] == "subscription")
+            return students + sum(
+                1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
+            )
+        if kind == "subscription":
+            stimulus = self._streams.get(name) == claim["type"]
+            return int(stimulus) + sum(_compatible(c, claim) for c in claims if c["kind"] == "publisher")
+        wanted = "service" if kind == "client" else "client"
+        return int(kind == "client" and any(c["kind"] == wanted and c["name"] == name for c in claims))
+
+    def _look_at_graph(self) -> None:
+        graph = self._observer.graph(self._now_ns)
+        if (graph.nodes, graph.endpoints) != (self._graph.nodes, self._graph.endpoints):
+            self._graph = graph
+            self._observations.append(graph)
+
+    def _write_output(self, student: Student, *, final: bool) -> None:
+        self._observations += student.output(self._now_ns, final=final)
+
+    def _endings(self, student: Student, report: Mapping[str, Any]) -> list[Fault]:
+        """Return the faults of a process that says how it ended."""
+        if isinstance(report.get("fault"), dict):
+            return [self._fault(student, report["fault"])]
+        code = report.get("code")
+        return [Fault(self._now_ns, student.name, FaultKind.EXITED, f"exited with code {code if isinstance(code, int) else '?'}")]
+
+    def _fault(self, student: Student, data: Mapping[str, Any]) -> Fault:
+        kinds = {kind.value: kind for kind in FaultKind}
+        frames = data.get("frames")
+        line = data.get("line")
+        return Fault(
+            t_ns=self._now_ns,
+            process=student.name,
+            kind=kinds.get(str(data.get("kind")), FaultKind.EXCEPTION),
+            text=str(data.get("text", ""))[:500],
+            file=str(data.get("file", ""))[:300],
+            line=line if isinstance(line, int) else 0,
+            frames=tuple(str(f)[:300] for f in frames[:20]) if isinstance(frames, list) else (),
+        )
+
+    def _end(self, student: Student, *faults: Fault) -> None:
+        self._observations += faults
+        student.ended = True
+        student.wake_ns = None
+        student.claims = []
+
+    def _play(self, *, phase: str = "") -> None:
+        """Do what stimuli do at this instant; before the start, only what appears at once."""
+        while self._due and self._due[0].t_ns <= self._now_ns:
+            if phase and self._due[0].action != "appear":
+                return
+            self._do(self._due.pop(0))
+
+    def _do(self, due: Due) -> None:
+        if due.action == "appear":
+            self._appear(due)
+        elif due.action == "disappear":
+            self._streams.pop(due.topic, None)
+            self._observer.withdraw(due.topic)
+            self._observations.append(Mark(self._now_ns, "stream_stops", due.topic))
+        else:
+            self._publish(due)
+
+    def _appear(self, due: Due) -> None:
+        """Create a stimulus's publisher, of the type and durability that the students' subscriptions ask for."""
+        self._start_stream(due.topic, due.payload)
+        self._observations.append(Mark(self._now_ns, "stream_starts", due.topic))
+
+    def _start_stream(self, topic: str, default: str) -> None:
+        asked = [c for s in self._students for c in _readers(s, topic)]
+        carrying = [c for c in asked if default == c["type"] or numeric_field(c["type"]) is not None]
+        interface = carrying[0]["type"] if carrying and "nav_msgs" not in default else default
+        latched = any(c["latched"] for c in asked if c["type"] == interface)
+        self._observer.advertise(topic, interface, latched=latched)
+        self._streams[topic] = interface
+        readers = [c for c in asked if c["type"] == interface]
+        wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
+        for student in self._students:
+            if not student.ended and student.claims:
+                self._tell_matches(student, [c for s in self._students for c in s.claims])
+
+    def _publish(self, due: Due) -> None:
+        """Publish one message of a stimulus and note for whom it is on its way."""
+        self._follow_type(due.topic)
+        interface = self._streams[due.topic]
+        if interface == "nav_msgs/msg/Odometry":
+            cdr, value = due.payload
+            message: Any = cdr
+        else:
+            message, value = number_message(interface, due.payload)
+            cdr = b""
+        self._observations.append(Delivery(self._now_ns, due.topic, interface, value, cdr))
+        self._observer.publish(due.topic, message)
+        for student in self._students:
+            if any(c["type"] == interface for c in _readers(student, due.topic)):
+                _add(student.arrivals, f"topic {due.topic}", 1)
+
+    def _follow_type(self, topic: str) -> None:
+        """Change a stimulus's type or durability when a student's node subscribed with another one."""
+        current = self._streams[topic]
+        asked = [c for s in self._students for c in _readers(s, topic)]
+        if current == "nav_msgs/msg/Odometry" or not asked or any(c["type"] == current for c in asked):
+            return
+        if any(numeric_field(c["type"]) is not None for c in asked):
+            self._observer.withdraw(topic)
+            self._start_stream(topic, current)
+
+    def processor_share(self) -> float:
+        """Return the processor seconds that the busiest process used per virtual second."""
+        return max((s.used_ns for s in self._students), default=0) / max(self._now_ns, NS_PER_S)
+
+
+def _counts(data: Any) -> dict[str, int]:
+    if not isinstance(data, dict):
+        return {}
+    return {str(name): count for name, count in data.items() if isinstance(count, int) and count > 0}
+
+
+def _is_claim(claim: Any) -> bool:
+    if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
+        return False
+    ends = claim["kind"] in ("publisher", "subscription")
+    return not ends or all(isinstance(claim.get(k), bool) for k in ("reliable", "latched"))
+
+
+def _readers(student: Student, topic: str) -> list[dict[str, Any]]:
+    return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
+
+
+def _compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
+    """Return whether a publisher's offer satisfies a subscription's request (reliability and durability)."""
+    return (
+        (writer["name"], writer["type"]) == (reader["name"], reader["type"])
+        and (writer["reliable"] or not reader["reliable"])
+        and (writer["latched"] or not reader["latched"])
+    )
+
+
+def _add(arrivals: dict[str, int], channel: str, count: int) -> None:
+    arrivals[channel] = arrivals.get(channel, 0) + count

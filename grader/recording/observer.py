@@ -1,0 +1,210 @@
+"""The grader's own node: sees the graph, takes every message the students' nodes publish, publishes stimuli.
+
+With `worker.py` and `conductor.py` the only place of the grader that uses rclpy. It has no services, no parameters and no callbacks; it
+never waits for an executor: messages are taken when the conductor asks for them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import secrets
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from grader.model.trace import Endpoint, GraphSnapshot
+
+BACKGROUND = frozenset({"/rosout", "/parameter_events"})
+#: Deep enough for everything that can be published between two looks.
+DEPTH = 5000
+#: Messages larger than this are counted, but neither decoded nor kept.
+MESSAGE_BYTES = 1 << 20
+TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One message as it came: topic, type, bytes and decoded fields."""
+
+    topic: str
+    type: str
+    cdr: bytes
+    value: Mapping[str, Any]
+
+
+class Observer:
+    """A node in a context of its own.
+
+    Args:
+        domain: ROS domain to join.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        self._context.init(domain_id=domain)
+        self._name = f"_observer_{secrets.token_hex(8)}"  # a student's node can't guess it
+        self.node = Node(
+            self._name,
+            context=self._context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            enable_logger_service=False,
+        )
+        self._readers: dict[tuple[str, str, bool], Any] = {}
+        self._writers: dict[str, Any] = {}
+        self._participants: dict[bytes, int] = {}
+        self.unreadable: Counter[str] = Counter()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self.node.destroy_node()
+        self._context.shutdown()
+
+    def graph(self, t_ns: int) -> GraphSnapshot:
+        """Return the live graph without the grader's own node, everything sorted."""
+        names = ((name, space) for name, space in self.node.get_node_names_and_namespaces() if name != self._name)
+        nodes = sorted({_full_name(name, space) for name, space in names})
+        ends = []
+        for topic, _ in sorted(self.node.get_topic_names_and_types(no_demangle=False)):
+            if topic in BACKGROUND:
+                continue
+            ends += [self._endpoint("publisher", topic, info) for info in self.node.get_publishers_info_by_topic(topic)]
+            ends += [
+                self._endpoint("subscription", topic, info) for info in self.node.get_subscriptions_info_by_topic(topic)
+            ]
+        students = [e for e in ends if e.participant >= 0]
+        return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)))
+
+    def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
+        own = info.node_name == self._name
+        prefix = bytes(info.endpoint_gid[:12])
+        number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
+        latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        return Endpoint(
+            kind=kind,
+            topic=topic,
+            type=info.topic_type,
+            node=_full_name(info.node_name, info.node_namespace),
+            participant=number,
+            reliability="best_effort" if best_effort else "reliable",
+            durability="transient_local" if latched else "volatile",
+        )
+
+    def watch(self, graph: GraphSnapshot) -> list[str]:
+        """Subscribe to every topic that a student's node publishes; return topics whose type is unknown here."""
+        unknown = []
+        for end in graph.endpoints:
+            key = (end.topic, end.type, end.reliability == "reliable")
+            if end.kind != "publisher" or key in self._readers:
+                continue
+            message = message_class(end.type)
+            if message is None:
+                unknown.append(f"{end.topic} [{end.type}]")
+                continue
+            reliability = ReliabilityPolicy.RELIABLE if key[2] else ReliabilityPolicy.BEST_EFFORT
+            qos = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=reliability)
+            self._readers[key] = self.node.create_subscription(message, end.topic, _nothing, qos, raw=True)
+        return unknown
+
+    def watching(self, topic: str, interface: str) -> list[bool]:
+        """Return the subscriptions on a topic and type: for each, whether it asks for reliability."""
+        return [reliable for name, kind, reliable in self._readers if (name, kind) == (topic, interface)]
+
+    def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
+        """Return how many publishers the subscription for a topic, type and reliability has."""
+        reader = self._readers.get((topic, interface, reliable))
+        return 0 if reader is None else int(reader.get_publisher_count())
+
+    def take(self) -> list[Taken]:
+        """Return every message that has arrived since the last time, topic by topic."""
+        taken = []
+        for (topic, interface, _), reader in sorted(self._readers.items()):
+            with reader.handle:
+                while (found := reader.handle.take_message(reader.msg_type, True)) is not None:  # noqa: FBT003
+                    taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+        return taken
+
+    def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:
+        if len(cdr) > MESSAGE_BYTES:
+            self.unreadable[topic] += 1
+            return Taken(topic, interface, b"", {})
+        try:
+            return Taken(topic, interface, cdr, plain_fields(deserialize_message(cdr, message)))
+        except Exception:  # noqa: BLE001 - rclpy gives no type for a message that can't be decoded
+            self.unreadable[topic] += 1
+            return Taken(topic, interface, cdr, {})
+
+    def advertise(self, topic: str, interface: str, *, latched: bool) -> None:
+        """Create the publisher of a stimulus: reliable, and latched where a subscription asks for it."""
+        message = message_class(interface)
+        if message is None:
+            raise ValueError(interface)
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+        self._writers[topic] = self.node.create_publisher(message, topic, qos)
+
+    def subscribers_matched(self, topic: str) -> int:
+        """Return how many subscriptions the publisher of a stimulus has."""
+        return int(self._writers[topic].get_subscription_count())
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message object, or its bytes, on a stimulus's topic."""
+        self._writers[topic].publish(message)
+
+    def withdraw(self, topic: str) -> None:
+        """Take the publisher of a stimulus out of the graph."""
+        self.node.destroy_publisher(self._writers.pop(topic))
+
+
+def message_class(interface: str) -> Any:
+    """Return the class of a message type, or None if this machine has no such type."""
+    match = TYPE_NAME.fullmatch(interface)
+    if match is None:
+        return None
+    try:
+        return getattr(importlib.import_module(f"{match[1]}.msg"), match[2], None)
+    except ImportError:
+        return None
+
+
+def plain_fields(message: Any) -> Any:
+    """Return a message's fields as plain values, nested by name."""
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: plain_fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, (bool, int, float, str)):
+        return message
+    if isinstance(message, bytes):
+        return list(message)
+    return [plain_fields(item) for item in message]
+
+
+def wait_until(condition: Any, seconds: float) -> bool:
+    """Wait, in real time, until a condition holds; return whether it came to."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.0003)
+    return True
+
+
+def _full_name(name: str, space: str) -> str:
+    return f"{space.rstrip('/')}/{name}"
+
+
+def _endpoint_order(end: Endpoint) -> tuple[str, str, str, int]:
+    return end.kind, end.topic, end.node, end.participant
+
+
+def _nothing(_: object) -> None:
+    """Stand for a callback; messages are taken by hand."""

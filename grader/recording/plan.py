@@ -1,0 +1,186 @@
+"""Plans: one scenario made concrete, every drawn value in place, as the supervisor hands it to a worker."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.model.exercise import Exercise
+from grader.model.scenario import Between, JustAbove, JustBelow, NumberSpec, NumberStream, OdometryStream, Scenario
+from grader.model.submission import Submission
+from grader.recording.bag import Odometry, window
+
+#: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
+PlannedNumber = tuple[float, int]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedNumbers:
+    """Numbers to be published in the type the student's node takes; times in nanoseconds since scenario start."""
+
+    topic: str
+    type: str
+    start_ns: int
+    period_ns: int
+    repeats: int
+    numbers: tuple[PlannedNumber, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRecording:
+    """Recorded messages to be published as they are: `(t_ns, cdr, value)` since scenario start."""
+
+    topic: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    messages: tuple[tuple[int, bytes, Mapping[str, Any]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a worker needs to know to run one scenario.
+
+    Attributes:
+        scenario: Scenario id.
+        processes: Name (the wanted file) and found file of each student process, in start order.
+        root: The staged submission.
+        host_seed: Hex; seeds the randomness of the student's processes, and tells nothing about the stimuli.
+        duration_ns: Observed time.
+        first_message_on: Topic whose first message starts the observation, or empty.
+        wait_at_most_ns: How long that message is waited for.
+        numbers: Stimuli.
+        recordings: Stimuli.
+        clock: `virtual` or `wall`.
+    """
+
+    scenario: str
+    processes: tuple[tuple[str, str], ...]
+    root: str
+    host_seed: str
+    duration_ns: int
+    first_message_on: str
+    wait_at_most_ns: int
+    numbers: tuple[PlannedNumbers, ...]
+    recordings: tuple[PlannedRecording, ...]
+    clock: str
+
+
+def plan_scenario(
+    exercise: Exercise, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
+) -> Plan:
+    """Return a scenario with every value drawn.
+
+    Args:
+        exercise: The exercise it belongs to.
+        scenario: What to run.
+        submission: Whose files run; every process of the scenario has one.
+        seed: Every drawn value follows from it, the exercise and the scenario.
+        odometry: The recording, if the scenario plays one.
+        clock: `virtual` or `wall`.
+    """
+    draw = random.Random(derive(seed, "stimuli", exercise.id, scenario.id))  # noqa: S311 - it has to repeat
+    numbers = tuple(_numbers(s, draw) for s in scenario.stimuli if isinstance(s, NumberStream))
+    recordings = tuple(
+        _recording(s, odometry, draw.getrandbits(32))
+        for s in scenario.stimuli
+        if isinstance(s, OdometryStream) and odometry is not None
+    )
+    return Plan(
+        scenario=scenario.id,
+        processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
+        root=str(submission.root),
+        host_seed=derive(seed, "host", exercise.id, scenario.id),
+        duration_ns=scenario.span.duration_ns,
+        first_message_on=scenario.span.after_first_message_on or "",
+        wait_at_most_ns=scenario.span.wait_at_most_ns,
+        numbers=numbers,
+        recordings=recordings,
+        clock=clock,
+    )
+
+
+def derive(seed: int, *purpose: str) -> str:
+    """Return 64 hex digits that follow from a seed and a purpose, and from which neither can be found."""
+    text = "/".join((str(seed), *purpose))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def seed_of(digest: str) -> int:
+    """Return the seed that belongs to a submission's digest, a number people can type."""
+    return int(hashlib.sha256(digest.encode()).hexdigest()[:8], 16)
+
+
+def _numbers(stream: NumberStream, draw: random.Random) -> PlannedNumbers:
+    return PlannedNumbers(
+        topic=stream.topic,
+        type=stream.type,
+        start_ns=stream.start_ns,
+        period_ns=stream.period_ns,
+        repeats=max(1, stream.hold_ns // stream.period_ns),
+        numbers=tuple(_number(spec, draw) for spec in stream.values),
+    )
+
+
+def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
+    if isinstance(spec, Between):
+        if float(spec.low).is_integer() and float(spec.high).is_integer():
+            return float(draw.randint(int(spec.low), int(spec.high))), 0
+        # Two decimals: exactly what a student's "%.2f" shows.
+        return round(draw.uniform(spec.low, spec.high), 2), 0
+    if isinstance(spec, JustAbove):
+        return spec.limit, 1
+    if isinstance(spec, JustBelow):
+        return spec.limit, -1
+    return spec, 0
+
+
+def _recording(stream: OdometryStream, odometry: Odometry, seed: int) -> PlannedRecording:
+    messages = window(odometry, duration_ns=stream.duration_ns, seed=seed)
+    kept = tuple((stream.start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= stream.duration_ns)
+    return PlannedRecording(
+        topic=stream.topic,
+        type="nav_msgs/msg/Odometry",
+        start_ns=stream.start_ns,
+        stop_ns=kept[-1][0] + 1 if kept else stream.start_ns,
+        messages=kept,
+    )
+
+
+def plan_to_json(plan: Plan) -> dict[str, Any]:
+    """Return a plan as plain JSON values."""
+    data: dict[str, Any] = {name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings")}
+    data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
+    data["recordings"] = [
+        {
+            "topic": r.topic,
+            "type": r.type,
+            "start_ns": r.start_ns,
+            "stop_ns": r.stop_ns,
+            "messages": [[t, base64.b64encode(cdr).decode(), value] for t, cdr, value in r.messages],
+        }
+        for r in plan.recordings
+    ]
+    return data
+
+
+def plan_from_json(data: Mapping[str, Any]) -> Plan:
+    """Return the plan that `plan_to_json` was given; the supervisor's word is trusted."""
+    fields = dict(data)
+    fields["processes"] = tuple((str(name), str(file)) for name, file in data["processes"])
+    fields["numbers"] = tuple(
+        PlannedNumbers(**{**n, "numbers": tuple((float(value), int(side)) for value, side in n["numbers"])})
+        for n in data["numbers"]
+    )
+    fields["recordings"] = tuple(
+        PlannedRecording(**{**r, "messages": _messages(r["messages"])}) for r in data["recordings"]
+    )
+    return Plan(**fields)
+
+
+def _messages(rows: Sequence[Sequence[Any]]) -> tuple[tuple[int, bytes, Mapping[str, Any]], ...]:
+    return tuple((int(t), base64.b64decode(cdr), value) for t, cdr, value in rows)

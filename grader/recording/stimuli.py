@@ -1,0 +1,79 @@
+"""What the grader publishes in a scenario, and when: plain schedules that the conductor reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from grader.recording.observer import message_class, plain_fields
+from grader.recording.plan import PlannedNumbers, PlannedRecording
+
+#: The step that tells "just above" a limit for types with a fraction; whole numbers step by 1.
+FRACTION_STEP = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """One thing to do at a time: `appear`, `publish` or `disappear`; `payload` is what to publish."""
+
+    t_ns: int
+    action: str
+    topic: str
+    payload: Any = None
+
+
+def schedule(numbers: tuple[PlannedNumbers, ...], recordings: tuple[PlannedRecording, ...]) -> list[Due]:
+    """Return everything that stimuli do, in order of time; number streams never disappear."""
+    due = [d for stream in numbers for d in _number_events(stream)]
+    due += [d for recording in recordings for d in _recording_events(recording)]
+    return sorted(due, key=lambda d: d.t_ns)
+
+
+def _number_events(stream: PlannedNumbers) -> Iterator[Due]:
+    yield Due(0, "appear", stream.topic, stream.type)
+    for index in range(len(stream.numbers) * stream.repeats):
+        yield Due(
+            stream.start_ns + index * stream.period_ns, "publish", stream.topic, stream.numbers[index // stream.repeats]
+        )
+
+
+def _recording_events(recording: PlannedRecording) -> Iterator[Due]:
+    yield Due(recording.start_ns, "appear", recording.topic, recording.type)
+    for t_ns, cdr, value in recording.messages:
+        yield Due(t_ns, "publish", recording.topic, (cdr, value))
+    yield Due(recording.stop_ns, "disappear", recording.topic)
+
+
+def numeric_field(interface: str) -> tuple[str, bool] | None:
+    """Return the field of a message type that carries a number, and whether it holds whole numbers only."""
+    message = message_class(interface)
+    if message is None:
+        return None
+    kinds: Mapping[str, str] = message.get_fields_and_field_types()
+    for name in ("data", "temperature"):
+        kind = kinds.get(name, "")
+        if kind in ("float", "double"):
+            return name, False
+        if kind.startswith(("int", "uint")) and "[" not in kind and "<" not in kind:
+            return name, True
+    return None
+
+
+def number_message(interface: str, number: tuple[float, int]) -> tuple[Any, Mapping[str, Any]]:
+    """Return a message that carries a planned number in a type, and its fields; a whole type rounds it.
+
+    Raises:
+        ValueError: If the type carries no number.
+    """
+    found = numeric_field(interface)
+    if found is None:
+        raise ValueError(interface)
+    name, whole = found
+    value, side = number
+    message = message_class(interface)()
+    if whole:
+        setattr(message, name, round(value) + side)
+    else:
+        setattr(message, name, float(value) + side * FRACTION_STEP)
+    return message, {name: plain_fields(getattr(message, name))}

@@ -1,0 +1,134 @@
+"""The trusted worker: runs plans one after another in a network of its own, and answers each with a trace.
+
+Usage: python -m grader.recording.worker JSON, with an object of `isolation`, `runtime` and `line` (a descriptor). A plan is a
+JSON line on the descriptor, the answer a JSON line with `trace` or `problem`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+from grader.recording.codec import trace_to_json
+from grader.recording.conductor import Conductor
+from grader.recording.isolation.choose import isolation_from_name
+from grader.recording.isolation.protocol import Isolation, Limits, PythonRuntime, StudentProcess
+from grader.recording.observer import Observer
+from grader.recording.plan import Plan, plan_from_json
+from grader.recording.student import LOG_FORMAT, Student
+
+#: Processor seconds that a node may use between two moments at which it blocks.
+WAKE_UP_CPU_S = 10.0
+#: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
+BLOCKED_S = 5.0
+
+
+class Worker:
+    """Starts students' processes and conducts them.
+
+    Args:
+        isolation: The tier that student processes are started in.
+        runtime: Interpreter and ROS.
+    """
+
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime) -> None:
+        self._isolation = isolation
+        self._runtime = runtime
+
+    def run(self, plan: Plan, domain: int) -> dict[str, Any]:
+        """Run one plan and return its trace as JSON values."""
+        students = [self._start(plan, name, file, domain) for name, file in plan.processes]
+        observer = Observer(domain)
+        try:
+            for student in students:
+                ready = student.report()
+                if ready is None or ready.get("kind") != "ready":
+                    raise RuntimeError(f"a student's process did not start: {_last_words(student)}")
+            return trace_to_json(Conductor(plan, students, observer).run())
+        finally:
+            stop(students)
+            observer.close()
+
+    def _start(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+        ours, theirs = socket.socketpair()
+        root = self._isolation.submission_seen_at or plan.root
+        request = {
+            "fd": theirs.fileno(),
+            "root": root,
+            "file": file,
+            "seed": plan.host_seed,
+            "clock": plan.clock,
+            "python_paths": [str(p) for p in self._runtime.python_paths],
+            "limits": {"wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
+        }
+        launcher = f"{self._isolation.host_seen_at}/launcher.py"
+        command = self._isolation.student_command(
+            StudentProcess(
+                runtime=self._runtime,
+                host_folder=Path(__file__).resolve().parents[1] / "host",
+                submission=Path(plan.root),
+                arguments=("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps(request)),
+                environment={
+                    "ROS_DOMAIN_ID": str(domain),
+                    "RCUTILS_CONSOLE_OUTPUT_FORMAT": LOG_FORMAT,
+                    "RCUTILS_COLORIZED_OUTPUT": "0",
+                    "ROS_PYTHON_CHECK_FIELDS": "1",
+                    "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
+                },
+                pass_fds=(theirs.fileno(),),
+            ),
+            Limits(),
+        )
+        try:
+            return Student.start(name, root, command, ours)
+        finally:
+            theirs.close()
+
+
+def _last_words(student: Student) -> str:
+    student.drain()
+    words = [getattr(line, "text", "") for line in student.output(0, final=True)]
+    return " | ".join(words[-3:])[:500] or "no output"
+
+
+def stop(students: list[Student]) -> None:
+    """Send the stop signal to every process that still runs, give it a moment, end it."""
+    for student in students:
+        if not student.ended:
+            student.tell({"stop": True})
+    for student in students:
+        student.kill()
+        student.close()
+
+
+def main() -> None:
+    """Serve plans until the supervisor hangs up."""
+    request = json.loads(sys.argv[1])
+    line = socket.socket(fileno=request["line"])
+    runtime = PythonRuntime(
+        executable=Path(request["runtime"]["executable"]),
+        read_paths=tuple(map(Path, request["runtime"]["read_paths"])),
+        library_paths=tuple(map(Path, request["runtime"]["library_paths"])),
+        python_paths=tuple(map(Path, request["runtime"]["python_paths"])),
+        environment=request["runtime"]["environment"],
+    )
+    worker = Worker(isolation_from_name(request["isolation"]), runtime)
+    commands, answers = line.makefile("r"), line.makefile("w")
+    for command in commands:
+        data = json.loads(command)
+        try:
+            answer = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
+        except Exception:  # noqa: BLE001 - whatever fails here is ours: the scenario is undecided, and the next one goes on
+            answer = {"problem": traceback.format_exc()[-4000:]}
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    os.chdir("/")
+    main()
