@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
-from grader.model.errors import GraderError, HarnessError
+from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.model.report import Report
 from grader.reports.delivery import FORMATS, Output, deliver, prepared
 from grader.reports.escape import shown
@@ -199,10 +199,12 @@ def _guarded(run: Callable[[], object]) -> int:
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
-        _complain(error.format_message().rstrip("."), "grade --help lists the options")
+        _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
-        _complain(error.message, error.hint)
+        # A rubric may have several mistakes, one a line; in any other message a line break comes from a hostile name.
+        lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
+        _complain(*lines, hint=error.hint)
         return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: no report was made", err=True)
@@ -210,14 +212,13 @@ def _guarded(run: Callable[[], object]) -> int:
     except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
             traceback.print_exc()
-        _complain(f"the grader failed: {type(error).__name__}: {error}", "GRADER_DEBUG=1 shows where")
+        _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
         return UNDECIDED
     return code if isinstance(code, int) else ALL_MET
 
 
-def _complain(message: str, hint: str = "") -> None:
-    # A rubric may have several mistakes, one a line.
-    for line in message.splitlines() or [""]:
+def _complain(*lines: str, hint: str) -> None:
+    for line in lines:
         click.echo(f"error: {shown(line)}", err=True)
     if hint:
         click.echo(f"hint: {shown(hint)}", err=True)

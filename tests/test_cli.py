@@ -1,0 +1,392 @@
+"""The command line: arguments, destinations, exit codes, and every way a run can end."""
+
+import json
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import grader
+from grader import cli, session
+from grader.model import errors
+from grader.model.exercise import Outcome
+from grader.model.report import Environment, ExerciseReport, Report, Verdict
+from grader.model.trace import ClockKind
+
+
+def a_report(*outcomes, score=None):
+    """Return a report of one exercise with a criterion of 10 points for each outcome."""
+    earned = {Outcome.MET: 10, Outcome.PARTLY: 5}
+    verdicts = tuple(
+        Verdict(f"c{n}", f"Criterion {n} ±", o, Fraction(earned.get(o, 0)), Fraction(10), "why")
+        for n, o in enumerate(outcomes or (Outcome.MET,))
+    )
+    part = ExerciseReport("velocity_publisher", "1", "Velocity", True, ClockKind.VIRTUAL, "", verdicts)
+    environment = Environment("0.1.0", "jazzy", "7.1.6", "rmw_fastrtps_cpp", "3.11.9", "none")
+    return Report("ada", "./ada", "sha256:" + "0" * 64, environment, 7, (part,), 1.5)
+
+
+class Session:
+    """Stands in for the run: remembers the request, returns or raises what it was told to."""
+
+    def __init__(self):
+        self.requests = []
+        self.result = a_report()
+
+    def grade(self, request, progress):
+        self.requests.append(request)
+        progress("exercise 1: alone")
+        if isinstance(self.result, BaseException):
+            raise self.result
+        return self.result
+
+
+@pytest.fixture
+def run_session(monkeypatch):
+    stand_in = Session()
+    monkeypatch.setattr(session, "grade", stand_in.grade)
+    return stand_in
+
+
+def grade(*arguments, **kwargs):
+    return CliRunner().invoke(cli.app, list(arguments), prog_name="grade", **kwargs)
+
+
+def test_the_everyday_form_prints_the_text_report(run_session):
+    """A path and nothing else is enough."""
+    result = grade("ada")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("ada: 10 of 10 points\n")
+    assert result.stderr == ""
+    assert run_session.requests == [session.Request(submission="ada")]
+
+
+def test_every_option_reaches_the_session(run_session, monkeypatch):
+    """What is asked for is what is graded; a repeated exercise is graded once."""
+    monkeypatch.setattr(cli, "_known_exercises", lambda rubrics: ["a", "b"])
+    options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--odom-bag", "bag"]
+    options += ["--rubric", "r1.yaml", "--rubric", "r2.yaml", "--clock", "wall", "--isolation", "none", "--no-progress"]
+    result = grade(*options, "ada")
+    assert result.exit_code == 0, result.output
+    assert run_session.requests == [
+        session.Request(
+            submission="ada",
+            exercises=("b", "a"),
+            rubrics=(Path("r1.yaml"), Path("r2.yaml")),
+            seed=5,
+            odom_bag=Path("bag"),
+            clock="wall",
+            isolation="none",
+        )
+    ]
+
+
+def test_options_may_follow_the_submission(run_session):
+    """Order does not matter."""
+    assert grade("ada", "--seed", "5").exit_code == 0
+    assert run_session.requests[0].seed == 5
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "options", "code"),
+    [
+        ((Outcome.MET, Outcome.MET), (), 0),
+        ((Outcome.MET, Outcome.PARTLY), (), 1),
+        ((Outcome.MET, Outcome.NOT_MET), (), 1),
+        ((Outcome.MET, Outcome.BLOCKED), (), 1),
+        ((Outcome.MET, Outcome.UNDECIDED), (), 3),
+        ((Outcome.MET, Outcome.PARTLY), ("--min-score", "75"), 0),
+        ((Outcome.MET, Outcome.PARTLY), ("--min-score", "75.1"), 1),
+        ((Outcome.NOT_MET,), ("--min-score", "0"), 0),
+        ((Outcome.MET, Outcome.MET), ("--min-score", "100"), 0),
+        ((Outcome.MET, Outcome.UNDECIDED), ("--min-score", "10"), 3),
+        ((Outcome.MET, Outcome.PARTLY, Outcome.MET), ("--min-score", "83.3"), 0),
+        ((Outcome.MET, Outcome.PARTLY, Outcome.MET), ("--min-score", "83.34"), 1),
+    ],
+)
+def test_the_exit_code_says_how_it_went(run_session, outcomes, options, code):
+    """0 all met or the share reached, 1 not, 3 undecided whatever the share."""
+    run_session.result = a_report(*outcomes)
+    result = grade("ada", *options)
+    assert result.exit_code == code
+    assert "points" in result.stdout
+
+
+def test_json_prints_the_report_and_nothing_else(run_session):
+    """Standard output can be piped into a parser."""
+    result = grade("ada", "--json")
+    assert json.loads(result.stdout)["schema"] == "grader/report/v1"
+    assert result.stderr == ""
+
+
+def test_reports_go_to_files_as_well(run_session, tmp_path):
+    """The text is still printed; files are plain and in UTF-8."""
+    result = grade("ada", "-o", f"json={tmp_path / 'r.json'}", "--output", f"text={tmp_path / 'r.txt'}")
+    assert result.exit_code == 0
+    assert json.loads((tmp_path / "r.json").read_bytes())["score"] == 10
+    assert "Criterion 0 ±" in (tmp_path / "r.txt").read_text(encoding="utf-8")
+    assert "ada: 10 of 10" in result.stdout
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.json", "r.txt"]
+
+
+def test_a_dash_prints_that_format_instead(run_session, tmp_path):
+    """One report on standard output, the chosen one."""
+    result = grade("ada", "-o", "json=-", "-o", f"text={tmp_path / 'r.txt'}")
+    assert json.loads(result.stdout)["score"] == 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message", "hint"),
+    [
+        ((), "Missing argument 'SUBMISSION'", "grade --help"),
+        (("ada", "bert"), "unexpected extra argument (bert)", "grade --help"),
+        (("ada", "--sed", "5"), "--seed", "grade --help"),
+        (("ada", "--seed", "-1"), "x>=0", "grade --help"),
+        (("ada", "--seed", "many"), "'many' is not a valid integer", "grade --help"),
+        (("ada", "--clock", "sundial"), "'sundial' is not one of", "grade --help"),
+        (("ada", "--isolation", "bubblewrap"), "'bubblewrap' is not one of", "grade --help"),
+        (("ada", "--min-score", "101"), "expected 0 to 100, found 101", "grade --help"),
+        (("ada", "--min-score", "nan"), "expected 0 to 100, found nan", "grade --help"),
+        (("ada", "-o", "json"), "expected FORMAT=PATH, found 'json'", "grade --help"),
+        (("ada", "-o", "jsn=x"), "'jsn' is no format; did you mean json?", "grade --help"),
+        (("ada", "-o", "docx=x"), "there are json, text", "grade --help"),
+        (("ada", "--json", "-o", "text=-"), "standard output: expected one report, found more", "to files"),
+        (("ada", "-o", "json=x", "-o", "text=./x"), "x: expected one report, found more", "its own file"),
+        (("ada", "-o", "json=/proc/none/r"), "/proc/none/r: the json report cannot be written", ""),
+        (("ada", "-o", "text=."), "the text report cannot be written: Is a directory", ""),
+    ],
+)
+def test_a_wrong_command_is_one_line_and_nothing_is_graded(run_session, arguments, message, hint):
+    """Exit code 2, what is wrong, what to do; before any work is done."""
+    result = grade(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert lines[0].startswith("error: ")
+    assert message in lines[0]
+    assert (lines[1:] == []) if not hint else (lines[1].startswith("hint: ") and hint in lines[1])
+    assert len(lines) <= 2
+    assert run_session.requests == []
+
+
+def test_an_unknown_exercise_names_the_nearest(run_session, monkeypatch):
+    """A slip of the finger is found before anything runs."""
+    monkeypatch.setattr(cli, "_known_exercises", lambda rubrics: ["velocity_publisher", "odom_subscriber"])
+    result = grade("ada", "--exercise", "velocity_publishr")
+    assert (result.exit_code, run_session.requests) == (2, [])
+    assert result.stderr == "error: --exercise: 'velocity_publishr' is no exercise; did you mean velocity_publisher?\n"
+    assert "there are velocity_publisher, odom_subscriber" in grade("ada", "--exercise", "3").stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (errors.SubmissionError("ada: no such folder", "check the path"), 2),
+        (errors.RubricError("r.yaml:1:1: expected points", "add points"), 2),
+        (errors.RecordingError("bag: no odometry", "record /odom"), 2),
+        (errors.EnvironmentFault("rclpy: not found", "install it"), 2),
+        (errors.HarnessError("the worker ended twice", "grade again"), 3),
+    ],
+)
+def test_a_grader_error_is_a_line_and_a_hint(run_session, error, code):
+    """Whoever must act reads what is wrong and one thing to do."""
+    run_session.result = error
+    result = grade("ada", "--json")
+    assert result.exit_code == code
+    assert result.stdout == ""
+    assert result.stderr == f"error: {error.message}\nhint: {error.hint}\n"
+
+
+def test_several_mistakes_are_several_lines(run_session):
+    """A rubric's author sees all of them at once; without a hint there is no empty one."""
+    run_session.result = errors.RubricError("r.yaml:1:1: one\nr.yaml:2:1: two")
+    assert grade("ada").stderr == "error: r.yaml:1:1: one\nerror: r.yaml:2:1: two\n"
+
+
+def test_an_error_cannot_steer_the_terminal(run_session):
+    """File names of a student end up in messages."""
+    run_session.result = errors.SubmissionError("a\x1b[2J\udcff: no", "b\x07")
+    assert grade("ada").stderr == "error: a\\x1b[2J\\udcff: no\nhint: b\\x07\n"
+    run_session.result = errors.SubmissionError("a\nerror: forged")
+    assert grade("ada").stderr == "error: a\\nerror: forged\n"
+
+
+def test_a_mistake_of_ours_is_no_low_score(run_session, monkeypatch):
+    """Exit code 3 and one line; the traceback only for those who ask."""
+    run_session.result = KeyError("secret")
+    monkeypatch.delenv("GRADER_DEBUG", raising=False)
+    result = grade("ada")
+    assert result.exit_code == 3
+    assert result.stderr == "error: the grader failed: KeyError: 'secret'\nhint: GRADER_DEBUG=1 shows where\n"
+    monkeypatch.setenv("GRADER_DEBUG", "1")
+    assert "Traceback (most recent call last)" in grade("ada").stderr
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), click.Abort()])
+def test_an_interrupt_is_one_line(run_session, error):
+    """Ctrl-C ends in 130, without a traceback and without a report."""
+    run_session.result = error
+    result = grade("ada", "--json")
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert result.stderr == "interrupted: no report was made\n"
+
+
+def test_an_end_of_input_of_ours_is_no_interrupt(run_session):
+    """Only Ctrl-C is called one."""
+    run_session.result = EOFError("worker")
+    assert grade("ada").exit_code == 3
+
+
+def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(run_session, tmp_path, monkeypatch):
+    """The disk filled up while grading: what can be delivered is."""
+    path = tmp_path / "r.json"
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    result = grade("ada", "-o", f"json={path}")
+    assert result.exit_code == 2
+    assert "ada: 10 of 10" in result.stdout
+    assert result.stderr == f"error: {path}: the json report cannot be written: No space left on device\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_said_while_grading_unless_stderr_is_a_terminal(run_session):
+    """Logs of a build server stay clean."""
+    assert grade("ada").stderr == ""
+
+
+def test_help_names_every_option_and_the_exit_codes(run_session):
+    """Both spellings, before and after the submission, show the same."""
+    text = grade("--help").stdout
+    for word in ("--exercise ID", "--seed N", "--odom-bag", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
+        assert word in text
+    for word in ("--clock [virtual|wall|auto]", "--isolation [auto|none]", "--no-progress", "--version", "130"):
+        assert word in text
+    assert grade("-h").stdout == grade("ada", "--help").stdout == text
+
+
+def test_the_version_is_the_package_s(run_session):
+    """One number, in one place."""
+    assert grade("--version").stdout == f"grade {grader.__version__}\n"
+
+
+@pytest.fixture
+def with_batch():
+    """A group like ours with a subcommand beside the everyday one."""
+
+    @click.command()
+    @click.argument("folder")
+    def batch(folder):
+        """Grade a class."""
+        click.echo(f"batch {folder}")
+        return 1
+
+    app = cli.CommandLine(cli.app.everyday, name="grade", context_settings=cli.app.context_settings)
+    app.add_command(batch)
+    return app
+
+
+def test_a_subcommand_fits_beside_the_everyday_form(run_session, with_batch):
+    """Its name as the first argument calls it; its return value is the exit code; help lists it."""
+    result = CliRunner().invoke(with_batch, ["batch", "hw"])
+    assert (result.stdout, result.exit_code) == ("batch hw\n", 1)
+    assert "Grade a class." in CliRunner().invoke(with_batch, ["--help"]).stdout
+    assert "FOLDER" in CliRunner().invoke(with_batch, ["batch", "--help"]).stdout
+
+
+@pytest.mark.parametrize("arguments", [["./batch"], ["--json", "batch"], ["--", "batch"]])
+def test_a_folder_named_like_a_subcommand_is_graded(run_session, with_batch, arguments):
+    """Only the bare first word is a command."""
+    assert CliRunner().invoke(with_batch, arguments).exit_code == 0
+    assert Path(run_session.requests[0].submission) == Path("batch")
+
+
+# --- whole processes -------------------------------------------------------------------------------------------------
+
+CHILD = """
+import sys
+sys.path.insert(0, {folder!r})
+from test_cli import a_report
+from grader import cli, session
+def grade(request, progress):
+    progress("exercise 1: \\x1b[31malone")
+    sys.stdin.readline()
+    return a_report()
+session.grade = grade
+sys.argv[0] = "grade"
+cli.main()
+"""
+
+
+def process(*arguments, **kwargs):
+    code = CHILD.format(folder=str(Path(__file__).parent))
+    command = [sys.executable, "-c", code, *arguments]
+    kwargs.setdefault("stdin", subprocess.DEVNULL)
+    return subprocess.Popen(command, stderr=kwargs.pop("stderr", subprocess.PIPE), **kwargs)
+
+
+@pytest.mark.parametrize("option", ["--json", "--no-progress"])
+def test_a_reader_that_had_enough_is_no_problem(option):
+    """`grade ada | head -1` ends quietly and with its own exit code."""
+    child = process("ada", option, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    child.stdout.close()
+    _, complaint = child.communicate(b"\n", timeout=60)
+    assert complaint == b""
+    assert child.returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+def test_a_full_disk_behind_standard_output_is_said():
+    """The report is lost, and nobody takes the exit code for a success."""
+    with Path("/dev/full").open("wb") as full:
+        child = process("ada", stdout=full)
+        _, complaint = child.communicate(timeout=60)
+    assert complaint == b"error: standard output: the text report cannot be written: No space left on device\n"
+    assert child.returncode == 2
+
+
+def test_an_ascii_terminal_still_gets_the_numbers():
+    """Signs that it cannot show give way to plain ones."""
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    out, complaint = process("ada", stdout=subprocess.PIPE, env=environment).communicate(timeout=60)
+    assert complaint == b""
+    assert b"Criterion 0 +/-" in out
+
+
+def test_a_terminal_sees_progress_and_colours():
+    """On a terminal the step is named, escaped, and gone again; the report is coloured."""
+    leader, follower = os.openpty()
+    environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
+    environment["TERM"] = "xterm"
+    child = process("ada", stdout=follower, stderr=follower, env=environment)
+    os.close(follower)
+    seen = b""
+    try:
+        while chunk := os.read(leader, 65536):
+            seen += chunk
+    except OSError:  # Linux says so when the other side is closed
+        pass
+    os.close(leader)
+    assert child.wait(timeout=60) == 0
+    assert b"\x1b[1;32mada: 10 of 10 points" in seen
+    assert b"exercise 1: \\x1b[31malone" in seen
+    assert b"\x1b[31malone" not in seen
+
+
+def test_help_starts_light():
+    """Neither rich nor pydantic nor ROS is imported before they are needed."""
+    code = (
+        "import sys\nfrom grader import cli\n"
+        "try: cli.app(['--help'])\nexcept SystemExit: pass\n"
+        "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy'}\n"
+        "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
