@@ -53,7 +53,7 @@ class Page:
             indent: Where the body begins if it has too little room beside its prefix.
         """
         head, text = _text(prefix), _text(body, style)
-        if self._crowded(text, head.cell_len, indent):
+        if head.plain.strip() and self._crowded(text, head.cell_len, indent):
             self._line(head)
             head = Text(" " * indent)
         lines = text.wrap(self._console, self.width - head.cell_len, overflow="fold")

@@ -72,6 +72,13 @@ def test_lines_keep_to_the_width_and_end_in_no_space(name, width):
     lines = render(SAMPLES[name](), width).split("\n")
     assert max(map(cell_len, lines)) <= width
     assert not [line for line in lines if line != line.rstrip()]
+    assert "\n\n\n" not in "\n".join(lines)
+
+
+def test_a_long_word_opens_no_gap_above_itself():
+    """A blank line ends an exercise and nothing else."""
+    verdict = criterion("c", "C", 1, Outcome.NOT_MET, reason=f"long {'A' * 200}")
+    assert render(report(exercise("e", "1", "E", verdict)), 40).count("\n\n") == 2
 
 
 @pytest.mark.parametrize("name", SAMPLES)
