@@ -62,19 +62,24 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A process ready for `subprocess.Popen`; `close_fds` frees what `opened_fds` lists once it has started.
+    """A process ready for `subprocess.Popen`, once: what `opened_fds` lists is read by the start and then of no use.
+
+    Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches the grader and nobody else, and from a
+    thread that outlives it: the process dies with the thread that started it.
 
     Attributes:
         argv: Full argument list.
         environment: The whole environment of the launched program.
         pass_fds: Descriptors to be inherited.
         opened_fds: Descriptors that the isolation opened for this start; the caller closes them afterwards.
+        made_folders: Folders that the isolation made for this start; the caller deletes them when the process has ended.
     """
 
     argv: tuple[str, ...]
     environment: Mapping[str, str]
     pass_fds: tuple[int, ...]
     opened_fds: tuple[int, ...] = ()
+    made_folders: tuple[Path, ...] = ()
 
 
 class Isolation(Protocol):
@@ -92,7 +97,7 @@ class Isolation(Protocol):
 
     @property
     def host_seen_at(self) -> str:
-        """Absolute folder at which a student process sees the `host` package."""
+        """Absolute folder at which a student process sees the `host` package; `launcher.py` lies in it."""
         ...
 
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:

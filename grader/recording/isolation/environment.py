@@ -1,0 +1,61 @@
+"""The variables that worker and student processes start with; nothing of the caller's environment is among them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from grader.recording.isolation.protocol import PythonRuntime, StudentProcess
+
+# Worker and student must agree on these. With the default transports Fast DDS would look for a /dev/shm that the two do
+# not share, and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST would bring that transport back by itself: it must stay unset.
+DDS_SETTINGS: Mapping[str, str] = {
+    "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    # A DEFAULT_FASTRTPS_PROFILES.xml in the working directory would be loaded otherwise.
+    "SKIP_DEFAULT_XML_FILE": "1",
+}
+
+# One arena and one thread per library: a node's memory and thread count then depend little on the machine's cores.
+FEW_RESOURCES: Mapping[str, str] = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "MALLOC_ARENA_MAX": "2",
+}
+
+
+def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
+    """Return what any child that uses ROS needs: the trusted worker as well as students' processes."""
+    environment = {
+        "PATH": "/usr/bin:/bin",
+        "LANG": "C.UTF-8",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONUTF8": "1",
+        **runtime.environment,
+        **DDS_SETTINGS,
+        **FEW_RESOURCES,
+    }
+    if runtime.library_paths:
+        environment["LD_LIBRARY_PATH"] = ":".join(map(str, runtime.library_paths))
+    if runtime.python_paths:
+        environment["PYTHONPATH"] = ":".join(map(str, runtime.python_paths))
+    return environment
+
+
+def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
+    """Return the whole environment of a student's process.
+
+    Args:
+        process: What is started; its own variables win.
+        home: A folder that the process may write to, as the process sees it.
+    """
+    return {
+        **runtime_environment(process.runtime),
+        "PATH": "/usr/bin",
+        "HOME": str(home),
+        "ROS_LOG_DIR": str(home / "log"),
+        # An int in a float field is then an exception with a line instead of an abort.
+        "ROS_PYTHON_CHECK_FIELDS": "1",
+        **process.environment,
+    }

@@ -1,0 +1,209 @@
+"""A seccomp filter for student processes, as the bytes that `bwrap --seccomp` loads.
+
+Namespaces hide files, processes and the network; what is left is the kernel itself. The filter refuses the calls that
+reach around a namespace (AF_VSOCK, user keyrings), that attack the kernel's widest surfaces (io_uring, bpf, perf,
+userfaultfd, the mount calls), or that hold memory no limit counts (System V segments). Everything a ROS node needs
+stays allowed. Layout of the program: Linux, Documentation/userspace-api/seccomp_filter.rst.
+"""
+
+from __future__ import annotations
+
+import errno
+import platform
+import socket
+import struct
+from dataclasses import dataclass
+
+LOAD = 0x20  # BPF_LD | BPF_W | BPF_ABS
+JUMP_IF_EQUAL = 0x15  # BPF_JMP | BPF_JEQ | BPF_K
+JUMP_IF_ANY_BIT = 0x45  # BPF_JMP | BPF_JSET | BPF_K
+RETURN = 0x06  # BPF_RET | BPF_K
+
+ALLOW = 0x7FFF0000
+FAIL_WITH = 0x00050000
+KILL_PROCESS = 0x80000000
+
+NUMBER_AT, ARCHITECTURE_AT, ARGUMENTS_AT = 0, 4, 16
+X32_BIT = 0x40000000
+
+AUDIT_ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
+
+# clone and unshare take the same flags: new mount, cgroup, uts, ipc, user, pid, network and (unshare only) time namespace.
+NEW_NAMESPACES = 0x00020000 | 0x02000000 | 0x04000000 | 0x08000000 | 0x10000000 | 0x20000000 | 0x40000000
+NEW_TIME_NAMESPACE = 0x00000080
+
+TIOCSTI, TIOCLINUX = 0x5412, 0x541C
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The numbers of one system call, None where the architecture lacks it."""
+
+    x86_64: int | None
+    aarch64: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class ArgumentRule:
+    """Refuses a call by the low 32 bits of one argument.
+
+    Attributes:
+        call: Key of `NUMBERS`.
+        argument: Index of the argument.
+        only: The values allowed; empty if any is.
+        never: The values refused.
+        never_bits: Refused if any of these bits is set.
+        error: What errno the caller sees.
+    """
+
+    call: str
+    argument: int
+    only: tuple[int, ...] = ()
+    never: tuple[int, ...] = ()
+    never_bits: int = 0
+    error: int = errno.EPERM
+
+
+ARGUMENT_RULES = (
+    ArgumentRule(
+        "socket", 0, only=(socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK), error=errno.EAFNOSUPPORT
+    ),
+    ArgumentRule("clone", 0, never_bits=NEW_NAMESPACES),
+    ArgumentRule("unshare", 0, never_bits=NEW_NAMESPACES | NEW_TIME_NAMESPACE),
+    ArgumentRule("ioctl", 1, never=(TIOCSTI, TIOCLINUX)),
+    ArgumentRule("prlimit64", 0, only=(0,)),
+)
+
+# Sorted by what they are for. A filter cannot look into the struct that clone3 takes, so that call does not exist:
+# the C library then uses clone.
+NUMBERS = {
+    "socket": Numbers(41, 198),
+    "clone": Numbers(56, 220),
+    "unshare": Numbers(272, 97),
+    "ioctl": Numbers(16, 29),
+    "prlimit64": Numbers(302, 261),
+    "clone3": Numbers(435, 435),
+    "setns": Numbers(308, 268),
+    # other processes
+    "ptrace": Numbers(101, 117),
+    "process_vm_readv": Numbers(310, 270),
+    "process_vm_writev": Numbers(311, 271),
+    "process_madvise": Numbers(440, 440),
+    "process_mrelease": Numbers(448, 448),
+    "kcmp": Numbers(312, 272),
+    "pidfd_getfd": Numbers(438, 438),
+    # keyrings outlive the process and belong to the user
+    "add_key": Numbers(248, 217),
+    "request_key": Numbers(249, 218),
+    "keyctl": Numbers(250, 219),
+    # mounts
+    "mount": Numbers(165, 40),
+    "umount2": Numbers(166, 39),
+    "pivot_root": Numbers(155, 41),
+    "chroot": Numbers(161, 51),
+    "open_tree": Numbers(428, 428),
+    "open_tree_attr": Numbers(467, 467),
+    "move_mount": Numbers(429, 429),
+    "fsopen": Numbers(430, 430),
+    "fsconfig": Numbers(431, 431),
+    "fsmount": Numbers(432, 432),
+    "fspick": Numbers(433, 433),
+    "mount_setattr": Numbers(442, 442),
+    "open_by_handle_at": Numbers(304, 265),
+    "name_to_handle_at": Numbers(303, 264),
+    "fanotify_init": Numbers(300, 262),
+    "quotactl": Numbers(179, 60),
+    "quotactl_fd": Numbers(443, 443),
+    # wide kernel surfaces
+    "bpf": Numbers(321, 280),
+    "perf_event_open": Numbers(298, 241),
+    "userfaultfd": Numbers(323, 282),
+    "io_uring_setup": Numbers(425, 425),
+    "io_uring_enter": Numbers(426, 426),
+    "io_uring_register": Numbers(427, 427),
+    "modify_ldt": Numbers(154, None),
+    "ioperm": Numbers(173, None),
+    "iopl": Numbers(172, None),
+    # memory that no limit of a process counts
+    "shmget": Numbers(29, 194),
+    "msgget": Numbers(68, 186),
+    "semget": Numbers(64, 190),
+    "memfd_secret": Numbers(447, 447),
+    # the machine
+    "kexec_load": Numbers(246, 104),
+    "kexec_file_load": Numbers(320, 294),
+    "init_module": Numbers(175, 105),
+    "finit_module": Numbers(313, 273),
+    "delete_module": Numbers(176, 106),
+    "reboot": Numbers(169, 142),
+    "swapon": Numbers(167, 224),
+    "swapoff": Numbers(168, 225),
+    "acct": Numbers(163, 89),
+    "settimeofday": Numbers(164, 170),
+    "clock_settime": Numbers(227, 112),
+    "clock_adjtime": Numbers(305, 266),
+    "syslog": Numbers(103, 116),
+    "vhangup": Numbers(153, 58),
+}
+ABSENT = ("clone3", "io_uring_setup", "io_uring_enter", "io_uring_register")
+
+
+def supports(machine: str) -> bool:
+    """Return whether a filter can be made for an architecture as `platform.machine()` names it."""
+    return machine in AUDIT_ARCHITECTURES
+
+
+def student_filter(machine: str | None = None) -> bytes:
+    """Return the filter for student processes, an array of `struct sock_filter`.
+
+    Args:
+        machine: Architecture as `platform.machine()` names it; the running one if None.
+
+    Raises:
+        KeyError: No filter is known for the architecture; ask `supports` first.
+    """
+    machine = machine or platform.machine()
+    program = [
+        _instruction(LOAD, ARCHITECTURE_AT),
+        _instruction(JUMP_IF_EQUAL, AUDIT_ARCHITECTURES[machine], if_true=1),
+        _instruction(RETURN, KILL_PROCESS),
+        _instruction(LOAD, NUMBER_AT),
+    ]
+    if machine == "x86_64":
+        # The x32 interface has the same architecture word and other numbers: it would walk around every rule.
+        program += [_instruction(JUMP_IF_ANY_BIT, X32_BIT, if_false=1), _fail(errno.ENOSYS)]
+    by_argument = {rule.call for rule in ARGUMENT_RULES}
+    for call, numbers in NUMBERS.items():
+        number = numbers.x86_64 if machine == "x86_64" else numbers.aarch64
+        if number is None or call in by_argument:
+            continue
+        error = errno.ENOSYS if call in ABSENT else errno.EPERM
+        program += [_instruction(JUMP_IF_EQUAL, number, if_false=1), _fail(error)]
+    for rule in ARGUMENT_RULES:
+        numbers = NUMBERS[rule.call]
+        program += _argument_rule(rule, numbers.x86_64 if machine == "x86_64" else numbers.aarch64)
+    program.append(_instruction(RETURN, ALLOW))
+    return b"".join(program)
+
+
+def _argument_rule(rule: ArgumentRule, number: int | None) -> list[bytes]:
+    if number is None:
+        return []
+    # Both architectures are little-endian, so the low half of the 64-bit argument comes first.
+    body = [_instruction(LOAD, ARGUMENTS_AT + 8 * rule.argument)]
+    for value in rule.never:
+        body += [_instruction(JUMP_IF_EQUAL, value, if_false=1), _fail(rule.error)]
+    if rule.never_bits:
+        body += [_instruction(JUMP_IF_ANY_BIT, rule.never_bits, if_false=1), _fail(rule.error)]
+    for value in rule.only:
+        body += [_instruction(JUMP_IF_EQUAL, value, if_false=1), _instruction(RETURN, ALLOW)]
+    body.append(_fail(rule.error) if rule.only else _instruction(RETURN, ALLOW))
+    return [_instruction(JUMP_IF_EQUAL, number, if_false=len(body)), *body]
+
+
+def _fail(error: int) -> bytes:
+    return _instruction(RETURN, FAIL_WITH | error)
+
+
+def _instruction(code: int, operand: int, *, if_true: int = 0, if_false: int = 0) -> bytes:
+    return struct.pack("<HBBI", code, if_true, if_false, operand)
