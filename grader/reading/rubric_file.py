@@ -1,0 +1,217 @@
+"""Reads rubric files: YAML in, an Exercise out, every mistake with its line and column."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import NoReturn
+
+from pydantic import ValidationError
+
+from grader.judging.checks import CHECKS
+from grader.model.errors import RubricError
+from grader.model.exercise import Check, Criterion, Exercise
+from grader.model.scenario import (
+    Between,
+    JustAbove,
+    JustBelow,
+    NumberSpec,
+    NumberStream,
+    OdometryStream,
+    Scenario,
+    Span,
+    Stimulus,
+)
+from grader.reading.check_parameters import build
+from grader.reading.quoting import shown
+from grader.reading.rubric_links import broken_links
+from grader.reading.rubric_mistakes import mistakes_of
+from grader.reading.rubric_model import (
+    CriterionShape,
+    DrawnShape,
+    RubricShape,
+    ScenarioShape,
+    StimulusShape,
+    rubric_model,
+)
+from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, read_yaml
+
+#: Largest rubric file.
+MAX_BYTES = 256 * 1024
+
+#: Mistakes listed at once.
+MAX_MISTAKES = 10
+
+
+def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
+    """Read one rubric file.
+
+    Args:
+        path: The file; messages show it as given.
+        checks: The table of checks that the rubric may use.
+
+    Returns:
+        The exercise.
+
+    Raises:
+        RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
+    """
+    content = _content(path)
+    try:
+        tree = read_yaml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        _refuse(path, [_not_utf8(content, error)])
+    except YamlSyntaxError as error:
+        _refuse(path, [error.mistake])
+    rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
+    mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
+    criteria = tuple(_criteria(rubric, checks, tree, mistakes))
+    if mistakes:
+        _refuse(path, mistakes)
+    return Exercise(
+        id=rubric.exercise.id,
+        number=rubric.exercise.number,
+        title=rubric.exercise.title,
+        required=rubric.exercise.required,
+        files=rubric.files,
+        scenarios=tuple(_scenario(shape) for shape in rubric.scenarios),
+        criteria=criteria,
+        digest=f"sha256:{hashlib.sha256(content).hexdigest()}",
+    )
+
+
+def _content(path: Path) -> bytes:
+    where = shown(str(path), 500)
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise RubricError(f"{where}: expected a rubric file, found a folder", "name the YAML file inside it")
+        if not stat.S_ISREG(mode):
+            raise RubricError(f"{where}: expected a rubric file, found something that is no plain file")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        raise RubricError(f"{where}: expected a rubric file, found nothing there", "check the path") from None
+    except OSError as error:
+        raise RubricError(f"{where}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise RubricError(f"{where}: expected a path, found one with a null character") from None
+    if len(content) > MAX_BYTES:
+        raise RubricError(f"{where}: expected at most {MAX_BYTES // 1024} KiB, found more")
+    return content
+
+
+def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
+    before = content[: error.start].decode("utf-8", "replace")
+    column = len(before) - (before.rfind("\n") + 1) + 1
+    text = f"expected UTF-8 text, found the byte 0x{content[error.start]:02x}"
+    return Mistake(before.count("\n") + 1, column, text, "save the file as UTF-8")
+
+
+def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
+    """Raise the error that lists mistakes, one a line; with several, each hint says which it belongs to."""
+    where = shown(str(path), 500)
+    ordered = sorted(set(mistakes))
+    lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in ordered[:MAX_MISTAKES]]
+    if len(ordered) > MAX_MISTAKES:
+        lines.append(f"{where}: {len(ordered) - MAX_MISTAKES} more")
+    hinted = [m for m in ordered[:MAX_MISTAKES] if m.hint]
+    hints = [m.hint if len(ordered) == 1 else f"{m.line}:{m.column}: {m.hint}" for m in hinted]
+    raise RubricError("\n".join(lines), "; ".join(hints))
+
+
+def _validated(path: Path, tree: YamlTree, model: type[RubricShape]) -> RubricShape:
+    if tree.data is None:
+        _refuse(path, [TOP.mistake("expected a rubric, found an empty file")])
+    try:
+        return model.model_validate(tree.data)
+    except ValidationError as error:
+        known = {(m.line, m.column) for m in tree.mistakes}
+        others = [m for m in mistakes_of(error, tree, model) if (m.line, m.column) not in known]
+        _refuse(path, [*tree.mistakes, *others])
+
+
+def _criteria(
+    rubric: RubricShape, checks: Mapping[str, type], tree: YamlTree, mistakes: list[Mistake]
+) -> Iterator[Criterion]:
+    """Yield the criteria; one whose check refuses its parameters becomes a mistake."""
+    for index, shape in enumerate(rubric.criteria):
+        name, parameters = shape.check.chosen
+        try:
+            check: Check = build(checks[name], parameters)
+        except ValueError as error:
+            where = tree.keys[("criteria", index, "check", name)]
+            mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
+            continue
+        yield _criterion(shape, check)
+
+
+def _criterion(shape: CriterionShape, check: Check) -> Criterion:
+    return Criterion(
+        id=shape.id,
+        title=shape.title,
+        points=shape.points,
+        scenario=shape.scenario,
+        check=check,
+        needs=shape.needs,
+        hint=" ".join((shape.hint or "").split()),
+    )
+
+
+def _scenario(shape: ScenarioShape) -> Scenario:
+    span = Span(
+        duration_ns=shape.observe.duration,
+        after_first_message_on=shape.observe.after_first_message_on,
+        wait_at_most_ns=shape.observe.wait_at_most,
+    )
+    return Scenario(shape.id, shape.processes, span, tuple(_stimulus(stimulus) for stimulus in shape.stimuli))
+
+
+def _stimulus(shape: StimulusShape) -> Stimulus:
+    kind, _ = shape.chosen
+    if kind == "odometry":
+        odometry = shape.odometry
+        return OdometryStream(topic=odometry.topic, start_ns=odometry.start, duration_ns=odometry.duration)
+    numbers = shape.numbers
+    return NumberStream(
+        topic=numbers.topic,
+        type=numbers.type,
+        values=tuple(_number(value) for value in numbers.values),
+        period_ns=numbers.period,
+        hold_ns=numbers.hold,
+        start_ns=numbers.start,
+    )
+
+
+def _number(value: float | DrawnShape) -> NumberSpec:
+    if not isinstance(value, DrawnShape):
+        return float(value)
+    kind, _ = value.chosen
+    if kind == "between":
+        return Between(*value.between)
+    return JustAbove(value.just_above) if kind == "just_above" else JustBelow(value.just_below)
+
+
+def builtin_rubrics() -> Mapping[str, Path]:
+    """Return the rubrics that come with the grader: exercise id to YAML file, in the order of exercise numbers.
+
+    Raises:
+        RubricError: The rubrics are missing from this installation, or one of them has mistakes.
+    """
+    package = Path(__file__).resolve().parent.parent
+    folders = (package / "rubrics", package.parent / "rubrics")  # in a wheel, in a checkout
+    folder = next((f for f in folders if f.is_dir()), None)
+    paths = sorted(folder.glob("*.yaml")) if folder else []
+    if not paths:
+        raise RubricError(f"{shown(str(folders[0]), 500)}: expected the built-in rubrics, found none", "install again")
+    exercises = [(read_rubric(path), path) for path in paths]
+    exercises.sort(key=lambda pair: _number_order(pair[0].number))
+    return {exercise.id: path for exercise, path in exercises}
+
+
+def _number_order(number: str) -> list[tuple[int, str]]:
+    """Return a sort key under which 2 comes before 10 and numbers before words."""
+    return [(int(part), "") if part.isdigit() else (1 << 62, part) for part in re.findall(r"[0-9]+|[^0-9]+", number)]

@@ -1,0 +1,88 @@
+"""What one part of a rubric says about another: names that must exist, come first, or be unique."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from grader.reading.quoting import listed, shown
+from grader.reading.rubric_mistakes import nearest
+from grader.reading.rubric_model import CriterionShape, RubricShape, ScenarioShape
+from grader.reading.yaml_tree import TOP, Mistake, TreePath, YamlTree
+
+
+def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
+    """Return the mistakes of a rubric whose every part is well formed by itself.
+
+    Args:
+        rubric: The rubric.
+        tree: The document it came from, for places.
+    """
+    scenario_ids = [scenario.id for scenario in rubric.scenarios]
+    criterion_ids = [criterion.id for criterion in rubric.criteria]
+    return [
+        *_repeated(rubric.files, ("files",), tree),
+        *_repeated(scenario_ids, ("scenarios",), tree, "id"),
+        *_repeated(criterion_ids, ("criteria",), tree, "id"),
+        *(m for i, scenario in enumerate(rubric.scenarios) for m in _in_scenario(scenario, i, rubric.files, tree)),
+        *(m for i, criterion in enumerate(rubric.criteria) for m in _in_criterion(criterion, i, rubric, tree)),
+    ]
+
+
+def _repeated(names: Sequence[str], path: TreePath, tree: YamlTree, key: str = "") -> Iterator[Mistake]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            where = tree.values.get((*path, index, key) if key else (*path, index), TOP)
+            what = f"each {key or 'name'} in `{path[-1]}` once"
+            yield where.mistake(f"expected {what}, found `{shown(name)}` again")
+
+
+def _unknown(name: str, known: Iterable[str], what: str, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    known = list(dict.fromkeys(known))
+    if name not in known:
+        text = f"expected {what} ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
+        yield tree.values.get(path, TOP).mistake(text, nearest(name, known))
+
+
+def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree: YamlTree) -> Iterator[Mistake]:
+    path: TreePath = ("scenarios", index)
+    yield from _repeated(scenario.processes, (*path, "processes"), tree)
+    for number, process in enumerate(scenario.processes):
+        yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree)
+    for number, stimulus in enumerate(scenario.stimuli):
+        kind, parameters = stimulus.chosen
+        place: TreePath = (*path, "stimuli", number, kind)
+        if parameters.start >= scenario.observe.duration and scenario.observe.after_first_message_on is None:
+            yield tree.values.get((*place, "start"), TOP).mistake("expected a start before the end of `observe`")
+        if kind == "numbers" and parameters.hold < parameters.period:
+            text = "expected each number to be held for at least one period, found a shorter `hold`"
+            yield tree.values.get((*place, "hold"), TOP).mistake(text)
+
+
+def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    path: TreePath = ("criteria", index)
+    scenarios = {scenario.id: scenario for scenario in rubric.scenarios}
+    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", (*path, "scenario"), tree)
+    yield from _needs(criterion, index, rubric, tree)
+    name, parameters = criterion.check.chosen
+    process = parameters.model_dump(by_alias=True).get("process")
+    if isinstance(process, str) and criterion.scenario in scenarios:
+        known = scenarios[criterion.scenario].processes
+        what = f"a process of the scenario {criterion.scenario}"
+        yield from _unknown(process, known, what, (*path, "check", name, "process"), tree)
+
+
+def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield the needs that name no earlier criterion; so there are no cycles."""
+    path: TreePath = ("criteria", index, "needs")
+    earlier = [other.id for other in rubric.criteria[:index]]
+    yield from _repeated(criterion.needs, path, tree)
+    for number, need in enumerate(criterion.needs):
+        where = tree.values.get((*path, number), TOP)
+        if need == criterion.id:
+            yield where.mistake(f"expected an earlier criterion, found `{need}` itself")
+        elif need in (other.id for other in rubric.criteria[index:]):
+            yield where.mistake(f"expected an earlier criterion, found `{need}`, which comes later", "change the order")
+        elif not earlier:
+            yield where.mistake(f"expected no needs in the first criterion, found `{need}`")
+        else:
+            yield from _unknown(need, earlier, "the id of an earlier criterion", (*path, number), tree)

@@ -1,0 +1,52 @@
+"""The JSON Schema of rubric files, which lets editors complete and check them.
+
+`python -m grader.reading.rubric_schema` prints it as it is shipped.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from grader.judging.checks import CHECKS
+from grader.reading.rubric_model import rubric_model
+
+
+def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of rubric files.
+
+    Args:
+        checks: The table of checks that rubrics may use.
+    """
+    schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_tidy(schema)}
+
+
+def schema_text() -> str:
+    """Return the schema as the shipped file holds it."""
+    return json.dumps(rubric_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _tidy(node: Any, *, names: bool = False) -> Any:  # noqa: ANN401 - any JSON value
+    """Drop what only restates Python: generated titles, and the default of an option that was not chosen.
+
+    Args:
+        node: Part of a schema.
+        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not words of the schema.
+    """
+    if isinstance(node, list):
+        return [_tidy(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    kept = node if names else {key: value for key, value in node.items() if not _restates(key, value)}
+    return {key: _tidy(value, names=not names and key in ("properties", "$defs")) for key, value in kept.items()}
+
+
+def _restates(key: str, value: object) -> bool:
+    return (key == "title" and isinstance(value, str)) or (key == "default" and value is None)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(schema_text())

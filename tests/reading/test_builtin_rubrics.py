@@ -1,0 +1,134 @@
+"""The rubrics that come with the grader hold the criteria and points that are promised, and editors can check them."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+from ruamel.yaml import YAML
+
+from grader.judging.checks import CHECKS
+from grader.model.quantities import NS_PER_S
+from grader.model.scenario import OdometryStream
+from grader.reading import rubric_file
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.rubric_schema import rubric_schema, schema_text
+
+RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
+
+POINTS = {
+    "velocity_publisher": {
+        "publishes_twist": 6,
+        "rate": 10,
+        "linear_velocity": 5,
+        "angular_velocity": 5,
+        "logging": 4,
+    },
+    "odom_subscriber": {"subscribes_odom": 6, "logs_position": 10, "log_period": 6, "waits_gracefully": 8},
+    "two_node_communication": {
+        "temperature_rate": 6,
+        "temperature_range": 6,
+        "logs_fan_speed": 5,
+        "fan_on_above_25": 7,
+        "fan_off_at_or_below_25": 7,
+        "runs_together": 5,
+        "bidirectional_graph": 4,
+    },
+}
+
+
+def exercise(name):
+    return read_rubric(builtin_rubrics()[name])
+
+
+def test_the_criteria_and_points_are_the_promised_ones():
+    """Ids, points and order are fixed: other programs read them."""
+    got = {name: {c.id: c.points for c in read_rubric(path).criteria} for name, path in builtin_rubrics().items()}
+    assert got == POINTS
+    assert [list(criteria) for criteria in got.values()] == [list(criteria) for criteria in POINTS.values()]
+    assert list(got) == list(POINTS)
+    assert sum(sum(criteria.values()) for criteria in got.values()) == 100
+
+
+@pytest.mark.parametrize("name", list(POINTS))
+def test_every_lost_criterion_has_something_to_say(name):
+    """Each criterion has a short title and a hint of one line."""
+    for criterion in exercise(name).criteria:
+        assert 0 < len(criterion.title) <= 50
+        assert 0 < len(criterion.hint) <= 110
+
+
+def test_odometry_comes_late_and_goes_early():
+    """Exercise 2 is observed for 24 s: 5 s of silence, 16 s of odometry, 3 s of silence."""
+    (scenario,) = exercise("odom_subscriber").scenarios
+    (stream,) = scenario.stimuli
+    assert stream == OdometryStream("/odom", 5 * NS_PER_S, 16 * NS_PER_S)
+    assert scenario.span.duration_ns == 24 * NS_PER_S
+
+
+def test_every_scripted_number_is_held_for_its_whole_time():
+    """No scripted value of exercise 3 is cut off by the end of its scenario."""
+    for scenario in exercise("two_node_communication").scenarios:
+        for stream in scenario.stimuli:
+            assert stream.start_ns + stream.hold_ns * len(stream.values) <= scenario.span.duration_ns
+
+
+def test_the_shipped_schema_is_up_to_date():
+    """`python -m grader.reading.rubric_schema > rubrics/rubric.schema.json` was run after the last change."""
+    assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
+
+
+@pytest.mark.parametrize("path", sorted(RUBRICS.glob("*.yaml")), ids=lambda path: path.name)
+def test_each_rubric_names_the_schema_and_fits_it(path):
+    """An editor that knows JSON Schema finds nothing wrong."""
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("# yaml-language-server: $schema=rubric.schema.json\n")
+    jsonschema.Draft202012Validator(rubric_schema()).validate(YAML(typ="safe", pure=True).load(text))
+
+
+def test_the_schema_knows_every_check_and_parameter():
+    """Editors complete the checks with their parameters, and mark what is missing or unknown."""
+    schema = rubric_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    check = schema["$defs"]["Check"]
+    assert set(check["properties"]) == set(CHECKS)
+    assert (check["minProperties"], check["maxProperties"]) == (1, 1)
+    rate = schema["$defs"][CHECKS["topic_rate"].__name__]
+    assert set(rate["required"]) == {"topic", "rate", "tolerance", "window"}
+    assert "partly_tolerance" in rate["properties"]
+    assert rate["additionalProperties"] is False
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("rate: 20 Hz", "rate: 20"),
+        ("points: 6", "points: 0"),
+        ("topic_rate:", "topic_rat:"),
+        ("title: Logs", "titel: Logs"),
+    ],
+)
+def test_the_schema_refuses_what_the_reader_refuses(old, new):
+    """An editor marks a missing unit, points of 0, an unknown check and an unknown key."""
+    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8").replace(old, new, 1)
+    data = YAML(typ="safe", pure=True).load(text)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data, rubric_schema())
+
+
+def test_the_schema_is_plain_json():
+    """The text of the schema reads back as the schema."""
+    assert json.loads(schema_text()) == rubric_schema()
+
+
+def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatch):
+    """Beside the package's code, exercise 2 before exercise 10."""
+    rubrics = tmp_path / "grader" / "rubrics"
+    rubrics.mkdir(parents=True)
+    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
+        changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
+        (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
+    monkeypatch.setattr(rubric_file, "__file__", str(tmp_path / "grader" / "reading" / "rubric_file.py"))
+    assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
+    assert list(builtin_rubrics()) == ["c", "a", "b"]
