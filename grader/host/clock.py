@@ -7,6 +7,8 @@ EPOCH_NS = 1_767_225_600_000_000_000
 
 #: A program that never blocks is let go on by this much, each time it has shown that it only waits for time to pass.
 STEP_NS = 500_000
+#: The same for a program that does not even look at the clock, and only waits for something to happen.
+LONG_STEP_NS = 10_000_000
 #: So many looks at the clock, or fruitless polls, at one instant show it; fewer once it has been seen to do so.
 LOOKS = 200
 LOOKS_WHILE_SPINNING = 4
@@ -23,6 +25,7 @@ class VirtualClock:
         self._allowed = LOOKS
         self._yielding = False
         self._sent = 0
+        self._looked_at = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
 
     def move_to(self, now_ns: int) -> None:
@@ -32,6 +35,7 @@ class VirtualClock:
 
     def look(self) -> int:
         """Return the time to a program that asks for it, letting time pass if it does nothing else."""
+        self._looked_at = True
         self.idle_look()
         return self.now_ns
 
@@ -45,9 +49,9 @@ class VirtualClock:
     def _yield(self) -> None:
         self._yielding = True
         try:
-            self.let_time_pass(self.now_ns + STEP_NS)
+            self.let_time_pass(self.now_ns + (STEP_NS if self._looked_at else LONG_STEP_NS))
         finally:
-            self._yielding = False
+            self._yielding = self._looked_at = False
 
     def busy(self) -> None:
         """Note that the program did something else than wait."""

@@ -82,7 +82,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
-        clock.idle_look()
+        clock.look()
         return now(self)
 
     def sleep_until(self: Clock, until: Time, context: Any = None) -> bool:
@@ -183,6 +183,11 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
 def install_wait_sets(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> None:
     """Replace rclpy's wait set."""
     _rclpy.WaitSet = wait_set_type(scheduler, clock, ledger)
+
+
+def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> None:
+    """Wrap the one function through which every logger writes."""
+    _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
 def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], None]) -> None:

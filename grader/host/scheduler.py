@@ -132,8 +132,11 @@ class Scheduler:
         """Return the strand that runs next; when none can, let time move until one can."""
         while True:
             if self._runnable:
+                self._round += 1
                 return self._runnable.popleft()
-            strand = self._poller() or self._due()
+            strand = self._poller()
+            if strand is None and (strand := self._due()) is not None:
+                self._round += 1
             if strand is not None:
                 self._parked.remove(strand)
                 strand.parked = False

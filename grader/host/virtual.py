@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -32,11 +33,13 @@ class VirtualTime:
         self._link = link
         self.clock = VirtualClock()
         self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
-        self.clock.let_time_pass = self.scheduler.pause
+        self.clock.let_time_pass = lambda until_ns: self.scheduler.pause(until_ns, polls=True)
         self._ledger: Ledger | None = None
         self._clocks: RosClocks | None = None
         self._stopping = False
         self._end_ns = 0
+        self._free_until_ns = 0
+        self.unreported = False
         self.resumed_ns = originals.processor_ns()
         self.running = True
         self._used_ns = 0
@@ -57,6 +60,21 @@ class VirtualTime:
         ros.install_traffic(self._ledger, self.clock, lambda: self._converse(self.clock.now_ns))
         ros.install_looks(self.clock)
         threads.install_wall_time(self.clock)
+        self._notice_output(ros)
+
+    def _notice_output(self, ros: Any) -> None:
+        """Have everything that is written reported before time moves, so that it gets its own instant."""
+
+        def noticing(write: Callable[..., Any]) -> Callable[..., Any]:
+            def write_and_note(*args: Any) -> Any:
+                self.unreported = True
+                return write(*args)
+
+            return write_and_note
+
+        for stream in (sys.stdout, sys.stderr):
+            stream.write = noticing(stream.write)  # type: ignore[method-assign]
+        ros.replace_log(noticing)
 
     def start(self, now_ns: int) -> None:
         """Begin to live at a time."""
@@ -66,7 +84,8 @@ class VirtualTime:
     def summary(self) -> dict[str, Any]:
         """Return what every report carries: traffic, endpoints if they changed, processor time."""
         self._used_ns += originals.processor_ns() - self.resumed_ns
-        report: dict[str, Any] = {"cpu_ns": self._used_ns}
+        self.unreported = False
+        report: dict[str, Any] = {"cpu_ns": self._used_ns, "now_ns": self.clock.now_ns}
         if self._ledger is not None:
             report["sent"] = dict(self._ledger.sent)
             self._ledger.sent.clear()
@@ -87,6 +106,9 @@ class VirtualTime:
         """Report, wait for the answer and do what it says."""
         if self._stopping:
             return
+        if wake_ns is not None and self._may_go_on(wake_ns):
+            self._move_to(wake_ns)
+            return
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary()}
         self.running = False
         answer = self._link.ask(report)
@@ -101,8 +123,19 @@ class VirtualTime:
             os.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer["now_ns"])
+        self._free_until_ns = answer["free_until_ns"]
         if self._ledger is not None and answer.get("arrivals"):
             self._ledger.expect(answer["arrivals"])
+
+    def _may_go_on(self, wake_ns: int) -> bool:
+        """Return whether time may move on without asking: nothing else happens until then, and nothing is to be told."""
+        return (
+            self.clock.now_ns < wake_ns < self._free_until_ns
+            and not self.unreported
+            and self._ledger is not None
+            and not self._ledger.changed
+            and not self._ledger.sent
+        )
 
     def _move_to(self, now_ns: int) -> None:
         self.clock.move_to(now_ns)
