@@ -1,0 +1,77 @@
+"""The submissions and what they are worth belong together: every folder has its entry, every entry its folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from grader.model.exercise import Outcome
+
+HERE = Path(__file__).parent
+GROUPS = ("correct", "threads", "wrong", "broken")
+NOT_PYTHON = {"broken/syntax_error", "broken/mixed_tabs"}
+MISSPELT = {"broken/misspelt_file", "broken/controller_missing"}
+
+FILES = {
+    "velocity_publisher": {"velocity_publisher.py"},
+    "odom_subscriber": {"odom_subscriber.py"},
+    "two_node_communication": {"temperature_sensor.py", "fan_controller.py"},
+}
+CRITERIA = {
+    "velocity_publisher": {"publishes_twist", "rate", "linear_velocity", "angular_velocity", "logging"},
+    "odom_subscriber": {"subscribes_odom", "logs_position", "log_period", "waits_gracefully"},
+    "two_node_communication": {
+        "temperature_rate",
+        "temperature_range",
+        "logs_fan_speed",
+        "fan_on_above_25",
+        "fan_off_at_or_below_25",
+        "runs_together",
+        "bidirectional_graph",
+    },
+}
+
+MANIFEST = YAML(typ="safe").load((HERE / "expected.yaml").read_text(encoding="utf-8"))
+ENTRIES = pytest.mark.parametrize(("folder", "entry"), MANIFEST.items(), ids=list(MANIFEST))
+
+
+def test_every_folder_is_listed():
+    """No submission is forgotten, and none is expected that is not there."""
+    folders = {f"{group}/{path.name}" for group in GROUPS for path in (HERE / group).iterdir() if path.is_dir()}
+    assert folders == set(MANIFEST)
+
+
+@ENTRIES
+def test_entry_is_well_formed(folder: str, entry: dict):
+    """Ids and outcomes are those of the exercises; nothing is expected to be undecided."""
+    assert set(entry) == {"about", "graded", "expected"}
+    assert set(entry["expected"]) <= set().union(*(CRITERIA[e] for e in entry["graded"]))
+    assert set(entry["expected"].values()) <= {o.value for o in (Outcome.PARTLY, Outcome.NOT_MET, Outcome.BLOCKED)}
+    if folder.startswith(("correct/", "threads/")):
+        assert entry["expected"] == {}
+    if folder.startswith("wrong/"):
+        assert entry["expected"] != {}
+
+
+@ENTRIES
+def test_files_are_those_of_the_exercise(folder: str, entry: dict):
+    """Each exercise's files are there under their names, and those of no other exercise."""
+    names = {path.name for path in (HERE / folder).rglob("*.py")}
+    wanted = set().union(*(FILES[e] for e in entry["graded"]))
+    others = set().union(*FILES.values()) - wanted
+    assert (wanted <= names) is (folder not in MISSPELT)
+    assert not names & others
+
+
+@ENTRIES
+def test_files_compile(folder: str, entry: dict):
+    """Every file is Python that compiles without a warning, except where that is its fault."""
+    sources = [(path.read_bytes(), str(path)) for path in sorted((HERE / folder).rglob("*.py"))]
+    if folder in NOT_PYTHON:
+        with pytest.raises(SyntaxError):
+            compile(*sources[0], "exec")
+        return
+    for source, name in sources:
+        compile(source, name, "exec")
