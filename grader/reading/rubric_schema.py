@@ -30,7 +30,7 @@ def schema_text() -> str:
 
 
 def _tidy(node: Any, *, names: bool = False) -> Any:  # noqa: ANN401 - any JSON value
-    """Drop what only restates Python: generated titles, and the default of an option that was not chosen.
+    """Drop what speaks of Python only: generated titles, and defaults that a rubric could not write.
 
     Args:
         node: Part of a schema.
@@ -40,12 +40,16 @@ def _tidy(node: Any, *, names: bool = False) -> Any:  # noqa: ANN401 - any JSON 
         return [_tidy(item) for item in node]
     if not isinstance(node, dict):
         return node
-    kept = node if names else {key: value for key, value in node.items() if not _restates(key, value)}
+    kept = node if names else {key: value for key, value in node.items() if not _misleads(key, value, node)}
     return {key: _tidy(value, names=not names and key in ("properties", "$defs")) for key, value in kept.items()}
 
 
-def _restates(key: str, value: object) -> bool:
-    return (key == "title" and isinstance(value, str)) or (key == "default" and value is None)
+def _misleads(key: str, value: object, node: dict[str, Any]) -> bool:
+    """Return whether a word of the schema speaks of Python instead of what a rubric holds."""
+    if key == "title":
+        return isinstance(value, str)
+    # A default of nanoseconds is no text with a unit.
+    return key == "default" and (value is None or (node.get("type") == "string" and not isinstance(value, str)))
 
 
 if __name__ == "__main__":

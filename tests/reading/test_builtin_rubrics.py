@@ -116,6 +116,26 @@ def test_the_schema_refuses_what_the_reader_refuses(old, new):
         jsonschema.validate(data, rubric_schema())
 
 
+def defaults_in(node):
+    if isinstance(node, dict):
+        if "default" in node and "type" in node:
+            yield node["default"], node
+        for value in node.values():
+            yield from defaults_in(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from defaults_in(value)
+
+
+def test_every_default_in_the_schema_could_be_written():
+    """An editor never completes nanoseconds where `60 s` belongs."""
+    schema = rubric_schema()
+    found = list(defaults_in(schema))
+    assert found
+    for default, node in found:
+        jsonschema.validate(default, {"$defs": schema["$defs"], **node})
+
+
 def test_the_schema_is_plain_json():
     """The text of the schema reads back as the schema."""
     assert json.loads(schema_text()) == rubric_schema()
