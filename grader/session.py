@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+import difflib
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from grader.model.report import Report
+import grader
+from grader.judging.judge import judge_exercise
+from grader.model.errors import RubricError
+from grader.model.exercise import Exercise
+from grader.model.report import Environment, ExerciseReport, Report
+from grader.model.scenario import OdometryStream
+from grader.model.submission import Submission
+from grader.model.trace import Trace
+from grader.reading.rubric_file import builtin_odometry, builtin_rubrics, read_rubric
+from grader.reading.submission import stage_submission
+from grader.recording.bag import Odometry, read_odometry
+from grader.recording.domains import private_domains, shared_domains
+from grader.recording.isolation.choose import choose_isolation
+from grader.recording.isolation.protocol import Isolation
+from grader.recording.plan import plan_scenario, seed_of
+from grader.recording.recorder import Job, Recorder
+from grader.recording.ros_installation import RosInstallation, find_ros
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +65,98 @@ class Progress(Protocol):
 def grade(request: Request, progress: Progress) -> Report:
     """Grade one submission.
 
+    Args:
+        request: What is to be graded, and how.
+        progress: Hears which step begins.
+
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
-    raise NotImplementedError
+    started = time.perf_counter()
+    exercises = read_exercises(request)
+    with tempfile.TemporaryDirectory(prefix="grade-") as folder:
+        progress("reading the submission")
+        submission = stage_submission(request.submission, _wanted(exercises), Path(folder) / "submission")
+        odometry = read_recording(request, exercises)
+        ros = find_ros()
+        isolation = choose_isolation(request.isolation, ros)
+        seed = seed_of(submission.digest) if request.seed is None else request.seed
+        jobs = plan_jobs(request, exercises, submission, odometry, seed)
+        with Recorder(isolation, ros.runtime, _domains(isolation), _workers(len(jobs))) as recorder:
+            traces = dict(zip(jobs, recorder.record(list(jobs.values()), progress), strict=True))
+        reports = tuple(_judge(exercise, traces, submission) for exercise in exercises)
+    return Report(
+        name=submission.name,
+        path=request.submission,
+        digest=submission.digest,
+        environment=_environment(ros, isolation),
+        seed=seed,
+        exercises=reports,
+        duration_s=time.perf_counter() - started,
+        notes=submission.notes,
+    )
+
+
+def read_exercises(request: Request) -> list[Exercise]:
+    """Return the exercises to grade, in rubric order; raises RubricError for an id that no rubric has."""
+    paths: Sequence[Path] = request.rubrics or tuple(builtin_rubrics().values())
+    exercises = [read_rubric(path) for path in paths]
+    known = [exercise.id for exercise in exercises]
+    for wanted in request.exercises:
+        if wanted not in known:
+            nearest = difflib.get_close_matches(wanted, known, n=1, cutoff=0.3)
+            hint = f"did you mean {nearest[0]}" if nearest else f"known are {', '.join(known)}"
+            raise RubricError(f"--exercise {wanted}: expected one of {', '.join(known)}, found {wanted}", hint)
+    return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
+
+
+def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:
+    """Return the /odom recording, if one was named or an exercise plays one."""
+    if request.odom_bag is not None:
+        return read_odometry(request.odom_bag)
+    stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
+    return read_odometry(builtin_odometry()) if any(isinstance(s, OdometryStream) for s in stimuli) else None
+
+
+def plan_jobs(
+    request: Request, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
+) -> dict[tuple[str, str], Job]:
+    """Return what has to be recorded, by exercise and scenario; a scenario with a missing file is left out."""
+    clock = "wall" if request.clock == "wall" else "virtual"
+    return {
+        (exercise.id, scenario.id): Job(
+            f"exercise {exercise.number}: {scenario.id.replace('_', ' ')}",
+            plan_scenario(exercise, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+        )
+        for exercise in exercises
+        for scenario in exercise.scenarios
+        if all(submission.files[name].found for name in scenario.processes)
+    }
+
+
+def _judge(exercise: Exercise, traces: Mapping[tuple[str, str], Trace], submission: Submission) -> ExerciseReport:
+    own = {scenario: trace for (owner, scenario), trace in traces.items() if owner == exercise.id}
+    return judge_exercise(exercise, own, submission)
+
+
+def _wanted(exercises: Sequence[Exercise]) -> list[str]:
+    return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+
+
+def _workers(jobs: int) -> int:
+    return max(1, min(jobs, len(os.sched_getaffinity(0)), 4))
+
+
+def _domains(isolation: Isolation) -> Iterator[int]:
+    return shared_domains() if isolation.name == "none" else private_domains()
+
+
+def _environment(ros: RosInstallation, isolation: Isolation) -> Environment:
+    return Environment(
+        grader=grader.__version__,
+        ros_distro=ros.distro,
+        rclpy=ros.rclpy_version,
+        rmw="rmw_fastrtps_cpp",
+        python=platform.python_version(),
+        isolation=isolation.name,
+    )

@@ -1,0 +1,240 @@
+"""The supervisor's side of recording: keeps workers, hands them plans, takes traces back.
+
+A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and the plan it
+had is tried once more; a second failure becomes a trace with a problem of ours, which is never judged.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from grader.model.errors import HarnessError
+from grader.model.trace import ClockKind, Trace
+from grader.recording.codec import trace_from_json
+from grader.recording.isolation.protocol import Isolation, PythonRuntime
+from grader.recording.plan import Plan, plan_to_json
+
+#: Real seconds that one scenario may take before its worker is taken for lost.
+SCENARIO_S = 300.0
+#: An answer larger than this is not a trace.
+ANSWER_BYTES = 256 << 20
+TRIES = 2
+
+
+class WorkerProcess:
+    """One running worker and the line to it.
+
+    Args:
+        isolation: The tier it runs in, and starts student processes in.
+        runtime: Interpreter and ROS.
+        domains: Gives the number of a ROS domain that nobody else uses.
+    """
+
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int]) -> None:
+        self._domains = domains
+        self._line, theirs = socket.socketpair()
+        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": _runtime_to_json(runtime)}
+        argv = [str(runtime.executable), "-s", "-u", "-m", "grader.recording.worker", json.dumps(request)]
+        command = isolation.worker_command(argv, _worker_environment(runtime), (theirs.fileno(),))
+        self._process = subprocess.Popen(
+            command.argv,
+            env=dict(command.environment),
+            pass_fds=command.pass_fds,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+            cwd="/",
+            start_new_session=True,
+        )
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
+        theirs.close()
+
+    def run(self, plan: Plan) -> Trace:
+        """Run one plan; raises HarnessError if the worker fails."""
+        request = json.dumps({"plan": plan_to_json(plan), "domain": next(self._domains)}) + "\n"
+        try:
+            self._line.sendall(request.encode())
+            answer = json.loads(self._answer())
+        except (OSError, ValueError) as error:
+            raise HarnessError(f"worker: expected a trace of {plan.scenario}, found none ({error})") from error
+        if not isinstance(answer, dict) or "trace" not in answer:
+            problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
+            raise HarnessError(f"worker: {problem.strip().splitlines()[-1:] or ['no trace']}"[:600])
+        return trace_from_json(answer["trace"])
+
+    def _answer(self) -> bytes:
+        deadline = time.monotonic() + SCENARIO_S
+        received = bytearray()
+        while not received.endswith(b"\n"):
+            self._line.settimeout(max(0.001, deadline - time.monotonic()))
+            found = self._line.recv(1 << 20)
+            if not found:
+                raise OSError("it ended")
+            received += found
+            if len(received) > ANSWER_BYTES:
+                raise OSError("it answered without end")
+        return bytes(received)
+
+    def close(self) -> None:
+        """Hang up; the worker and whatever it started end at once."""
+        self._line.close()
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, 9)
+        self._process.wait()
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A plan with the name its progress is told by."""
+
+    title: str
+    plan: Plan
+
+
+class Recorder:
+    """A few workers that record scenarios side by side; virtual time makes that safe.
+
+    Args:
+        isolation: The tier.
+        runtime: Interpreter and ROS.
+        domains: Gives ROS domains, a new one for every scenario.
+        workers: How many scenarios are recorded at the same time.
+    """
+
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], workers: int) -> None:
+        self._isolation = isolation
+        self._runtime = runtime
+        self._domains = _Shared(domains)
+        self._idle: queue.SimpleQueue[WorkerProcess | None] = queue.SimpleQueue()
+        self._alive: list[WorkerProcess] = []
+        self._lock = threading.Lock()
+        self._closed = False
+        self._count = workers
+        for _ in range(workers):
+            self._idle.put(None)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def warm_up(self, count: int) -> None:
+        """Start so many workers now, so that they are ready when the first plan comes."""
+        for _ in range(min(count, self._count)):
+            self._idle.get()
+            self._idle.put(self._start())
+
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+        """Record every job and return the traces in the same order."""
+        pool = ThreadPoolExecutor(self._count, thread_name_prefix="recorder")
+        try:
+            futures = [pool.submit(self._record, job, progress) for job in jobs]
+            return [future.result() for future in futures]
+        finally:
+            # After an interruption nobody waits for the scenarios under way: their workers are ended.
+            if sys.exc_info()[0] is not None:
+                self.close()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
+        progress(job.title)
+        problem = ""
+        for _ in range(TRIES):
+            worker = self._idle.get()
+            try:
+                worker = worker or self._start()
+                trace = worker.run(job.plan)
+                self._idle.put(worker)
+                return trace
+            except HarnessError as error:
+                problem = error.message
+                self._discard(worker)
+                self._idle.put(None)
+                if self._closed:
+                    break
+        clock = ClockKind(job.plan.clock)
+        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+
+    def _start(self) -> WorkerProcess:
+        with self._lock:
+            if self._closed:
+                raise HarnessError("worker: the recorder is closed")
+            worker = WorkerProcess(self._isolation, self._runtime, self._domains)
+            self._alive.append(worker)
+            return worker
+
+    def _discard(self, worker: WorkerProcess | None) -> None:
+        with self._lock:
+            if worker in self._alive and worker is not None:
+                self._alive.remove(worker)
+                worker.close()
+
+    def close(self) -> None:
+        """End every worker."""
+        with self._lock:
+            self._closed = True
+            alive, self._alive = self._alive, []
+        for worker in alive:
+            worker.close()
+
+
+class _Shared:
+    """An iterator that several threads may use."""
+
+    def __init__(self, numbers: Iterator[int]) -> None:
+        self._numbers = numbers
+        self._lock = threading.Lock()
+
+    def __iter__(self) -> _Shared:
+        return self
+
+    def __next__(self) -> int:
+        with self._lock:
+            return next(self._numbers)
+
+
+def _runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
+    return {
+        "executable": str(runtime.executable),
+        "read_paths": [str(p) for p in runtime.read_paths],
+        "library_paths": [str(p) for p in runtime.library_paths],
+        "python_paths": [str(p) for p in runtime.python_paths],
+        "environment": dict(runtime.environment),
+    }
+
+
+def _worker_environment(runtime: PythonRuntime) -> Mapping[str, str]:
+    """Return the whole environment of a worker: nothing of the caller's but where to find programs."""
+    from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
+    environment = {
+        "HOME": "/tmp",  # noqa: S108 - nothing is written there
+        "LANG": "C.UTF-8",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "LD_LIBRARY_PATH": ":".join(map(str, runtime.library_paths)),
+        "PYTHONPATH": ":".join([*map(str, runtime.python_paths), _package_root()]),
+        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+        "SKIP_DEFAULT_XML_FILE": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        **runtime.environment,
+        **from_caller,
+    }
+    return {name: value for name, value in environment.items() if value}
+
+
+def _package_root() -> str:
+    """Return the folder that holds the grader package, so that a worker runs the same one."""
+    return os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
