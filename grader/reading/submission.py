@@ -131,7 +131,7 @@ def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> li
     ranked = []
     for relative in files:
         name = PurePosixPath(relative).name
-        if name in all_wanted or not _may_be_python(name):
+        if name in all_wanted or len(name) > 2 * len(wanted) + 20 or not _may_be_python(name):
             continue
         likeness = _likeness(_plain(name), plain)
         if likeness >= SIMILARITY:

@@ -1,0 +1,37 @@
+"""Foreign text becomes one short printable line."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.reading.quoting import listed, shown
+
+
+@given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))
+def test_shown_text_is_one_short_printable_line(text, limit):
+    """Whatever goes in, lone surrogates too, the result is printable, encodable and no longer than asked."""
+    line = shown(text, limit)
+    assert line.isprintable()
+    assert len(line) <= limit
+    assert line.encode("utf-8").decode("utf-8") == line
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("fan_controller.py", "fan_controller.py"),
+        ("température.py", "température.py"),
+        ("a\nb\x1b[31m", "a\\nb\\x1b[31m"),
+        ("\udcff\u202e", "\\udcff\\u202e"),
+        ("0123456789" * 3, "0123456789…123456789"),
+    ],
+)
+def test_what_is_shown(text, line):
+    """Letters of any language stay; control characters and surrogates are spelt out; long text loses its middle."""
+    assert shown(text, 20) == line
+
+
+@pytest.mark.parametrize(("names", "phrase"), [(["a"], "a"), (["a", "b"], "a or b"), (["a", "b", "c"], "a, b or c")])
+def test_a_list_reads_as_a_phrase(names, phrase):
+    """Names are joined as people write them."""
+    assert listed(names) == phrase
