@@ -1,1 +1,29 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
+
+from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
+from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+
+#: Name in a rubric -> check; the fields of the class are the parameters.
+CHECKS: dict[str, type] = {
+    "publishes": Publishes,
+    "topic_rate": TopicRate,
+    "field_values": FieldValues,
+    "uses_logger": UsesLogger,
+    "subscribes": Subscribes,
+    "logs_position": LogsPosition,
+    "log_period": LogPeriod,
+    "waits_gracefully": WaitsGracefully,
+    "random_in_range": RandomInRange,
+    "logs_received": LogsReceived,
+    "threshold_response": ThresholdResponse,
+    "answers_together": AnswersTogether,
+    "bidirectional_graph": BidirectionalGraph,
+}
+
+__all__ = ["CHECKS"]

@@ -1,0 +1,209 @@
+"""The check on a controller that switches at a threshold, tried on scripted numbers."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+from grader.judging.findings import met, not_met
+from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
+from grader.judging.values import Held, Reading, held, last_of_instant, published, readings
+from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
+from grader.model.errors import HarnessError
+from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_MS, seconds, within
+from grader.model.trace import Trace
+
+#: How long after a new input an answer to the one before is still accepted.
+_GRACE_NS = 300 * NS_PER_MS
+#: The same for a controller that answers on a timer: one of its periods, at most this.
+_LONGEST_GRACE_NS = 1_200 * NS_PER_MS
+#: A controller that speaks at least this often repeats itself; silence then means that it stopped.
+_REPEATING_NS = 1_200 * NS_PER_MS
+_EXACT = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class _Violation:
+    """A held input that was answered wrongly; `got` is None where there was no answer."""
+
+    t_ns: int
+    held: Held
+    got: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdResponse:
+    """A controller alone answers held inputs: one value above a threshold, another at or below it.
+
+    It may answer each input, publish on change only, or publish on a timer of up to a second.
+
+    Attributes:
+        input: Topic that the numbers are published on.
+        output: Topic of the answers.
+        threshold: Where the answer changes; the threshold itself is not above.
+        above: Answer expected above the threshold.
+        otherwise: Answer expected at or below it.
+        side: Which side this criterion is about.
+    """
+
+    input: str
+    output: str
+    threshold: float
+    above: float
+    otherwise: float
+    side: Literal["above", "at_or_below"]
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if every input on this side is answered rightly."""
+        inputs = held(trace, self.input)
+        messages = published(trace, self.output)
+        if not messages:
+            return self._silent(trace)
+        mine = [h for h in inputs if self._on_side(h.value)]
+        if not mine:
+            return self._nothing_asked(trace)
+        answers = last_of_instant(readings(messages))
+        if not answers:
+            return not_met(f"{self.output}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+        violations = [v for v in (self._violation(h, answers, trace) for h in mine) if v is not None]
+        evidence = self._evidence(inputs, answers)
+        if violations:
+            return self._violated(trace, violations, inputs, answers, evidence)
+        side = "above" if self.side == "above" else "at or below"
+        reason = (
+            f"{self.output}: {number(self._expected(mine[0].value))} for each of {counted(len(mine), 'value')} {side} "
+        )
+        reason += f"{number(self.threshold)}{unit_of(self.input)} ({numbers(h.value for h in mine)})"
+        return met(reason, evidence)
+
+    def _on_side(self, value: float) -> bool:
+        return (value > self.threshold) == (self.side == "above")
+
+    def _expected(self, value: float) -> float:
+        return self.above if value > self.threshold else self.otherwise
+
+    def _right(self, got: float, value: float) -> bool:
+        return within(got, self._expected(value), _EXACT)
+
+    def _violation(self, asked: Held, answers: Sequence[Reading], trace: Trace) -> _Violation | None:
+        grace_ns = _grace(answers)
+        during = [a for a in answers if asked.start_ns <= a.t_ns < asked.stop_ns]
+        wrong = [a for a in during if a.t_ns > asked.start_ns + grace_ns and not self._right(a.value, asked.value)]
+        if wrong:
+            return _Violation(wrong[0].t_ns, asked, wrong[0].value)
+        if asked.stop_ns == trace.stop_ns and asked.stop_ns - asked.start_ns <= grace_ns:
+            return None  # the observation ended before an answer was due
+        before = [a for a in answers if a.t_ns < asked.start_ns]
+        if during:
+            last = during[-1]
+            return None if self._right(last.value, asked.value) else _Violation(last.t_ns, asked, last.value)
+        if not before or _repeats(answers) or any(f.t_ns <= asked.start_ns for f in trace.faults()):
+            return _Violation(asked.start_ns, asked, None)
+        carried = before[-1].value
+        return None if self._right(carried, asked.value) else _Violation(asked.start_ns, asked, carried)
+
+    def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, Any]:
+        rows = []
+        for asked in inputs:
+            state = [a.value for a in answers if a.t_ns < asked.stop_ns]
+            expected = self._expected(asked.value)
+            rows.append([seconds(asked.start_ns), asked.value, state[-1] if state else None, expected])
+        return {"columns": ["t_s", "input", "answer", "expected"], "rows": rows, "answers": len(answers)}
+
+    def _violated(
+        self,
+        trace: Trace,
+        violations: Sequence[_Violation],
+        inputs: Sequence[Held],
+        answers: Sequence[Reading],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        first = violations[0]
+        unit = unit_of(self.input)
+        wanted = number(self._expected(first.held.value))
+        found = "no answer" if first.got is None else number(first.got)
+        reason = f"{moment(first.t_ns)}, {self.output}: {found} for {number(first.held.value)}{unit} on {self.input}, "
+        reason += f"expected {wanted}"
+        fault = first_fault(trace)
+        if fault is not None and first.got is None:
+            return not_met(f"{reason}; {fault_sentence(fault)}", evidence, hint=fault_hint(fault), fault=fault)
+        said, hint = self._diagnosis(violations, inputs, answers)
+        return not_met(reason + said, evidence, hint=hint)
+
+    def _diagnosis(
+        self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
+    ) -> tuple[str, str]:
+        """Return what to add to the reason, and a hint; both may be empty."""
+        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        rule = f"publish {number(self.above)} above {limit} and {number(self.otherwise)} at or below it"
+        seen = {a.value for a in answers}
+        if self._inverted(inputs, answers):
+            return "; the answers are the wrong way round for every value", rule
+        if len(seen) == 1:
+            return f"; the answer is {number(answers[0].value)} all the time", ""
+        mistaken = [v.held.value for v in violations]
+        if self.side == "at_or_below" and all(v == self.threshold for v in mistaken):
+            return "", f"{limit} itself is not above {limit}: compare with > and not with >="
+        near = self.side == "above" and all(0 < v - self.threshold <= 1 for v in mistaken)
+        if near and any(h.value > self.threshold + 1 for h in inputs):
+            return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
+        if not any(within(s, w, _EXACT) for s in seen for w in (self.above, self.otherwise)):
+            return "", rule
+        return "", ""
+
+    def _inverted(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> bool:
+        pairs = []
+        for asked in inputs:
+            state = [a.value for a in answers if a.t_ns < asked.stop_ns]
+            if state:
+                pairs.append((asked.value, state[-1]))
+        flipped = {self.above: self.otherwise, self.otherwise: self.above}
+        both = {v > self.threshold for v, _ in pairs} == {True, False}
+        # exactly at the threshold, inverted logic may fall on either side
+        away = [(v, got) for v, got in pairs if v != self.threshold]
+        return both and all(within(got, flipped[self._expected(v)], _EXACT) for v, got in away)
+
+    def _silent(self, trace: Trace) -> Finding:
+        """Return why the controller never answered; that it did subscribe is said too."""
+        why = explain_no_message(trace, self.output)
+        heard = [e for e in student_endpoints(trace, "subscription") if e.topic == self.input]
+        if first_fault(trace) is not None or why.evidence.get("messages"):
+            return why
+        if not heard:
+            others = [e.topic for e in student_endpoints(trace, "subscription")]
+            instead = f"; it subscribes to {quote(others[0])}" if others else ""
+            hint = f"subscribe to {self.input}"
+            return not_met(f"{why.reason}; nothing subscribes to {self.input}{instead}", why.evidence, hint=hint)
+        return not_met(f"{why.reason}; {quote(heard[0].node)} subscribes to {self.input}{_deaf(heard)}", why.evidence)
+
+    def _nothing_asked(self, trace: Trace) -> Finding:
+        fault = first_fault(trace)
+        if fault is None:
+            raise HarnessError(f"{self.input}: no value on this side of {number(self.threshold)} was published")
+        return not_met(f"{fault_sentence(fault)}; no answer on {self.output}", hint=fault_hint(fault), fault=fault)
+
+
+def _deaf(subscriptions: Sequence[Any]) -> str:
+    latched = all(e.durability == "transient_local" for e in subscriptions)
+    return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
+
+
+def _gaps(answers: Sequence[Reading]) -> list[int]:
+    return [b.t_ns - a.t_ns for a, b in pairwise(answers)]
+
+
+def _grace(answers: Sequence[Reading]) -> int:
+    """Return how long after a new input the old answer may still come: one period of a timer-driven controller."""
+    gaps = _gaps(answers)
+    period = round(statistics.median(gaps)) if gaps else 0
+    return max(_GRACE_NS, min(period, _LONGEST_GRACE_NS))
+
+
+def _repeats(answers: Sequence[Reading]) -> bool:
+    """Return whether the controller repeats its answers, rather than publishing on change only."""
+    gaps = _gaps(answers)
+    return bool(gaps) and statistics.median(gaps) <= _REPEATING_NS

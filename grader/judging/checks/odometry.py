@@ -1,0 +1,252 @@
+"""Checks on logged positions: whether they are right, how often they come, and what happens while there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+from grader.judging.findings import met, not_met, partly
+from grader.judging.output import printed_lines, student_records, written
+from grader.judging.positions.analysis import Analysis, logged_positions, printed_positions
+from grader.judging.positions.causes import cause_of
+from grader.judging.positions.matching import Group, blocks, grouped
+from grader.judging.positions.track import Track, track_of
+from grader.judging.silence import fault_hint, first_fault
+from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
+from grader.model.errors import HarnessError
+from grader.model.exercise import Finding, Location
+from grader.model.quantities import DurationNs, seconds, within
+from grader.model.trace import Fault, LogRecord, Trace
+
+_LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
+_TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"
+#: Longest gap between two logs, in periods, and longest wait at both ends of the stream.
+_LONGEST_GAP = 2.2
+#: Share of the messages from which on logs are taken for one a message.
+_ONE_A_MESSAGE = 0.8
+_MOST_IN_EVIDENCE = 60
+
+
+def _track(trace: Trace, process: str, topic: str) -> Track | Finding:
+    """Return the odometry played; where a fault ended the recording before it, a finding that says so."""
+    track = track_of(trace, topic)
+    if track is not None:
+        return track
+    fault = first_fault(trace, process)
+    if fault is None:
+        raise HarnessError(f"{topic}: nothing was played on it")
+    return _ended_early(fault)
+
+
+def _ended_early(fault: Fault) -> Finding:
+    reason = f"{fault_sentence(fault)}; nothing could be logged after it"
+    return not_met(reason, hint=fault_hint(fault), fault=fault, blocked_by="waits_gracefully")
+
+
+@dataclass(frozen=True, slots=True)
+class LogsPosition:
+    """A process logs the (x, y) of the odometry that is played, in any wording, to the precision that it prints.
+
+    A logged pair must show a pose that was current when it was written: the newest one, or one replaced less than half
+    a second before. Positions that are printed instead of logged are half of it.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that the odometry is played on.
+    """
+
+    process: str
+    topic: str
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit for right records, half for right printed lines; the reason names what is wrong."""
+        track = _track(trace, self.process, self.topic)
+        if isinstance(track, Finding):
+            return track
+        logged = logged_positions(trace, self.process, track)
+        if logged.met:
+            return met(self._right(logged), _evidence(logged))
+        printed = printed_positions(trace, self.process, track)
+        if printed.met:
+            return partly(f"{self._right(printed)}, printed and not logged", _evidence(printed), hint=_LOGGER_HINT)
+        chosen = logged if logged.groups or not printed.groups else printed
+        return self._explain(trace, track, chosen)
+
+    def _right(self, found: Analysis) -> str:
+        first = found.right[0]
+        reason = f"{self.process}: {counted(len(found.times_ns), 'position')} that agree with {self.topic}"
+        return f"{reason}, the first at {moment(first.t_ns)}: {quote(first.text, 80)}"
+
+    def _explain(self, trace: Trace, track: Track, found: Analysis) -> Finding:
+        fault = first_fault(trace, self.process)
+        if fault is not None and fault.t_ns < track.times_ns[0]:
+            return _ended_early(fault)
+        cause = cause_of(found, track)
+        evidence = _evidence(found) | {"cause": cause.name}
+        if fault is not None and cause.name in ("no_pair", "few"):
+            reason = f"{fault_sentence(fault)}; {cause.sentence if found.right else 'no position was logged before it'}"
+            return not_met(reason, evidence, hint=fault_hint(fault), fault=fault)
+        if not found.groups and not self._wrote_after(trace, track):
+            during = span(track.stop_ns - track.start_ns)
+            reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
+            return not_met(reason, evidence | {"cause": "nothing"})
+        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint)
+
+    def _wrote_after(self, trace: Trace, track: Track) -> bool:
+        return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))
+
+
+def _evidence(found: Analysis) -> dict[str, Any]:
+    entries = found.right or found.wrong or tuple(e for g in found.groups for e in g.entries)
+    return {
+        "right": len(found.right),
+        "wrong": len(found.wrong),
+        "times_s": [seconds(t) for t in found.times_ns[:_MOST_IN_EVIDENCE]],
+        "first_texts": [quote(e.text) for e in entries[:3]],
+        "first_wrong": quote(found.wrong[0].text) if found.wrong else "",
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class LogPeriod:
+    """A process logs positions with a period while odometry is played, not one for every message.
+
+    Judged on the position logs; where none is right, on the commonest log that holds a number.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that the odometry is played on.
+        period: Time expected from one log to the next, on average.
+        tolerance: Largest difference of the average, as a share of the period; the edge is inside.
+    """
+
+    process: str
+    topic: str
+    period: DurationNs
+    tolerance: float = 0.1
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if the average is right and there is no long gap."""
+        track = _track(trace, self.process, self.topic)
+        if isinstance(track, Finding):
+            return not_met(track.reason, track.evidence, blocked_by="logs_position")
+        times = [t for t in self._times(trace, track) if track.start_ns <= t < track.stop_ns]
+        if not times:
+            reason = f"{self.process}: nothing with a number was logged while {self.topic} was played"
+            return not_met(reason, blocked_by="logs_position")
+        average_ns = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 0.0
+        evidence = {
+            "logs": len(times),
+            "average_period_s": average_ns / 1e9,
+            "times_s": [seconds(t) for t in times[:_MOST_IN_EVIDENCE]],
+            "stream_s": [seconds(track.start_ns), seconds(track.stop_ns)],
+        }
+        return self._judged(trace, track, times, average_ns, evidence)
+
+    def _judged(
+        self, trace: Trace, track: Track, times: Sequence[int], average_ns: float, evidence: dict[str, Any]
+    ) -> Finding:
+        wanted = f"expected one every {span(self.period)} ± {number(100 * self.tolerance)} %"
+        if len(times) == 1:
+            only = f"{self.process}: 1 log in {span(track.stop_ns - track.start_ns)}, at {moment(times[0])}; {wanted}"
+            return not_met(only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process))
+        average = f"{self.process}: {len(times)} logs, one every {average_ns / 1e9:.3f} s on average"
+        if not within(average_ns, self.period, self.tolerance * self.period):
+            return not_met(self._too_many(track, times, average, wanted), evidence, hint=_TIMER_HINT)
+        gap = self._long_gap(track, times)
+        if gap is None:
+            return met(f"{average}; {wanted}", evidence)
+        fault = first_fault(trace, self.process)
+        ended = f"; {fault_sentence(fault)}" if fault else ""
+        return not_met(
+            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}", evidence, fault=fault
+        )
+
+    def _too_many(self, track: Track, times: Sequence[int], average: str, wanted: str) -> str:
+        played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
+        if len(times) < _ONE_A_MESSAGE * played:
+            return f"{average}; {wanted}"
+        rate = len(times) / seconds(track.stop_ns - track.start_ns)
+        return f"{self.process}: {rate:.0f} logs a second: one for every message; {wanted}"
+
+    def _long_gap(self, track: Track, times: Sequence[int]) -> tuple[int, int] | None:
+        ends = [track.start_ns, *times, track.stop_ns]
+        gaps = pairwise(ends)
+        return next(((a, b) for a, b in gaps if b - a > _LONGEST_GAP * self.period + track.jitter_ns), None)
+
+    def _times(self, trace: Trace, track: Track) -> tuple[int, ...]:
+        logged = logged_positions(trace, self.process, track)
+        if logged.right:
+            return logged.times_ns
+        printed = printed_positions(trace, self.process, track)
+        if printed.right:
+            return printed.times_ns
+        for outputs in (student_records(trace, self.process), printed_lines(trace, self.process)):
+            during = [o for o in outputs if track.start_ns <= o.t_ns < track.stop_ns]
+            commonest = _commonest(grouped(blocks(during, trace.clock)))
+            if commonest is not None:
+                return tuple(dict.fromkeys(e.t_ns for e in commonest.entries))
+        return ()
+
+
+def _commonest(groups: Sequence[Group]) -> Group | None:
+    """Return the template seen most often; of equals the one that holds two numbers."""
+    return max(groups, key=lambda g: (len(g.entries), bool(g.pairs)), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class WaitsGracefully:
+    """A process lives through a silence on a topic without an exception or an ERROR record, and works once data comes.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that stays silent at first.
+        silence: How long at least it must have been silent in the recording.
+    """
+
+    process: str
+    topic: str
+    silence: DurationNs
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if nothing went wrong and something was written after the first message."""
+        fault = first_fault(trace, self.process)
+        if fault is not None:
+            return self._faulted(trace, fault)
+        bad = [r for r in student_records(trace, self.process) if r.severity in ("ERROR", "FATAL")]
+        if bad:
+            return self._complained(bad)
+        deliveries = trace.deliveries(self.topic)
+        if not deliveries or deliveries[0].t_ns < self.silence:
+            raise HarnessError(
+                f"{self.topic}: the recording has no silence of {span(self.silence)} before the first message"
+            )
+        return self._works(trace, deliveries[0].t_ns)
+
+    def _faulted(self, trace: Trace, fault: Fault) -> Finding:
+        deliveries = trace.deliveries(self.topic)
+        early = not deliveries or fault.t_ns < deliveries[0].t_ns
+        when = f"while nothing was published on {self.topic}" if early else f"after messages came on {self.topic}"
+        hint = fault_hint(fault)
+        if "NoneType" in fault.text:
+            hint = "start with None and return early as long as no message has come"
+        return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
+
+    def _complained(self, bad: Sequence[LogRecord]) -> Finding:
+        first = bad[0]
+        reason = f"{self.process}: {counted(len(bad), 'record')} of severity ERROR or FATAL, the first at "
+        reason += f"{moment(first.t_ns)}: {quote(first.text)}"
+        evidence = {"records": len(bad), "first_s": seconds(first.t_ns), "first": quote(first.text)}
+        found = not_met(reason, evidence, hint="waiting for data is no error: say nothing, or use info or warn")
+        location = Location(first.file, first.line) if first.file and first.line > 0 else None
+        return replace(found, location=location)
+
+    def _works(self, trace: Trace, first_ns: int) -> Finding:
+        after = min((o.t_ns for o in written(trace, self.process) if o.t_ns >= first_ns), default=None)
+        alive = f"{self.process}: alive through {span(first_ns)} without a message"
+        if after is None:
+            return not_met(f"{alive}, but no sign that the data arrived", blocked_by="logs_position")
+        evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
+        return met(f"{alive}, first output with data at {moment(after)}", evidence)

@@ -1,0 +1,173 @@
+"""The check on how often a topic is published, worded as `ros2 topic hz` words it."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import dataclass
+from itertools import pairwise
+
+from grader.judging.findings import met, not_met, partly
+from grader.judging.silence import explain_no_message, first_fault
+from grader.judging.values import published
+from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
+from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
+from grader.model.trace import ClockKind, Fault, Trace
+
+#: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
+_END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """Statistics of the message times in a window; times in seconds."""
+
+    times_ns: tuple[int, ...]
+    stop_ns: int
+    rate_hz: float
+    min_s: float
+    max_s: float
+    std_dev_s: float
+
+    @property
+    def average_ns(self) -> float:
+        return (self.times_ns[-1] - self.times_ns[0]) / (len(self.times_ns) - 1)
+
+    @property
+    def steady(self) -> bool:
+        """Whether at least half of the intervals are of the average length, give or take a half."""
+        gaps = [b - a for a, b in zip(self.times_ns, self.times_ns[1:], strict=False)]
+        usual = sum(0.5 * self.average_ns <= g <= 1.5 * self.average_ns for g in gaps)
+        return 2 * usual >= len(gaps)
+
+    def sentence(self) -> str:
+        return (
+            f"average rate: {self.rate_hz:.3f} Hz, min: {self.min_s:.3f} s, max: {self.max_s:.3f} s, "
+            f"std dev: {self.std_dev_s:.5f} s, window: {len(self.times_ns)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TopicRate:
+    """A topic is published at a rate, measured from its first message on.
+
+    The rate is (n - 1) / (t_last - t_first) over the window, as `ros2 topic hz` has it. Messages must go on to the end
+    of the window and be spread over it: bursts of the right average do not count. The type is free.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        rate: Rate expected.
+        tolerance: Largest difference for full credit; the edge is inside.
+        window: How long is looked at, from the first message on.
+        partly_tolerance: Largest difference for half credit; none if left out.
+    """
+
+    topic: str
+    rate: Hertz
+    tolerance: Hertz
+    window: DurationNs
+    partly_tolerance: Hertz | None = None
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full, half or no credit by how far the rate is off."""
+        times = [m.t_ns for m in published(trace, self.topic)]
+        if not times:
+            return explain_no_message(trace, self.topic)
+        stop_ns = min(trace.stop_ns, times[0] + self.window)
+        inside = tuple(sorted(t for t in times if t < stop_ns))
+        if inside[-1] == inside[0]:
+            return self._too_few(trace, inside)
+        found = _measure(inside, stop_ns)
+        evidence = self._evidence(found)
+        return self._flaw(trace, found, evidence) or self._grade(found, evidence)
+
+    @property
+    def _period_ns(self) -> float:
+        return NS_PER_S / self.rate
+
+    @property
+    def _wanted(self) -> str:
+        return f"expected {number(self.rate)} ± {number(self.tolerance)} Hz over {span(self.window)}"
+
+    def _evidence(self, found: _Measured) -> dict[str, object]:
+        return {
+            "topic": self.topic,
+            "rate_hz": found.rate_hz,
+            "min_s": found.min_s,
+            "max_s": found.max_s,
+            "std_dev_s": found.std_dev_s,
+            "window": len(found.times_ns),
+            "first_s": seconds(found.times_ns[0]),
+            "last_s": seconds(found.times_ns[-1]),
+            "expected_hz": self.rate,
+            "tolerance_hz": self.tolerance,
+        }
+
+    def _grade(self, found: _Measured, evidence: dict[str, object]) -> Finding:
+        reason = f"{self.topic}: {found.sentence()}; {self._wanted}"
+        if within(found.rate_hz, self.rate, self.tolerance):
+            return met(reason, evidence)
+        if self.partly_tolerance is not None and within(found.rate_hz, self.rate, self.partly_tolerance):
+            return partly(reason, evidence, hint=self._hint(found.rate_hz))
+        return not_met(reason, evidence, hint=self._hint(found.rate_hz))
+
+    def _flaw(self, trace: Trace, found: _Measured, evidence: dict[str, object]) -> Finding | None:
+        """Return why a window cannot be taken at its average, or None if it can."""
+        first, last = found.times_ns[0], found.times_ns[-1]
+        seen = f"{self.topic}: {found.sentence()}"
+        if not found.steady:
+            hint = f"publish one message every {self._period_text()} rather than several at once"
+            return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint)
+        silence = found.stop_ns - last
+        if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
+            ended, fault = _ending(trace, first, last)
+            return not_met(f"{seen}; {ended}; {self._wanted}", evidence, fault=fault)
+        if found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
+            observed = (
+                f"only {span(found.stop_ns - first)} could be observed, the first message came at {moment(first)}"
+            )
+            fault = first_fault(trace)
+            observed += f"; {fault_sentence(fault)}" if fault else ""
+            return not_met(f"{seen}; {observed}; {self._wanted}", evidence, fault=fault)
+        return None
+
+    def _too_few(self, trace: Trace, times: tuple[int, ...]) -> Finding:
+        if len(times) == 1:
+            found = f"1 message, at {moment(times[0])}"
+        else:
+            found = f"{counted(len(times), 'message')}, all at {moment(times[0])}"
+        evidence = {"topic": self.topic, "window": len(times), "first_s": seconds(times[0]), "expected_hz": self.rate}
+        fault = first_fault(trace)
+        if fault is not None:
+            return not_met(f"{self.topic}: {found}; {fault_sentence(fault)}; {self._wanted}", evidence, fault=fault)
+        hint = f"publish from a timer: create_timer({self._period_text(bare=True)}, ...) takes the period in seconds"
+        return not_met(f"{self.topic}: {found}; {self._wanted}", evidence, hint=hint)
+
+    def _period_text(self, *, bare: bool = False) -> str:
+        return number(1 / self.rate) + ("" if bare else " s")
+
+    def _hint(self, rate_hz: float) -> str:
+        period = self._period_text(bare=True)
+        rule = f"create_timer({period}, ...): the argument is the period in seconds, 1/{number(self.rate)} = {period}"
+        if rate_hz > 20 * self.rate:
+            return f"the loop has no pacing; use {rule}"
+        if within(rate_hz, self.rate, 0.2 * self.rate):
+            return f"a loop with sleep adds the time of its own work to each period; use {rule}"
+        return rule
+
+
+def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:
+    gaps = [seconds(b - a) for a, b in pairwise(times)]
+    # n - 1 gaps, not n: counting messages overstates a short window
+    rate_hz = (len(times) - 1) / seconds(times[-1] - times[0])
+    return _Measured(times, stop_ns, rate_hz, min(gaps), max(gaps), statistics.pstdev(gaps))
+
+
+def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | None]:
+    """Return how to say that messages stopped before the window did, and the fault that ended them if one did."""
+    stopped = f"stopped after {span(last_ns - first_ns)}"
+    fault = next((f for f in trace.faults() if last_ns <= f.t_ns < trace.stop_ns), None)
+    if fault is not None:
+        return f"{stopped}: {fault_sentence(fault)}", fault
+    limit = next((m for m in trace.marks("limit") if m.t_ns >= last_ns), None)
+    return (f"{stopped}: {quote(limit.detail)}" if limit else stopped), None

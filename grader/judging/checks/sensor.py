@@ -1,0 +1,199 @@
+"""Checks on a sensor: its values lie in a range and are drawn, and it logs what comes back to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.judging.findings import met, not_met, partly
+from grader.judging.output import printed_lines, student_records
+from grader.judging.positions.numbers import Printed, clean, printed_numbers, with_decimal_points
+from grader.judging.randomness import pattern_of
+from grader.judging.silence import (
+    explain_no_message,
+    explain_no_subscription,
+    fault_hint,
+    first_fault,
+    student_endpoints,
+)
+from grader.judging.values import Held, Reading, carries_number, held, published, readings
+from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
+from grader.model.errors import HarnessError
+from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.model.trace import Endpoint, LogRecord, OutputLine, Trace
+
+#: Rounding to single precision must not push a value out of its range.
+_EDGE = 1e-5
+#: So many equal values or fewer may have been drawn: whole numbers repeat.
+_FEWEST_FOR_CONSTANT = 5
+#: How long after the next value came a log may still show the one before.
+_LATE_NS = NS_PER_S
+#: A value that was there for less than this need not have been logged.
+_SHORTEST_NS = 1_200 * NS_PER_MS
+_RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high})"
+_PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
+
+
+@dataclass(frozen=True, slots=True)
+class RandomInRange:
+    """Every number on a topic lies in a range, and the numbers are drawn: no constant, cycle, ramp or smooth curve.
+
+    Attributes:
+        topic: Topic name as on the wire; its messages carry one number, as `data` or `temperature`.
+        low: Smallest value allowed, the edge inside.
+        high: Largest value allowed, the edge inside.
+    """
+
+    topic: str
+    low: float
+    high: float
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if no value is outside and the values may have been drawn."""
+        messages = published(trace, self.topic)
+        if not messages:
+            silent = explain_no_message(trace, self.topic)
+            return not_met(silent.reason, silent.evidence, blocked_by="topic_rate")
+        values = readings(messages)
+        if len(values) < len(messages):
+            return not_met(f"{self.topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+        return self._outside(values) or self._computed(values) or self._drawn(values)
+
+    @property
+    def _hint(self) -> str:
+        return _RANDOM_HINT.format(low=f"{float(self.low)}", high=f"{float(self.high)}")
+
+    def _evidence(self, values: Sequence[Reading]) -> dict[str, Any]:
+        got = [r.value for r in values]
+        return {
+            "messages": len(got),
+            "min": min(got),
+            "max": max(got),
+            "distinct": len(set(got)),
+            "first_values": got[:10],
+        }
+
+    def _outside(self, values: Sequence[Reading]) -> Finding | None:
+        unit = unit_of(self.topic)
+        bad = [r for r in values if not self.low - _EDGE <= r.value <= self.high + _EDGE]
+        if not bad:
+            return None
+        first = bad[0]
+        side = f"above {number(self.high)}" if first.value > self.high else f"below {number(self.low)}"
+        side = "that is no number" if math.isnan(first.value) else f"{side}{unit}"
+        reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
+        reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
+        evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
+        return not_met(reason, evidence, hint=self._hint)
+
+    def _computed(self, values: Sequence[Reading]) -> Finding | None:
+        got = [r.value for r in values]
+        pattern = "constant" if len(got) == 1 else pattern_of(got)
+        if pattern is None:
+            return None
+        if pattern == "constant" and len(got) < _FEWEST_FOR_CONSTANT:
+            reason = (
+                f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{unit_of(self.topic)}) cannot show chance"
+            )
+            return not_met(reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate")
+        if pattern == "constant":
+            pattern = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
+        reason = f"{self.topic}: the values are not random but {pattern} ({numbers(got[:5])}, ...)"
+        return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint)
+
+    def _drawn(self, values: Sequence[Reading]) -> Finding:
+        got = [r.value for r in values]
+        unit = unit_of(self.topic)
+        reason = f"{self.topic}: {counted(len(got), 'value')} from {number(min(got))} to {number(max(got))}{unit}, "
+        reason += f"{len(set(got))} of them different; "
+        reason += f"expected random ones in {number(self.low)} to {number(self.high)}{unit}"
+        return met(reason, self._evidence(values))
+
+
+@dataclass(frozen=True, slots=True)
+class LogsReceived:
+    """A process logs the numbers that are published to it, each at least once while it lasts or up to a second later.
+
+    Numbers count to the precision printed. Values that are printed instead of logged are half of it.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that the numbers are published on.
+    """
+
+    process: str
+    topic: str
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if every value is in a log record, half if printed lines are needed."""
+        fault = first_fault(trace, self.process)
+        values = held(trace, self.topic)
+        subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == self.topic]
+        if not subscriptions and fault is None:
+            return explain_no_subscription(trace, self.topic)
+        if not values:
+            return self._no_values(trace, subscriptions)
+        records = student_records(trace, self.process)
+        unlogged = self._missing(values, records, trace)
+        evidence: dict[str, Any] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+        if not unlogged:
+            reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
+            return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
+        if not self._missing(values, [*records, *printed_lines(trace, self.process)], trace):
+            reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
+            return partly(reason, evidence, hint=_PRINT_HINT)
+        if fault is not None:
+            reason = f"{fault_sentence(fault)}; {len(unlogged)} of {len(values)} values of {self.topic} were not logged"
+            return not_met(reason, evidence, hint=fault_hint(fault), fault=fault)
+        return self._unlogged(subscriptions, values, unlogged, evidence)
+
+    def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
+        types = [e.type for e in subscriptions]
+        if types and not any(carries_number(t) for t in types):
+            reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
+            return not_met(reason, {"type": types[0]}, hint="use a numeric message type, e.g. std_msgs/msg/Float32")
+        fault = first_fault(trace, self.process)
+        if fault is None:
+            raise HarnessError(f"{self.topic}: no number was published on it")
+        return not_met(f"{fault_sentence(fault)}; nothing was logged after it", hint=fault_hint(fault), fault=fault)
+
+    def _missing(self, values: Sequence[Held], outputs: Iterable[LogRecord | OutputLine], trace: Trace) -> list[Held]:
+        shown = [(o.t_ns, _numbers_in(o.text)) for o in outputs]
+        missing = []
+        for value in values:
+            stop_ns = value.stop_ns + (_LATE_NS if value.stop_ns < trace.stop_ns else 1)
+            logged = any(
+                value.start_ns <= t_ns < stop_ns and any(n.shows(value.value) for n in found) for t_ns, found in shown
+            )
+            if not logged and trace.stop_ns - value.start_ns >= _SHORTEST_NS:
+                missing.append(value)
+        return missing
+
+    def _unlogged(
+        self,
+        subscriptions: Sequence[Endpoint],
+        values: Sequence[Held],
+        unlogged: Sequence[Held],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        first = unlogged[0]
+        reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
+        reason += f"the first is {number(first.value)} at {moment(first.start_ns)}"
+        logged = {v.value for v in values} - {v.value for v in unlogged}
+        if logged and logged <= {0.0, 100.0}:
+            reason += "; only 0 and 100 are, so what is logged is not what was received"
+        if all(e.durability == "transient_local" for e in subscriptions):
+            reason += (
+                "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
+            )
+        hint = "log msg.data in the callback of the subscription to " + self.topic
+        return not_met(reason, evidence, hint=hint)
+
+
+def _numbers_in(text: str) -> tuple[Printed, ...]:
+    body = clean(text)
+    other = with_decimal_points(body)
+    return printed_numbers(body) + (printed_numbers(other) if other else ())

@@ -1,0 +1,195 @@
+"""The check on a sensor and a controller that run at once: every number is answered, and rightly."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from grader.judging.findings import met, not_met
+from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
+from grader.judging.values import Reading, last_of_instant, published, readings
+from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
+from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_MS, seconds, within
+from grader.model.trace import Endpoint, Fault, LogRecord, OutputLine, Trace
+
+#: An answer may belong to any input that was current so long before it.
+_CURRENT_NS = 250 * NS_PER_MS
+#: A controller must speak within this time where its last answer does not fit the input: one period of 1 s and slack.
+_SPEAK_NS = 1_250 * NS_PER_MS
+_EXACT = 1e-6
+#: Share of the inputs on one side up to which an answer to them may be missing where answers are few.
+_RARE = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class AnswersTogether:
+    """A sensor and a controller talk to each other: each answer fits an input of the moment, and the answers go on.
+
+    The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
+    lie on both sides of the threshold, both answers must occur.
+
+    Attributes:
+        input: Topic of the sensor.
+        output: Topic of the controller.
+        threshold: Where the answer changes; the threshold itself is not above.
+        above: Answer expected above the threshold.
+        otherwise: Answer expected at or below it.
+    """
+
+    input: str
+    output: str
+    threshold: float
+    above: float
+    otherwise: float
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if all of that holds; the reason names the first moment at which it does not."""
+        sent, answered = published(trace, self.input), published(trace, self.output)
+        for topic, messages in ((self.input, sent), (self.output, answered)):
+            if not messages:
+                return self._silent(trace, topic)
+            if len(readings(messages)) < len(messages):
+                return not_met(f"{topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+        inputs, answers = readings(sent), last_of_instant(readings(answered))
+        evidence = self._evidence(inputs, answers)
+        return (
+            self._wrong_answer(inputs, answers, evidence)
+            or self._stopped_sensor(trace, inputs, evidence)
+            or self._stopped_controller(trace, inputs, answers, evidence)
+            or self._one_sided(inputs, answers, evidence)
+            or self._all_well(inputs, answers, evidence)
+        )
+
+    def _expected(self, value: float) -> float:
+        return self.above if value > self.threshold else self.otherwise
+
+    def _evidence(self, inputs: Sequence[Reading], answers: Sequence[Reading]) -> dict[str, Any]:
+        changes = sum(a.value != b.value for a, b in pairwise(answers))
+        return {
+            "inputs": len(inputs),
+            "inputs_above": sum(r.value > self.threshold for r in inputs),
+            "answers": len(answers),
+            "answer_changes": changes,
+        }
+
+    def _silent(self, trace: Trace, topic: str) -> Finding:
+        """Return why one of the two says nothing; types or policies that keep them apart come first."""
+        apart = _kept_apart(trace, self.input) if topic == self.output else None
+        if apart is not None and first_fault(trace) is None:
+            return apart
+        return explain_no_message(trace, topic)
+
+    def _wrong_answer(
+        self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+    ) -> Finding | None:
+        for answer in answers:
+            recent = _recent(inputs, answer.t_ns)
+            if not recent or any(within(answer.value, self._expected(r.value), _EXACT) for r in recent):
+                continue
+            value, unit = recent[-1].value, unit_of(self.input)
+            reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
+            reason += f"{self.input}, expected {number(self._expected(value))}"
+            return not_met(reason, evidence | {"first_wrong_s": seconds(answer.t_ns)})
+        return None
+
+    def _stopped_sensor(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
+        gaps = [b.t_ns - a.t_ns for a, b in pairwise(inputs)]
+        usual = statistics.median(gaps) if gaps else 0
+        last = inputs[-1].t_ns
+        if trace.stop_ns - last <= max(_SPEAK_NS, 3 * usual):
+            return None
+        return self._stopped(trace, self.input, last, evidence)
+
+    def _stopped_controller(
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+    ) -> Finding | None:
+        for asked in inputs:
+            if asked.t_ns + _SPEAK_NS >= trace.stop_ns:
+                break
+            if any(asked.t_ns <= a.t_ns <= asked.t_ns + _SPEAK_NS for a in answers):
+                continue
+            before = [a for a in answers if a.t_ns < asked.t_ns]
+            # before its first answer nobody knows what a controller that publishes on change believes
+            if before and not within(before[-1].value, self._expected(asked.value), _EXACT):
+                return self._stopped(trace, self.output, before[-1].t_ns, evidence)
+        return None
+
+    def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, Any]) -> Finding:
+        fault = next((f for f in trace.faults() if f.t_ns < trace.stop_ns), None)
+        reason = f"{topic}: nothing after {moment(last_ns)}, expected to go on to {span(trace.stop_ns)}"
+        known = evidence | {"last_s": seconds(last_ns)}
+        if fault is None:
+            return not_met(reason, known)
+        return not_met(f"{reason}; {fault_sentence(fault)}", known, hint=fault_hint(fault), fault=fault)
+
+    def _one_sided(
+        self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+    ) -> Finding | None:
+        expected = [self._expected(r.value) for r in inputs]
+        # a timer of 1 s may miss what is rare; a controller that answers every other input may not
+        often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
+        asked = {w for w in expected if expected.count(w) > often}
+        given = {a.value for a in answers}
+        lacking = sorted(w for w in asked if not any(within(g, w, _EXACT) for g in given))
+        if not lacking:
+            return None
+        reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
+        return not_met(f"{reason}{number(self.threshold)}{unit_of(self.input)}", evidence)
+
+    def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]) -> Finding:
+        reason = (
+            f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
+        )
+        return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
+
+
+def _recent(inputs: Sequence[Reading], t_ns: int) -> list[Reading]:
+    """Return the inputs that were current at some moment of the quarter second up to and including `t_ns`."""
+    until = [r for r in inputs if r.t_ns <= t_ns]
+    older = [r for r in until if r.t_ns <= t_ns - _CURRENT_NS]
+    return older[-1:] + [r for r in until if r.t_ns > t_ns - _CURRENT_NS]
+
+
+def _kept_apart(trace: Trace, topic: str) -> Finding | None:
+    """Return why the two ends of a topic cannot talk, their types or their QoS; None if they can."""
+    publishers = [e for e in student_endpoints(trace, "publisher") if e.topic == topic]
+    subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == topic]
+    if not publishers or not subscriptions:
+        return None
+    here, there = publishers[0], subscriptions[0]
+    evidence = {"publisher": [here.node, here.type], "subscription": [there.node, there.type]}
+    if not {e.type for e in publishers} & {e.type for e in subscriptions}:
+        said = f"{_speaker(trace, here)} publishes {quote(here.type)}, "
+        said += f"{_speaker(trace, there)} subscribes {quote(there.type)}"
+        hint = f"use the same message type for {topic} in both files"
+        return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint)
+    policy = _incompatible(here, there)
+    if policy is None:
+        return None
+    said = f"{_speaker(trace, here)} offers {policy[0]}, {_speaker(trace, there)} asks for {policy[1]}"
+    return not_met(f"{topic}: {said}: they cannot talk", evidence, hint="pass the queue depth 10 as QoS on both sides")
+
+
+def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
+    """Return what is offered and what is asked for where these do not fit; None if they do."""
+    if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
+        return "best_effort reliability", "reliable"
+    if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
+        return "volatile durability", "transient_local"
+    return None
+
+
+def _speaker(trace: Trace, endpoint: Endpoint) -> str:
+    """Return the file that a node belongs to where its logs or its name tell, else the node."""
+    bare = endpoint.node.strip("/").replace("/", ".")
+    for record in trace.records():
+        if record.logger == bare:
+            return record.process
+    heard: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
+    processes = dict.fromkeys(o.process for o in heard)
+    named = next((p for p in processes if p.removesuffix(".py") == bare.rsplit(".", 1)[-1]), None)
+    return named or quote(endpoint.node)

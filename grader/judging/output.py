@@ -1,0 +1,62 @@
+"""What a process wrote: its log records, and the lines that it really printed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from grader.model.trace import LogRecord, OutputLine, Trace
+
+#: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
+_RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
+_TRACEBACK_HEAD = re.compile(r"\s*(Traceback \(most recent call last\):|Exception in thread .*|Exception ignored .*)$")
+_BETWEEN_TRACEBACKS = re.compile(r"(The above exception was|During handling of the above exception)")
+_INTERPRETER = re.compile(
+    r".*:\d+: \w*Warning: "  # warnings.warn
+    r"|sys:\d+: \w*Warning: "
+    r"|Fatal Python error: |Current thread 0x|Thread 0x[0-9a-f]+ "
+    r"|usage: .*\.py|.*\.py: error: "  # argparse
+    r"|\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d+\.\d+\] \["  # rcutils writing a record to its console
+    r"|>>> \[rcutils|.*\[(RTPS|SECURITY|DDS|XMLPARSER)\w* (Error|Warning)\]"
+    r"|terminate called |Segmentation fault|Aborted|Killed|.*Assertion .* failed"
+)
+
+
+def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
+    """Return the records of a process without those that rclpy itself wrote."""
+    return tuple(
+        r
+        for r in trace.records(process)
+        if r.t_ns < trace.stop_ns and not (not r.file and _RCLPY_TEXT.match(r.text[:400]))
+    )
+
+
+def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
+    """Return the lines that a process printed; tracebacks, interpreter warnings and blank lines are not printing."""
+    lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
+    outs = [o for o in lines if o.stream != "stderr"]
+    errs = _without_interpreter_noise([o for o in lines if o.stream == "stderr"])
+    kept = {id(o) for o in [*outs, *errs]}
+    return tuple(o for o in lines if id(o) in kept)
+
+
+def written(trace: Trace, process: str) -> tuple[LogRecord | OutputLine, ...]:
+    """Return the records of a process, then the lines that it printed."""
+    return (*student_records(trace, process), *printed_lines(trace, process))
+
+
+def _without_interpreter_noise(lines: Iterable[OutputLine]) -> list[OutputLine]:
+    kept: list[OutputLine] = []
+    inside_traceback = after_warning = False
+    for line in lines:
+        indented = line.text[:1] in (" ", "\t")
+        if _TRACEBACK_HEAD.match(line.text) or _BETWEEN_TRACEBACKS.match(line.text):
+            inside_traceback = True
+        elif inside_traceback:
+            inside_traceback = indented  # the first line at the margin is the exception itself
+        elif _INTERPRETER.match(line.text[:400]):
+            after_warning = True
+        elif not (after_warning and indented):
+            after_warning = False
+            kept.append(line)
+    return kept

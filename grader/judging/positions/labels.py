@@ -1,0 +1,142 @@
+"""Which of the numbers in a text are called x and y."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from grader.judging.positions.numbers import Printed
+
+#: Most numbers among which unlabelled pairs are sought.
+_MOST_UNLABELLED = 24
+_MOST_LABELLED_PAIRS = 60
+_WORD = re.compile(r"[A-Z]+(?![a-zà-ɏ])|[A-ZÀ-ɏ]?[a-zà-ɏ]+|[A-Z]")
+_LABELS = {
+    **dict.fromkeys(("x", "px", "posx", "xpos", "coordx", "xcoord", "xx"), "x"),
+    **dict.fromkeys(("y", "py", "posy", "ypos", "coordy", "ycoord", "yy"), "y"),
+    **dict.fromkeys(("z", "pz", "posz", "zpos", "coordz", "zcoord"), "z"),
+    "xy": "xy",
+    "xyz": "xyz",
+}
+#: Words that may stand inside a list of labels such as `pos_x and pos_y (m)`.
+_FILLERS = frozenset(
+    {
+        "and",
+        "e",
+        "et",
+        "und",
+        "i",
+        "ed",
+        "pos",
+        "position",
+        "coord",
+        "coordinate",
+        "coords",
+        "p",
+        "odom",
+        "robot",
+        "pose",
+    }
+    | {"m", "meter", "meters", "metre", "metres", "msg", "axis", "eje", "axe", "current", "the"}
+)
+
+Pair = tuple[int, int]
+Assignment = list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How one text presents numbers.
+
+    Attributes:
+        template: The text with its numbers masked; equal for texts that differ in their numbers only.
+        numbers: The numbers in order.
+        pairs: Index pairs that can be (x, y), the labelled ones first.
+    """
+
+    template: str
+    numbers: tuple[Printed, ...]
+    pairs: tuple[Pair, ...]
+
+
+def template_of(text: str, numbers: Sequence[Printed]) -> str:
+    """Return the text with every number replaced by `#` and without white space."""
+    parts = _segments(text, numbers)
+    return "#".join("".join(part.split()) for part in parts)
+
+
+def candidate_pairs(text: str, numbers: Sequence[Printed]) -> tuple[Pair, ...]:
+    """Return the index pairs that can be (x, y) by their labels; in order of appearance where there are no labels."""
+    parts = _segments(text, numbers)
+    ways = [_by_run(parts), _by_nearest(parts), _by_suffix(parts)]
+    complete = [w for w in ways if "x" in w and "y" in w]
+    plain = range(min(len(numbers), _MOST_UNLABELLED))
+    if not complete:
+        return tuple(combinations(plain, 2))
+    pairs = [pair for way in complete for pair in _labelled_pairs(way)][:_MOST_LABELLED_PAIRS]
+    bare = [i for i in plain if not any(way[i] for way in complete)]
+    return tuple(dict.fromkeys([*pairs, *combinations(bare, 2)]))
+
+
+def _segments(text: str, numbers: Sequence[Printed]) -> list[str]:
+    """Return the text before, between and after the numbers: one segment more than there are numbers."""
+    starts = [0] + [n.stop for n in numbers]
+    stops = [n.start for n in numbers] + [len(text)]
+    return [text[a:b] for a, b in zip(starts, stops, strict=True)]
+
+
+def _labels_in(segment: str) -> list[str]:
+    return [label for word in _WORD.findall(segment) for label in _LABELS.get(word.lower(), "")]
+
+
+def _last_run(segment: str) -> list[str]:
+    """Return the last list of labels in a segment: `the x of (x, y) = ` gives x and y."""
+    run: list[str] = []
+    unbroken = False
+    for word in _WORD.findall(segment):
+        labels = list(_LABELS.get(word.lower(), ""))
+        if labels:
+            again = any(label in run[:-1] for label in labels)
+            run = [*run, *labels] if unbroken and not again else labels
+            unbroken = True
+        elif word.lower() not in _FILLERS:
+            unbroken = False
+    return [label for i, label in enumerate(run) if i == 0 or run[i - 1] != label]
+
+
+def _by_run(parts: list[str]) -> Assignment:
+    """Give each list of labels to the numbers that follow it, in order."""
+    waiting: list[str] = []
+    given: Assignment = []
+    for part in parts[:-1]:
+        waiting = _last_run(part) or waiting
+        given.append(waiting[0] if waiting else "")
+        waiting = waiting[1:]
+    return given
+
+
+def _by_nearest(parts: list[str]) -> Assignment:
+    """Give each number the label that stands last before it."""
+    return [(_labels_in(part) or [""])[-1] for part in parts[:-1]]
+
+
+def _by_suffix(parts: list[str]) -> Assignment:
+    """Give each number the label that stands first after it, where nothing is labelled before the first."""
+    if not parts or _labels_in(parts[0]) or not _labels_in(parts[-1]):
+        return [""] * (len(parts) - 1)
+    return [(_labels_in(part) or [""])[0] for part in parts[1:]]
+
+
+def _labelled_pairs(given: Assignment) -> list[Pair]:
+    pairs: list[Pair] = []
+    xs = [i for i, label in enumerate(given) if label == "x"]
+    ys = [i for i, label in enumerate(given) if label == "y"]
+    for here, following in zip(xs, [*xs[1:], len(given)], strict=True):
+        after = next((j for j in ys if here < j < following), None)
+        before = next((j for j in reversed(ys) if j < here), None)
+        partner = after if after is not None else before
+        if partner is not None:
+            pairs.append((here, partner))
+    return pairs

@@ -1,0 +1,101 @@
+"""Numbers on topics: reading them out of messages and grouping what was held."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.model.trace import Delivery, Message, Trace
+
+_NUMERIC_TYPE = re.compile(r"std_msgs/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature")
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One number on a topic."""
+
+    t_ns: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A number that the grader repeated for a while, in [start_ns, stop_ns); the last one lasts to the trace's end."""
+
+    start_ns: int
+    stop_ns: int
+    value: float
+
+
+def as_number(value: object) -> float | None:
+    """Return a plain JSON value as a number; a bool, a string or a list is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def number_of(message: Message | Delivery) -> float | None:
+    """Return the number that a message carries as `data` or `temperature`, or None."""
+    for key in ("data", "temperature"):
+        found = as_number(message.value.get(key))
+        if found is not None:
+            return found
+    return None
+
+
+def carries_number(type_: str) -> bool:
+    """Return whether a message type is one of the standard ones that hold one number."""
+    return _NUMERIC_TYPE.fullmatch(type_) is not None
+
+
+def published(trace: Trace, topic: str) -> tuple[Message, ...]:
+    """Return what the student's nodes published on a topic while it was observed."""
+    return tuple(m for m in trace.messages(topic) if m.t_ns < trace.stop_ns)
+
+
+def readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
+    """Return the numbers of those messages that carry one."""
+    found = ((m.t_ns, number_of(m)) for m in messages)
+    return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
+
+
+def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
+    """Return one reading an instant: the last one counts."""
+    return tuple({r.t_ns: r for r in series}.values())
+
+
+def held(trace: Trace, topic: str) -> tuple[Held, ...]:
+    """Return the numbers that the grader published on a topic, equal neighbours joined."""
+    starts: list[Reading] = []
+    for reading in readings(trace.deliveries(topic)):
+        if reading.t_ns < trace.stop_ns and (not starts or starts[-1].value != reading.value):
+            starts.append(reading)
+    stops = [s.t_ns for s in starts[1:]] + [trace.stop_ns]
+    return tuple(Held(start.t_ns, stop, start.value) for start, stop in zip(starts, stops, strict=True))
+
+
+def field(value: Mapping[str, Any], path: str) -> float | None:
+    """Return the number at a path such as `linear.x`, or None if there is none."""
+    here: Any = value
+    for name in path.split("."):
+        if not isinstance(here, Mapping) or name not in here:
+            return None
+        here = here[name]
+    return as_number(here)
+
+
+def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """Return every number of a message by its path."""
+    found: dict[str, float] = {}
+    for name, inner in value.items():
+        if isinstance(inner, Mapping):
+            found |= leaves(inner, f"{prefix}{name}.")
+        elif (got := as_number(inner)) is not None:
+            found[f"{prefix}{name}"] = got
+    return found

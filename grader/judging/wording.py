@@ -1,0 +1,85 @@
+"""How judging words times, numbers, names and quotations in reasons."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Sequence
+
+from grader.model.quantities import seconds
+from grader.model.trace import Fault, FaultKind
+
+#: Longest quotation of a student's text inside a sentence.
+QUOTE_LENGTH = 120
+
+
+def moment(t_ns: int) -> str:
+    """Return a time as `t = 3.200 s`."""
+    return f"t = {seconds(t_ns):.3f} s"
+
+
+def span(duration_ns: int) -> str:
+    """Return a duration as `10.0 s`."""
+    return f"{seconds(duration_ns):.1f} s"
+
+
+def number(value: float) -> str:
+    """Return a number with up to six significant digits, without a needless `.0`."""
+    return f"{value:.6g}" if math.isfinite(value) else str(value)
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers as `1, 2.5, 3`."""
+    return ", ".join(number(v) for v in values)
+
+
+def counted(count: int, noun: str) -> str:
+    """Return `1 message` or `3 messages`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def quote(text: str, length: int = QUOTE_LENGTH) -> str:
+    """Return a student's text on one line, cut to `length` characters."""
+    line = " ".join(text[: 4 * length].split())
+    return line if len(line) <= length else line[: length - 1] + "…"
+
+
+def unit_of(topic: str) -> str:
+    """Return the unit of a topic's numbers with a leading space; empty if the name does not tell."""
+    return " °C" if "temperature" in topic.lower() else ""
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate that reads like a slip for `name`: almost the same, or the same last part; None if none."""
+    others = sorted(set(candidates) - {name})
+    last = _last_part(name)
+    same_end = [c for c in others if _last_part(c) == last]
+    if same_end:
+        return same_end[0]
+    close = difflib.get_close_matches(_plain(name), [_plain(c) for c in others], n=1, cutoff=0.7)
+    return next((c for c in others if close and _plain(c) == close[0]), None)
+
+
+def listed(items: Sequence[str], limit: int = 4) -> str:
+    """Return items as `a, b and 2 more`."""
+    shown = [quote(i, 80) for i in items[:limit]]
+    rest = len(items) - len(shown)
+    return ", ".join(shown) + (f" and {rest} more" if rest else "")
+
+
+def fault_sentence(fault: Fault) -> str:
+    """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
+    if fault.kind is FaultKind.EXITED:
+        tail = quote(fault.text)
+        tail = tail.removeprefix("exited") if tail.startswith("exited") else f" ({tail})" if tail else ""
+        return f"{fault.process} exited after {span(fault.t_ns)}{tail}"
+    place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
+    return f"{place}: {quote(fault.text)}"
+
+
+def _last_part(name: str) -> str:
+    return name.rsplit("/", 1)[-1]
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
