@@ -29,6 +29,10 @@ class Link:
     def ask(self, report: dict[str, Any]) -> dict[str, Any]:
         """Send one report and return the answer; raises ConnectionError if the grader is gone."""
         self.send(report)
+        return self.next_answer()
+
+    def next_answer(self) -> dict[str, Any]:
+        """Wait for what the grader says next; raises ConnectionError if it is gone."""
         line = self._lines.readline()
         if not line:
             raise ConnectionError("the grader is gone")

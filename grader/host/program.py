@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import os
 import random
+import signal
 import sys
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from . import entry
+from . import entry, originals
 from .faults import Describer
 from .link import Link
 from .virtual import VirtualTime
 from .watchdog import Watchdog
+
+if TYPE_CHECKING:
+    from .wall import WallTime
 
 
 def run(request: dict[str, Any]) -> None:
@@ -25,20 +30,48 @@ def run(request: dict[str, Any]) -> None:
     """
     link = Link(request["fd"])
     describer = Describer(request["root"])
-    time = VirtualTime(link, lambda error: link.send({"kind": "fault", **describer.exception(error)}))
+    die_with_parent()
+    time = make_time(request["clock"], link, describer)
     time.install_ros()
     preload()
     seed_randomness(request["seed"])
     os.register_at_fork(after_in_child=lambda: os._exit(70))
     start = link.ask({"kind": "ready", "python": sys.version.split()[0]})
     time.start(start["now_ns"])
-    watchdog = Watchdog(link, time, describer, request["limits"])
-    watchdog.start()
+    watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
+    if watchdog is not None:
+        watchdog.start()
     ending = play(request, describer, link)
-    watchdog.stop()
+    if watchdog is not None:
+        watchdog.stop()
     flush()
     link.send({"kind": "exited", **ending, **time.summary()})
     os._exit(0)
+
+
+def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
+    """Return the clock that a scenario is to run on."""
+
+    def report_fault(error: BaseException) -> None:
+        link.send({"kind": "fault", **describer.exception(error)})
+
+    if clock == "virtual":
+        return VirtualTime(link, report_fault)
+
+    from .wall import WallTime
+
+    def excepthook(args: Any) -> None:
+        if args.exc_value is not None and not issubclass(args.exc_type, SystemExit):
+            report_fault(args.exc_value)
+        originals.excepthook(args)
+
+    threading.excepthook = excepthook
+    return WallTime(link)
+
+
+def die_with_parent() -> None:
+    """Have the system end this process when the one that started it ends."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, linux/prctl.h
 
 
 def play(request: dict[str, Any], describer: Describer, link: Link) -> dict[str, Any]:

@@ -258,12 +258,17 @@ def _install_endpoints(ledger: Ledger) -> None:
     }
     for kind, cls in kinds.items():
         _register(ledger, kind, cls)
+    note_nodes(lambda context: ledger.contexts.append(weakref.ref(context)))
+
+
+def note_nodes(note_context: Callable[[Any], None] = lambda _: None) -> None:
+    """Remember every node that is made from now on."""
     create = rclpy.node.Node.__init__
 
     def make_node(self: Any, *args: Any, **kwargs: Any) -> None:
         MADE_NODES.append(weakref.ref(self))
         create(self, *args, **kwargs)
-        ledger.contexts.append(weakref.ref(self.context))
+        note_context(self.context)
 
     rclpy.node.Node.__init__ = functools.wraps(create)(make_node)
 

@@ -63,6 +63,10 @@ class Scheduler:
         """Return the system's number of the thread that holds the baton."""
         return self.current.native
 
+    def has_others(self) -> bool:
+        """Return whether the program has more than one thread."""
+        return len(self._strands) > 1
+
     def progress(self) -> None:
         """Note that something happened which may have made a wait set ready."""
         self._round += 1

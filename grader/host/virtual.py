@@ -83,7 +83,7 @@ class VirtualTime:
 
     def summary(self) -> dict[str, Any]:
         """Return what every report carries: traffic, endpoints if they changed, processor time."""
-        self._used_ns += originals.processor_ns() - self.resumed_ns
+        self._charge()
         self.unreported = False
         report: dict[str, Any] = {"cpu_ns": self._used_ns, "now_ns": self.clock.now_ns}
         if self._ledger is not None:
@@ -96,6 +96,13 @@ class VirtualTime:
                 report["endpoints"] = self._ledger.claims()
         return report
 
+    def _charge(self) -> None:
+        """Add the processor time since the last look to what the program has used, unless it only waited."""
+        now = originals.processor_ns()
+        if not self.clock.waiting:
+            self._used_ns += now - self.resumed_ns
+        self.resumed_ns = now
+
     def _ask_for_time(self, wake_ns: int | None) -> None:
         if self._stopping:
             self._run_on(wake_ns)
@@ -107,6 +114,7 @@ class VirtualTime:
         if self._stopping:
             return
         if wake_ns is not None and self._may_go_on(wake_ns):
+            self._charge()
             self._move_to(wake_ns)
             return
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary()}

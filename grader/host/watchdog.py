@@ -52,12 +52,13 @@ class Watchdog:
                 blocked_s = 0.0
                 continue
             if used - self._time.resumed_ns > self._wake_up_cpu_s * NS_PER_S:
-                self._give_up("hung", f"did not return within {self._wake_up_cpu_s:g} s of processor time")
+                unsettled = "threads" if self._time.scheduler.has_others() else ""
+                self._give_up(f"did not return within {self._wake_up_cpu_s:g} s of processor time", unsettled)
             idle = used - used_before < INTERVAL_S * NS_PER_S / 20 and self._sleeps()
             blocked_s = blocked_s + INTERVAL_S if idle else 0.0
             used_before = used
             if blocked_s > self._blocked_s:
-                self._give_up("hung", f"waited {self._blocked_s:g} s for something outside the ROS graph")
+                self._give_up(f"waited {self._blocked_s:g} s for something outside the ROS graph", "outside")
 
     def _sleeps(self) -> bool:
         """Return whether the thread that should be running is asleep in the system, rather than waiting for a processor."""
@@ -68,10 +69,12 @@ class Watchdog:
         except OSError:
             return False
 
-    def _give_up(self, kind: str, text: str) -> None:
+    def _give_up(self, text: str, unsettled: str) -> None:
+        """End the process; `unsettled` says why the real clock may do the program more justice."""
         if self._stopped or not self._time.running:
             return
         frame = sys._current_frames().get(self._time.scheduler.running_thread() or -1)
-        fault: dict[str, Any] = self._describer.stack(frame, kind, text)
-        self._link.send({"kind": "exited", "code": None, "fault": fault, **self._time.summary()})
+        fault: dict[str, Any] = self._describer.stack(frame, "hung", text)
+        report = {"kind": "exited", "code": None, "fault": fault, "unsettled": unsettled}
+        self._link.send({**report, **self._time.summary()})
         os._exit(70)

@@ -171,7 +171,7 @@ class Trace:
     Attributes:
         scenario: Scenario id.
         clock: Which clock the nodes ran on.
-        clock_reason: Why it was not the virtual one; empty if it was.
+        clock_reason: Why virtual time does not do these nodes justice; empty if it does.
         stop_ns: When observation ended; the window is [0, stop_ns).
         observations: In order.
         notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).

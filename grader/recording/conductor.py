@@ -15,13 +15,13 @@ from grader.model.trace import (
     ClockKind,
     Delivery,
     Fault,
-    FaultKind,
     GraphSnapshot,
     Mark,
     Message,
     Observation,
     Trace,
 )
+from grader.recording.ending import ending_fault, reported_fault
 from grader.recording.observer import Observer, wait_until
 from grader.recording.plan import Plan
 from grader.recording.stimuli import Due, number_message, numeric_field, schedule
@@ -36,6 +36,13 @@ PATIENCE = 3
 IMPATIENT_S = 0.05
 #: What rclpy calls a node whose endpoints are known but whose name is not yet.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: A node that needs more processor seconds than this a virtual second is judged on the real clock.
+BUSY_SHARE = 0.5
+#: What a host says when its program does not settle, in words.
+UNSETTLED = {
+    "threads": "the node's threads wait for each other without blocking",
+    "outside": "the node waits for something that is neither ROS nor time",
+}
 #: Limits of one scenario; reaching one ends it with a mark.
 MESSAGES = 20_000
 STEPS = 400_000
@@ -82,6 +89,7 @@ class Conductor:
         return Trace(
             scenario=self._plan.scenario,
             clock=ClockKind.VIRTUAL,
+            clock_reason=self._unfit(),
             stop_ns=self._end_ns,
             observations=tuple(self._observations),
             notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes])),
@@ -156,11 +164,12 @@ class Conductor:
                 continue
             self._write_output(student, final=kind == "exited")
             if kind == "fault":
-                self._observations.append(self._fault(student, report))
+                self._observations.append(reported_fault(student.name, self._now_ns, report))
                 continue
             self._account(student, report)
             if kind == "exited":
-                self._end(student, *self._endings(student, report))
+                student.unsettled = str(report.get("unsettled", ""))
+                self._end(student, ending_fault(student.name, self._now_ns, report))
                 return
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
@@ -304,27 +313,6 @@ class Conductor:
     def _write_output(self, student: Student, *, final: bool) -> None:
         self._observations += student.output(self._now_ns, final=final)
 
-    def _endings(self, student: Student, report: Mapping[str, Any]) -> list[Fault]:
-        """Return the faults of a process that says how it ended."""
-        if isinstance(report.get("fault"), dict):
-            return [self._fault(student, report["fault"])]
-        code = report.get("code")
-        return [Fault(self._now_ns, student.name, FaultKind.EXITED, f"exited with code {code if isinstance(code, int) else '?'}")]
-
-    def _fault(self, student: Student, data: Mapping[str, Any]) -> Fault:
-        kinds = {kind.value: kind for kind in FaultKind}
-        frames = data.get("frames")
-        line = data.get("line")
-        return Fault(
-            t_ns=self._now_ns,
-            process=student.name,
-            kind=kinds.get(str(data.get("kind")), FaultKind.EXCEPTION),
-            text=str(data.get("text", ""))[:500],
-            file=str(data.get("file", ""))[:300],
-            line=line if isinstance(line, int) else 0,
-            frames=tuple(str(f)[:300] for f in frames[:20]) if isinstance(frames, list) else (),
-        )
-
     def _end(self, student: Student, *faults: Fault) -> None:
         self._observations += faults
         student.ended = True
@@ -392,9 +380,13 @@ class Conductor:
             self._observer.withdraw(topic)
             self._start_stream(topic, current)
 
-    def processor_share(self) -> float:
-        """Return the processor seconds that the busiest process used per virtual second."""
-        return max((s.used_ns for s in self._students), default=0) / max(self._now_ns, NS_PER_S)
+    def _unfit(self) -> str:
+        """Say why virtual time does not do these nodes justice, if it does not."""
+        virtual_s = max(self._now_ns, NS_PER_S) / NS_PER_S
+        busiest_s = max((s.used_ns for s in self._students), default=0) / NS_PER_S
+        if busiest_s > BUSY_SHARE * virtual_s:
+            return "the node needs so much processor time that virtual time would hide it"
+        return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
 
 
 def _counts(data: Any) -> dict[str, int]:

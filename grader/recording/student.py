@@ -43,6 +43,7 @@ class Student:
         told: The counterparts it has been told to wait for.
         ended: Whether it has ended.
         used_ns: Processor time it has used, as it says.
+        unsettled: Why its program does not settle, as it says; empty if it does.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Student:
     told: dict[str, dict[str, int]] = field(default_factory=dict)
     ended: bool = False
     used_ns: int = 0
+    unsettled: str = ""
     notes: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -102,13 +104,26 @@ class Student:
                     return None
             if time.monotonic() > deadline or len(self._pending) > REPORT_BYTES:
                 return None
-        line, _, self._pending = self._pending.partition(b"\n")
         self.drain()
+        return self._parsed_report()
+
+    def _parsed_report(self) -> dict[str, Any] | None:
+        line, _, self._pending = self._pending.partition(b"\n")
         try:
             data = json.loads(line)
         except ValueError:
             return None
         return data if isinstance(data, dict) else None
+
+    def reports(self) -> list[dict[str, Any] | None]:
+        """Return the reports that are there, without waiting; a last None if the process has ended."""
+        gone = False
+        while any(key.data == "line" for key, _ in self._selector.select(timeout=0)) and not gone:
+            gone = not self._receive()
+        found: list[dict[str, Any] | None] = []
+        while b"\n" in self._pending:
+            found.append(self._parsed_report())
+        return [*found, None] if gone and not any(r and r.get("kind") == "exited" for r in found) else found
 
     def _receive(self) -> bool:
         try:

@@ -1,0 +1,17 @@
+"""Where the files lie that come with the grader: beside the package in a checkout, inside it in a wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def shipped_folder() -> Path:
+    """Return the folder of the built-in rubrics and of the recording."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "rubrics"
+    return inside if inside.is_dir() else package.parent / "rubrics"
+
+
+def builtin_odometry() -> Path:
+    """Return the project's own /odom recording."""
+    return shipped_folder() / "odometry"
