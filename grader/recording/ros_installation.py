@@ -23,7 +23,7 @@ MIDDLEWARE = "librmw_fastrtps_cpp.so"
 DEFAULT_DISTRO = "jazzy"
 INSTALLED_HERE = Path("/opt/ros")
 
-# What any program needs from the system: the C library, its loader and cache, and libraries chosen through alternatives.
+# What any program needs from the system: the C library, its loader and cache, libraries chosen through alternatives.
 SYSTEM_PATHS = tuple(
     map(Path, ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/alternatives", "/etc/ld.so.cache", "/etc/ld.so.conf"))
 )

@@ -1,4 +1,4 @@
-"""Isolation by nested bubblewrap: a network of its own around the worker, a file view of its own around each student."""
+"""Isolation by nested bubblewrap: a network of its own for the worker, a file view of its own for each student."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmp
 SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 INSTALL_HINT = "sudo apt install bubblewrap"
 
-# As root there is no user namespace, and the kernel counts processes by user: students who run at the same time on one
-# machine need users of their own, or one fork bomb would take the others' threads. 16 bits, so that containers map them.
+# As root there is no user namespace, and the kernel counts processes by user: students who run at the same time on
+# one machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since
+# containers map no others.
 STUDENT_GROUP = 61234
 STUDENT_USERS = range(61234, 65234)
 
@@ -87,8 +88,8 @@ class Bubblewrap:
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
         """Return the command that starts the trusted worker.
 
-        It sees all files, but has its own network with only `lo`, its own processes and its own /dev/shm: what it leaves
-        behind goes with it. It is killed when the caller dies.
+        It sees all files, but has its own network with only `lo`, its own processes and its own /dev/shm: what it
+        leaves behind goes with it. It is killed when the caller dies.
         """
         walls = [
             *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
@@ -195,7 +196,7 @@ def _make_readable(folder: Path) -> None:
 
 def _memory_file(name: str, content: bytes) -> int:
     descriptor = os.memfd_create(name)
-    with open(descriptor, "wb", closefd=False) as file:  # noqa: PTH123 -- a descriptor, not a path
+    with open(descriptor, "wb", closefd=False) as file:
         file.write(content)
     os.lseek(descriptor, 0, os.SEEK_SET)
     return descriptor

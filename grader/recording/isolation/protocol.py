@@ -35,7 +35,8 @@ class StudentProcess:
         runtime: Interpreter and ROS.
         host_folder: The folder of the `host` package; the only part of the grader that the process may read.
         submission: The staged copy; seen read-only by the process at `submission_seen_at`.
-        arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/launcher.py")`; paths as the process sees them.
+        arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/host/launcher.py")`; paths as the process
+            sees them.
         environment: Variables beyond those of the sandbox and the runtime.
         pass_fds: Descriptors the process inherits besides 0, 1 and 2, same numbers inside.
     """
@@ -64,22 +65,20 @@ class Limits:
 class Command:
     """A process ready for `subprocess.Popen`, once: what `opened_fds` lists is read by the start and then of no use.
 
-    Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches the grader and nobody else, and from a
-    thread that outlives it: the process dies with the thread that started it.
+    Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches the grader and nobody else, and from
+    a thread that outlives it: the process dies with the thread that started it.
 
     Attributes:
         argv: Full argument list.
         environment: The whole environment of the launched program.
         pass_fds: Descriptors to be inherited.
         opened_fds: Descriptors that the isolation opened for this start; the caller closes them afterwards.
-        made_folders: Folders that the isolation made for this start; the caller deletes them when the process has ended.
     """
 
     argv: tuple[str, ...]
     environment: Mapping[str, str]
     pass_fds: tuple[int, ...]
     opened_fds: tuple[int, ...] = ()
-    made_folders: tuple[Path, ...] = ()
 
 
 class Isolation(Protocol):
@@ -92,7 +91,7 @@ class Isolation(Protocol):
 
     @property
     def submission_seen_at(self) -> str:
-        """Absolute folder at which a student process sees its submission."""
+        """Absolute folder at which a student process sees its submission; empty if it sees it where it lies."""
         ...
 
     @property
@@ -101,7 +100,7 @@ class Isolation(Protocol):
         ...
 
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
-        """Return the command that starts the trusted worker: full view of files, a network of its own with only `lo`."""
+        """Return the command that starts the trusted worker: all files, a network of its own with only `lo`."""
         ...
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:

@@ -28,7 +28,8 @@ X32_BIT = 0x40000000
 
 AUDIT_ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
 
-# clone and unshare take the same flags: new mount, cgroup, uts, ipc, user, pid, network and (unshare only) time namespace.
+# clone and unshare take the same flags: new mount, cgroup, uts, ipc, user, pid and network namespace; unshare also a
+# new time namespace.
 NEW_NAMESPACES = 0x00020000 | 0x02000000 | 0x04000000 | 0x08000000 | 0x10000000 | 0x20000000 | 0x40000000
 NEW_TIME_NAMESPACE = 0x00000080
 

@@ -31,8 +31,8 @@ def view_of(paths: Iterable[Path]) -> View:
     """Return a view in which every path that exists can be opened under its own name.
 
     Args:
-        paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link to
-            a link still finds its way; a path that does not exist is left out.
+        paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link
+            to a link still finds its way; a path that does not exist is left out.
     """
     real: set[Path] = set()
     links: dict[Path, str] = {}
