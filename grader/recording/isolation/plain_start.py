@@ -1,11 +1,12 @@
 """Starts a program of the tier `none`: an own session, limits, a throw-away folder, and an end with its parent.
 
 Usage: plain_start.py JSON PROGRAM [ARGUMENT ...], with an object of `folder`, the working directory; `made`, whether
-the folder is to be made before the start and deleted after the end; and `limits`, by their names in the module resource.
-It imports nothing of grader, since it runs before anything of it can be found.
+the folder is to be made before the start and deleted after the end; and `limits`, by their names in `resource`. It
+imports nothing of grader, since it runs before anything of it can be found.
 """
 
-# ruff: noqa: PTH -- it starts before every student process, and pathlib would be half of its imports
+# It starts before every student process, and pathlib would be half of its imports.
+# ruff: noqa: PTH
 
 from __future__ import annotations
 
