@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from grader.judging.findings import not_met
-from grader.judging.wording import counted, fault_sentence, listed, moment, nearest, quote, span
+from grader.judging.wording import counted, fault_sentence, listed, nearest, quote, span
 from grader.model.exercise import Finding
 from grader.model.trace import Endpoint, Fault, FaultKind, Message, Trace
 
@@ -24,7 +24,8 @@ _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end
 
 def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
     """Return the fault that came first; of one instant the one that says most."""
-    found = [f for f in trace.faults(process) if f.t_ns < trace.stop_ns or f.kind is FaultKind.SYNTAX_ERROR]
+    # a recording that a fault cut short stops at the instant of the fault
+    found = [f for f in trace.faults(process) if f.t_ns <= trace.stop_ns]
     return min(found, key=lambda f: (f.t_ns, _URGENCY[f.kind]), default=None)
 
 
@@ -37,7 +38,20 @@ def fault_hint(fault: Fault) -> str:
 def student_endpoints(trace: Trace, kind: str | None = None) -> tuple[Endpoint, ...]:
     """Return the endpoints of student nodes on topics that a student makes, each once, in order of appearance."""
     kinds = (kind,) if kind else ("publisher", "subscription")
-    return tuple(e for k in kinds for e in trace.endpoints(k) if e.participant != -1 and e.topic not in _HIDDEN_TOPICS)
+    return tuple(e for k in kinds for e in trace.endpoints(k) if on_student_topic(e))
+
+
+def on_student_topic(endpoint: Endpoint) -> bool:
+    """Return whether an endpoint is a student's own, and not one that every node has."""
+    return endpoint.participant != -1 and endpoint.topic not in _HIDDEN_TOPICS
+
+
+def heard_from_ns(trace: Trace, topic: str) -> int:
+    """Return when the first subscription to a topic was there; 0 if that is not known."""
+    for graph in trace.graphs():
+        if any(e.kind == "subscription" and e.topic == topic and on_student_topic(e) for e in graph.endpoints):
+            return graph.t_ns
+    return 0
 
 
 def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Finding:
@@ -133,13 +147,3 @@ def _subscribed_elsewhere(endpoints: Iterable[Endpoint], topic: str, type_: str 
     reason = f"{topic}: no subscription; {quote(found.node)} subscribes to {quote(found.topic)} [{quote(found.type)}]"
     evidence = {"topic": found.topic, "type": found.type, "node": found.node}
     return not_met(reason, evidence, hint=f"subscribe to {topic} instead of {quote(found.topic)}")
-
-
-def stopped_by(trace: Trace, t_ns: int) -> tuple[str, Fault | None]:
-    """Return how to say that something ended after `t_ns`, and the fault that ended it if one did."""
-    fault = next((f for f in trace.faults() if t_ns <= f.t_ns < trace.stop_ns), None)
-    if fault is not None:
-        return f"stopped after {span(t_ns)}: {fault_sentence(fault)}", fault
-    limit = next((m for m in trace.marks("limit") if m.t_ns >= t_ns), None)
-    cause = f": {quote(limit.detail)}" if limit else ""
-    return f"stopped after {span(t_ns)} (last message at {moment(t_ns)}){cause}", None

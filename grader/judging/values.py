@@ -70,11 +70,16 @@ def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
     return tuple({r.t_ns: r for r in series}.values())
 
 
-def held(trace: Trace, topic: str) -> tuple[Held, ...]:
-    """Return the numbers that the grader published on a topic, equal neighbours joined."""
+def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...]:
+    """Return the numbers that the grader published on a topic, equal neighbours joined.
+
+    What was sent before `heard_from_ns`, when nobody listened, is left out, unless that is everything.
+    """
+    sent = [r for r in readings(trace.deliveries(topic)) if r.t_ns < trace.stop_ns]
+    heard = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
-    for reading in readings(trace.deliveries(topic)):
-        if reading.t_ns < trace.stop_ns and (not starts or starts[-1].value != reading.value):
+    for reading in heard:
+        if not starts or starts[-1].value != reading.value:
             starts.append(reading)
     stops = [s.t_ns for s in starts[1:]] + [trace.stop_ns]
     return tuple(Held(start.t_ns, stop, start.value) for start, stop in zip(starts, stops, strict=True))

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from grader.judging.findings import met, not_met
-from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
+from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
 from grader.judging.values import Held, Reading, held, last_of_instant, published, readings
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
 from grader.model.errors import HarnessError
@@ -59,7 +59,7 @@ class ThresholdResponse:
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every input on this side is answered rightly."""
-        inputs = held(trace, self.input)
+        inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
             return self._silent(trace)

@@ -166,7 +166,7 @@ def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:
 def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | None]:
     """Return how to say that messages stopped before the window did, and the fault that ended them if one did."""
     stopped = f"stopped after {span(last_ns - first_ns)}"
-    fault = next((f for f in trace.faults() if last_ns <= f.t_ns < trace.stop_ns), None)
+    fault = next((f for f in trace.faults() if last_ns <= f.t_ns <= trace.stop_ns), None)
     if fault is not None:
         return f"{stopped}: {fault_sentence(fault)}", fault
     limit = next((m for m in trace.marks("limit") if m.t_ns >= last_ns), None)

@@ -16,6 +16,7 @@ from grader.judging.silence import (
     explain_no_subscription,
     fault_hint,
     first_fault,
+    heard_from_ns,
     student_endpoints,
 )
 from grader.judging.values import Held, Reading, carries_number, held, published, readings
@@ -130,7 +131,7 @@ class LogsReceived:
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every value is in a log record, half if printed lines are needed."""
         fault = first_fault(trace, self.process)
-        values = held(trace, self.topic)
+        values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
         subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == self.topic]
         if not subscriptions and fault is None:
             return explain_no_subscription(trace, self.topic)

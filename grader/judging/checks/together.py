@@ -119,7 +119,7 @@ class AnswersTogether:
         return None
 
     def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, Any]) -> Finding:
-        fault = next((f for f in trace.faults() if f.t_ns < trace.stop_ns), None)
+        fault = next((f for f in trace.faults() if f.t_ns <= trace.stop_ns), None)
         reason = f"{topic}: nothing after {moment(last_ns)}, expected to go on to {span(trace.stop_ns)}"
         known = evidence | {"last_s": seconds(last_ns)}
         if fault is None:

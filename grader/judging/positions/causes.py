@@ -86,6 +86,8 @@ _SINGLES = (
 def cause_of(analysis: Analysis, track: Track) -> Cause:
     """Return what the texts show instead of the position, or at least where they first differ."""
     sampled = [_sample(g) for g in analysis.groups]
+    if analysis.right and analysis.wrong:  # a position log most of the time, so no other thing
+        return _first_difference(analysis, track)
     likely = _few(analysis) or _constant(sampled, track)
     if likely is None:
         likely = _variant(sampled, track) or _single(sampled, track) or _stale(sampled, track)

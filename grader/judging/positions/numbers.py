@@ -18,7 +18,7 @@ _MINUS = dict.fromkeys((0x2212, 0x2010, 0x2011, 0x2012, 0x2013, 0xFE63, 0xFF0D),
 _NUMBER = re.compile(
     r"(?P<hex>0[xX][0-9a-fA-F]+)"
     r"|(?:(?<![0-9.])(?P<sign>[+-]))?"
-    r"(?:(?P<whole>[0-9]+)(?:\.(?P<part>[0-9]*))?|\.(?P<only>[0-9]+))(?:[eE](?P<power>[+-]?[0-9]{1,3})(?![A-Za-z0-9]))?"
+    r"(?:(?P<whole>[0-9]+)(?:\.(?P<part>[0-9]*))?|\.(?P<only>[0-9]+))(?:[eE](?P<power>[+-]?[0-9]{1,3})(?![0-9]))?"
     r"|(?<![A-Za-z0-9_])[+-]?(?P<odd>nan|inf|infinity)(?![A-Za-z0-9_])",
     re.IGNORECASE,
 )
@@ -85,7 +85,8 @@ def _read(text: str, match: re.Match[str]) -> Printed | None:
     if not match["sign"] and _belongs_to_name(text, match):
         return None
     decimals = len(match["part"] or match["only"] or "")
-    step = 10.0 ** (int(match["power"] or 0) - decimals)
+    # 0e9 is no way of saying "any number"
+    step = 10.0 ** min(0, int(match["power"] or 0) - decimals)
     scale = 1.0
     unit = _UNIT_AFTER.match(text, match.end())
     if unit:

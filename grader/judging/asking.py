@@ -1,0 +1,90 @@
+"""Puts one criterion's question to its trace, and says why where it cannot be put."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from grader.judging.checks import CHECKS
+from grader.judging.findings import not_met
+from grader.judging.silence import fault_hint, first_fault, student_endpoints
+from grader.judging.wording import fault_sentence, quote
+from grader.model.errors import HarnessError
+from grader.model.exercise import Check, Criterion, Exercise, Finding
+from grader.model.scenario import Scenario
+from grader.model.submission import Submission
+from grader.model.trace import Fault, FaultKind, Trace
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of asking; exactly one attribute is set.
+
+    Attributes:
+        finding: What the check found.
+        missing: Files of the scenario that the submission lacks.
+        problem: Why nobody knows: our side's or the machine's failure.
+        error: Class and text of an exception in a check, for whoever mends it; goes with `problem`.
+    """
+
+    finding: Finding | None = None
+    missing: tuple[str, ...] = ()
+    problem: str = ""
+    error: str = ""
+
+
+def check_name(check: Check) -> str:
+    """Return the name of a check in rubrics."""
+    return next((name for name, kind in CHECKS.items() if type(check) is kind), type(check).__name__)
+
+
+def ask(criterion: Criterion, exercise: Exercise, traces: Mapping[str, Trace], submission: Submission) -> Answer:
+    """Return what the criterion's check finds in the trace of its scenario."""
+    scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
+    if missing:
+        return Answer(missing=missing)
+    trace = traces.get(scenario.id)
+    if trace is None:
+        return Answer(problem=f"the scenario {scenario.id} was not recorded")
+    if trace.harness_problem:
+        return Answer(problem=trace.harness_problem)
+    return _judged(criterion, scenario, trace)
+
+
+def _judged(criterion: Criterion, scenario: Scenario, trace: Trace) -> Answer:
+    name = check_name(criterion.check)
+    try:
+        finding = criterion.check.judge(trace)
+    except HarnessError as error:
+        return Answer(problem=f"{name} cannot be judged: {error.message}")
+    except Exception as error:  # a check that fails must cost no points and must not end the report
+        problem = f"the check {name} failed on this recording through no fault of the submission"
+        return Answer(problem=problem, error=f"{type(error).__name__}: {quote(str(error))}")
+    if not 0 <= finding.credit <= 1:
+        return Answer(problem=f"the check {name} gave a credit of {finding.credit}, expected 0 to 1")
+    return Answer(finding=_start_failure_first(finding, scenario, trace))
+
+
+def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> Finding:
+    """Return the finding; where a file could not even start and nothing was earned, that is the reason."""
+    fault = start_failure(scenario, trace)
+    if fault is None or finding.credit > 0:
+        return finding
+    if fault.kind is FaultKind.EXITED:
+        reason = f"{fault_sentence(fault)}, before it had a publisher or a subscription"
+    else:
+        reason = f"{fault.process} cannot run: {fault_sentence(fault)}"
+    return not_met(reason, finding.evidence, hint=fault_hint(fault), fault=fault)
+
+
+def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
+    """Return the fault that kept a file of the scenario from creating any endpoint, or None if all of them started."""
+    started = len({e.participant for e in student_endpoints(trace)})
+    for process in scenario.processes:
+        fault = first_fault(trace, process)
+        if fault is None:
+            continue
+        if fault.kind is FaultKind.SYNTAX_ERROR or started < len(scenario.processes):
+            return fault
+    return None

@@ -1,0 +1,152 @@
+"""Turns answers into verdicts: what blocks what, how many points are earned, and what the student is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from grader.judging.asking import Answer, check_name
+from grader.judging.findings import FAULT_KEY
+from grader.judging.wording import listed, quote
+from grader.model.exercise import Criterion, Exercise, Finding, Outcome
+from grader.model.report import Verdict
+from grader.model.submission import Submission
+
+_EARNED = (Outcome.MET, Outcome.PARTLY)
+_SAID = {
+    Outcome.NOT_MET: "not met",
+    Outcome.BLOCKED: "not judged",
+    Outcome.UNDECIDED: "undecided",
+}
+
+
+@dataclass(slots=True)
+class Bench:
+    """Goes through one exercise's answers in rubric order and remembers which causes were named already."""
+
+    exercise: Exercise
+    answers: Mapping[str, Answer]
+    submission: Submission
+    done: dict[str, Verdict] = field(default_factory=dict)
+    missing_named: set[str] = field(default_factory=set)
+    fault_owner: dict[tuple[Any, ...], str] = field(default_factory=dict)
+
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Return one verdict for each criterion, in rubric order."""
+        for criterion in self.exercise.criteria:
+            self.done[criterion.id] = self._verdict(criterion)
+        return tuple(self.done[c.id] for c in self.exercise.criteria)
+
+    def _verdict(self, criterion: Criterion) -> Verdict:
+        answer = self.answers[criterion.id]
+        if answer.missing:
+            return self._missing(criterion, answer.missing)
+        if answer.finding is None:
+            evidence = {"error": answer.error} if answer.error else {}
+            return _without_points(criterion, Outcome.UNDECIDED, answer.problem, evidence=evidence)
+        needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
+        if needed is not None:
+            return self._blocked(criterion, needed, self._outcome(needed))
+        return self._found(criterion, answer.finding)
+
+    def _found(self, criterion: Criterion, finding: Finding) -> Verdict:
+        if finding.credit > 0:
+            return _earned(criterion, finding)
+        blocker = self._blocker(criterion, finding)
+        if blocker is not None:
+            return self._blocked(criterion, blocker, self._outcome(blocker))
+        cause = _fault_of(finding)
+        owner = self.fault_owner.get(cause, "") if cause else ""
+        if owner:
+            return self._blocked(criterion, owner, Outcome.NOT_MET)
+        if cause:
+            self.fault_owner[cause] = criterion.id
+        return _earned(criterion, finding)
+
+    def _outcome(self, id_: str) -> Outcome:
+        """Return what a criterion came to, or by its own finding will come to if it is still ahead."""
+        if id_ in self.done:
+            return self.done[id_].outcome
+        answer = self.answers.get(id_)
+        if answer is None:
+            return Outcome.MET
+        if answer.finding is None:
+            return Outcome.NOT_MET if answer.missing else Outcome.UNDECIDED
+        return _outcome_of(answer.finding)
+
+    def _blocker(self, criterion: Criterion, finding: Finding) -> str | None:
+        """Return the criterion that a finding waits for, unless that one is met, is unknown, or waits for this one."""
+        if finding.blocked_by is None:
+            return None
+        target = self._named(criterion, finding.blocked_by)
+        if target is None or target.id == criterion.id or self._outcome(target.id) in _EARNED:
+            return None
+        theirs = self.answers[target.id].finding
+        back = self._named(target, theirs.blocked_by) if theirs is not None and theirs.blocked_by else None
+        ahead = target.id not in self.done
+        return None if ahead and back is not None and back.id == criterion.id else target.id
+
+    def _named(self, criterion: Criterion, name: str) -> Criterion | None:
+        """Return the criterion of that id, else the first of the same scenario whose check has that name."""
+        criteria = self.exercise.criteria
+        by_id = next((c for c in criteria if c.id == name), None)
+        same = (c for c in criteria if c.scenario == criterion.scenario and check_name(c.check) == name)
+        return by_id or next(same, None)
+
+    def _blocked(self, criterion: Criterion, needed: str, outcome: Outcome) -> Verdict:
+        reason = f"not judged: needs {needed} ({_SAID.get(outcome, 'not met')})"
+        kind = Outcome.UNDECIDED if outcome is Outcome.UNDECIDED else Outcome.BLOCKED
+        return _without_points(criterion, kind, reason)
+
+    def _missing(self, criterion: Criterion, files: tuple[str, ...]) -> Verdict:
+        unnamed = next((f for f in files if f not in self.missing_named), None)
+        if unnamed is None:
+            reason = f"not judged: needs {files[0]}, which is missing"
+            return _without_points(criterion, Outcome.BLOCKED, reason)
+        self.missing_named.add(unnamed)
+        similar = self.submission.files[unnamed].similar
+        reason = f"{unnamed}: not in the submission"
+        reason += f"; found {listed(similar)} instead" if similar else ""
+        hint = f"rename {quote(similar[0], 80)} to {unnamed}" if similar else f"hand in a file named {unnamed}"
+        evidence = {"missing": unnamed, "similar": list(similar)}
+        return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
+
+
+def _outcome_of(finding: Finding) -> Outcome:
+    if finding.credit == 1:
+        return Outcome.MET
+    return Outcome.PARTLY if finding.credit > 0 else Outcome.NOT_MET
+
+
+def _earned(criterion: Criterion, finding: Finding) -> Verdict:
+    outcome = _outcome_of(finding)
+    hint = "" if outcome is Outcome.MET else finding.hint or criterion.hint
+    return Verdict(
+        id=criterion.id,
+        title=criterion.title,
+        outcome=outcome,
+        score=finding.credit * criterion.points,
+        max_score=criterion.points,
+        reason=finding.reason,
+        hint=hint,
+        location=finding.location,
+        evidence=finding.evidence,
+    )
+
+
+def _without_points(
+    criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, Any] | None = None
+) -> Verdict:
+    points = criterion.points
+    known = evidence or {}
+    return Verdict(criterion.id, criterion.title, outcome, Fraction(0), points, reason, hint=hint, evidence=known)
+
+
+def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
+    """Return what makes a fault the same one in another scenario, or None if the finding rests on none."""
+    fault = finding.evidence.get(FAULT_KEY)
+    if not isinstance(fault, Mapping):
+        return None
+    return tuple(fault[key] for key in ("process", "kind", "text", "file", "line"))
