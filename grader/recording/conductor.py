@@ -31,6 +31,8 @@ from grader.recording.student import Student
 EPOCH_NS = 1_767_225_600_000_000_000
 #: How long, in real time, an endpoint or a message that was announced is waited for.
 SETTLE_S = 5.0
+#: Looking at the graph costs much: not so often that it holds up what is looked for.
+GRAPH_PAUSE_S = 0.003
 #: After so many messages that never came, later ones are waited for only briefly.
 PATIENCE = 3
 IMPATIENT_S = 0.05
@@ -248,7 +250,7 @@ class Conductor:
         """Wait until every endpoint that the processes say they have is seen, watched and matched."""
         claims = [c for s in self._students if not s.ended for c in s.claims]
         ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        if not wait_until(lambda: self._sees(ends), SETTLE_S):
+        if not wait_until(lambda: self._sees(ends), SETTLE_S, pause_s=GRAPH_PAUSE_S):
             self._notes.append("an endpoint that a node created was not seen in the graph")
         self._look_at_graph()
         unknown = self._observer.watch(self._graph)

@@ -228,6 +228,7 @@ def _worker_environment(runtime: PythonRuntime) -> Mapping[str, str]:
         "PYTHONPATH": ":".join([*map(str, runtime.python_paths), _package_root()]),
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
         "SKIP_DEFAULT_XML_FILE": "1",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": f"{_package_root()}/grader/host/fastdds.xml",
         "OPENBLAS_NUM_THREADS": "1",
         **runtime.environment,
         **from_caller,
