@@ -42,6 +42,7 @@ class VirtualTime:
         self.unreported = False
         self.resumed_ns = originals.processor_ns()
         self.running = True
+        self.has_blocked = False
         self._used_ns = 0
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, report_fault)
@@ -104,6 +105,7 @@ class VirtualTime:
         self.resumed_ns = now
 
     def _ask_for_time(self, wake_ns: int | None) -> None:
+        self.has_blocked = True
         if self._stopping:
             self._run_on(wake_ns)
         else:

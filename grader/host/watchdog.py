@@ -24,13 +24,14 @@ class Watchdog:
         link: The line to the grader.
         time: Says since when the student's code has been running.
         describer: Names the student's frames.
-        limits: `wake_up_cpu_s`, processor seconds between two reports; `blocked_s`, real seconds blocked elsewhere.
+        limits: `start_cpu_s` and `wake_up_cpu_s`, processor seconds until it first blocks and between two such moments; `blocked_s`, real seconds blocked elsewhere.
     """
 
     def __init__(self, link: Link, time: VirtualTime, describer: Describer, limits: dict[str, float]) -> None:
         self._link = link
         self._time = time
         self._describer = describer
+        self._start_cpu_s = limits["start_cpu_s"]
         self._wake_up_cpu_s = limits["wake_up_cpu_s"]
         self._blocked_s = limits["blocked_s"]
         self._stopped = False
@@ -51,9 +52,10 @@ class Watchdog:
             if not self._time.running:
                 blocked_s = 0.0
                 continue
-            if used - self._time.resumed_ns > self._wake_up_cpu_s * NS_PER_S:
+            limit_s = self._wake_up_cpu_s if self._time.has_blocked else self._start_cpu_s
+            if used - self._time.resumed_ns > limit_s * NS_PER_S:
                 unsettled = "threads" if self._time.scheduler.has_others() else ""
-                self._give_up(f"did not return within {self._wake_up_cpu_s:g} s of processor time", unsettled)
+                self._give_up(f"did not return within {limit_s:g} s of processor time", unsettled)
             idle = used - used_before < INTERVAL_S * NS_PER_S / 20 and self._sleeps()
             blocked_s = blocked_s + INTERVAL_S if idle else 0.0
             used_before = used

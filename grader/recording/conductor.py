@@ -15,6 +15,7 @@ from grader.model.trace import (
     ClockKind,
     Delivery,
     Fault,
+    FaultKind,
     GraphSnapshot,
     Mark,
     Message,
@@ -384,11 +385,13 @@ class Conductor:
 
     def _unfit(self) -> str:
         """Say why virtual time does not do these nodes justice, if it does not."""
+        if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in self._observations):
+            return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
         virtual_s = max(self._now_ns, NS_PER_S) / NS_PER_S
         busiest_s = max((s.used_ns for s in self._students), default=0) / NS_PER_S
         if busiest_s > BUSY_SHARE * virtual_s:
             return "the node needs so much processor time that virtual time would hide it"
-        return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
+        return ""
 
 
 def _counts(data: Any) -> dict[str, int]:

@@ -22,6 +22,8 @@ from grader.recording.student import Student
 #: How often the conductor looks, and how long it may be held up at most before the run says nothing.
 LOOK_S = 0.001
 HELD_UP_NS = 150 * NS_PER_MS
+#: A first message is not waited for as long as in virtual time, where waiting costs nothing.
+PATIENCE_NS = 20_000 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 #: Limit of one scenario; reaching it ends it with a mark.
 MESSAGES = 20_000
@@ -42,7 +44,7 @@ class WallConductor:
         self._plan = plan
         self._students = students
         self._observer = observer
-        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._end_ns = min(plan.wait_at_most_ns, PATIENCE_NS) if plan.first_message_on else plan.duration_ns
         self._due = schedule(plan.numbers, plan.recordings)
         self._streams: dict[str, str] = {}
         self._observations: list[Observation] = []

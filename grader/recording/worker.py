@@ -25,8 +25,9 @@ from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
 from grader.recording.wall import WallConductor
 
-#: Processor seconds that a node may use between two moments at which it blocks.
-WAKE_UP_CPU_S = 10.0
+#: Processor seconds that a node may use until it first blocks, its imports included, and between two such moments.
+START_CPU_S = 10.0
+WAKE_UP_CPU_S = 5.0
 #: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
 BLOCKED_S = 5.0
 
@@ -77,7 +78,7 @@ class Worker:
             "seed": plan.host_seed,
             "clock": plan.clock,
             "python_paths": [str(p) for p in self._runtime.python_paths],
-            "limits": {"wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
+            "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
         command = self._isolation.student_command(
