@@ -32,6 +32,10 @@ from grader.recording.recorder import Job, Recorder
 from grader.recording.ros_installation import RosInstallation, find_ros
 
 
+#: A submission has no more scenarios than this that are worth recording side by side.
+MOST_WORKERS = 4
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
     """What is to be graded, and how.
@@ -74,22 +78,25 @@ def grade(request: Request, progress: Progress) -> Report:
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    exercises = read_exercises(request)
-    with tempfile.TemporaryDirectory(prefix="grade-") as folder:
+    ros = find_ros()
+    isolation = choose_isolation(request.isolation, ros)
+    with (
+        Recorder(isolation, ros.runtime, _domains(isolation), _workers()) as recorder,
+        tempfile.TemporaryDirectory(prefix="grade-") as folder,
+    ):
         progress("reading the submission")
+        recorder.warm_up(1)
+        exercises = read_exercises(request)
         root = Path(folder) / "submission"
         root.mkdir()
         Path(folder).chmod(0o755)  # noqa: S103 - a student's process of another user reads the staged copy
         submission = stage_submission(request.submission, _wanted(exercises), root)
         odometry = read_recording(request, exercises)
-        ros = find_ros()
-        isolation = choose_isolation(request.isolation, ros)
         seed = seed_of(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
-        with Recorder(isolation, ros.runtime, _domains(isolation), _workers(len(jobs))) as recorder:
-            traces = dict(zip(jobs, recorder.record(list(jobs.values()), progress), strict=True))
-            if request.clock == "auto":
-                traces.update(record_on_wall_clock(jobs, traces, recorder, progress))
+        traces = dict(zip(jobs, recorder.record(list(jobs.values()), progress), strict=True))
+        if request.clock == "auto":
+            traces.update(record_on_wall_clock(jobs, traces, recorder, progress))
         reports = tuple(_judge(exercise, traces, submission) for exercise in exercises)
     return Report(
         name=submission.name,
@@ -165,8 +172,8 @@ def _wanted(exercises: Sequence[Exercise]) -> list[str]:
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
 
 
-def _workers(jobs: int) -> int:
-    return max(1, min(jobs, len(os.sched_getaffinity(0)), 4))
+def _workers() -> int:
+    return min(len(os.sched_getaffinity(0)), MOST_WORKERS)
 
 
 def _domains(isolation: Isolation) -> Iterator[int]:

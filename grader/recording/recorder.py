@@ -118,7 +118,7 @@ class Recorder:
         self._isolation = isolation
         self._runtime = runtime
         self._domains = _Shared(domains)
-        self._idle: queue.SimpleQueue[WorkerProcess | None] = queue.SimpleQueue()
+        self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
         self._alive: list[WorkerProcess] = []
         self._lock = threading.Lock()
         self._closed = False

@@ -27,8 +27,6 @@ PATIENCE_NS = 20_000 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 #: Limit of one scenario; reaching it ends it with a mark.
 MESSAGES = 20_000
-#: A run whose reference slipped is repeated so often before the scenario is undecided.
-TRIES = 3
 
 
 class WallConductor:
