@@ -151,7 +151,6 @@ def _grade(  # noqa: PLR0913  one parameter an option
     A folder with the name of a command is graded as ./NAME.
     """
     wanted = prepared((*outputs, Output("json")) if as_json else outputs)
-    _check_exercises(exercises, rubrics)
     from grader import session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
 
     request = session.Request(
@@ -165,6 +164,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
     )
     with _progress(wanted=not no_progress) as progress:
         report = session.grade(request, progress)
+    if isolation == "auto" and report.environment.isolation == session.NO_ISOLATION:
+        _warn(*report.notes[-1:])
     deliver(report, wanted)
     return exit_code(report, min_score)
 
@@ -224,24 +225,14 @@ def _complain(*lines: str, hint: str) -> None:
         click.echo(f"hint: {shown(hint)}", err=True)
 
 
+def _warn(*lines: str) -> None:
+    for line in lines:
+        click.echo(f"warning: {shown(line)}", err=True)
+
+
 def _nearest(found: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
-
-
-def _check_exercises(wanted: Sequence[str], rubrics: Sequence[Path]) -> None:
-    if not wanted:
-        return
-    known = _known_exercises(rubrics)
-    for id_ in wanted:
-        if id_ not in known:
-            raise GraderError(f"--exercise: {id_!r} is no exercise{_nearest(id_, known)}")
-
-
-def _known_exercises(rubrics: Sequence[Path]) -> list[str]:
-    from grader.reading.rubric_file import builtin_rubrics, read_rubric  # noqa: PLC0415  pydantic, a slow start
-
-    return [read_rubric(path).id for path in rubrics] if rubrics else list(builtin_rubrics())
 
 
 def _say_nothing(step: str) -> None:

@@ -32,6 +32,8 @@ from grader.recording.recorder import Job, Recorder
 from grader.recording.ros_installation import RosInstallation, find_ros
 
 
+#: What reports call a run without walls.
+NO_ISOLATION = "none"
 #: A submission has no more scenarios than this that are worth recording side by side.
 MOST_WORKERS = 4
 
@@ -106,7 +108,7 @@ def grade(request: Request, progress: Progress) -> Report:
         seed=seed,
         exercises=reports,
         duration_s=time.perf_counter() - started,
-        notes=submission.notes,
+        notes=(*submission.notes, *_isolation_notes(isolation)),
     )
 
 
@@ -177,7 +179,15 @@ def _workers() -> int:
 
 
 def _domains(isolation: Isolation) -> Iterator[int]:
-    return shared_domains() if isolation.name == "none" else private_domains()
+    return shared_domains() if isolation.name == NO_ISOLATION else private_domains()
+
+
+def _isolation_notes(isolation: Isolation) -> tuple[str, ...]:
+    """Say that the submission ran without walls, and why."""
+    if isolation.name != NO_ISOLATION:
+        return ()
+    why = getattr(isolation, "why", "")
+    return (f"the submission ran without a sandbox: {why or 'as asked'}",)
 
 
 def _environment(ros: RosInstallation, isolation: Isolation) -> Environment:
