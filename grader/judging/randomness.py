@@ -13,8 +13,11 @@ FEW = 10
 _EVIDENCE = 14.0
 #: Fewest steps for the patterns that a short random series may show by chance.
 _ENOUGH = 16
-#: Share of the variance of the steps that the two steps before explain in a smooth curve.
-_PREDICTABLE = 0.95
+#: Share of the variance of the steps that the two steps before leave unexplained in a smooth curve, at most.
+_REST = 0.05
+#: The same for few steps, where a fit comes out well by chance.
+_REST_OF_FEW = 0.001
+_MANY = 40
 
 
 def pattern_of(values: Sequence[float]) -> str | None:
@@ -62,13 +65,13 @@ def _one_way(steps: Sequence[float]) -> bool:
     rising, falling = all(s >= 0 for s in steps), all(s <= 0 for s in steps)
     moving = sum(s != 0 for s in steps)
     even = all(math.isclose(s, steps[0], rel_tol=1e-3, abs_tol=1e-6) for s in steps)
-    return (rising or falling) and (even or moving >= _ENOUGH)
+    return (rising or falling) and (moving >= _ENOUGH or (even and moving > FEW))
 
 
 def _sawtooth(values: Sequence[float], steps: Sequence[float]) -> bool:
     """Return whether there is one small step and one jump back, the jump exactly where the step would go too far."""
-    kinds = Counter(round(s, 4) for s in steps).most_common(3)
-    if len(steps) < _ENOUGH or len(kinds) < 2 or (len(kinds) == 3 and kinds[2][1] > 1):
+    kinds = Counter(round(s, 4) for s in steps).most_common(2)
+    if len(steps) < _ENOUGH or len(kinds) < 2 or sum(n for _, n in kinds) < len(steps) - 1:
         return False
     usual, jump = kinds[0][0], kinds[1][0]
     if usual * jump >= 0 or math.isclose(usual, -jump, rel_tol=0.05):
@@ -104,4 +107,4 @@ def _predictable(steps: Sequence[float]) -> bool:
         return False
     p, q = (ya * bb - yb * ab) / det, (yb * aa - ya * ab) / det
     rest = sum((y - p * a - q * b) ** 2 for y, a, b in rows)
-    return rest <= (1 - _PREDICTABLE) * total
+    return rest <= (_REST if len(steps) >= _MANY else _REST_OF_FEW) * total

@@ -81,7 +81,7 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
     for reading in heard:
         if not starts or starts[-1].value != reading.value:
             starts.append(reading)
-    stops = [s.t_ns for s in starts[1:]] + [trace.stop_ns]
+    stops = [*(s.t_ns for s in starts), trace.stop_ns][1:]
     return tuple(Held(start.t_ns, stop, start.value) for start, stop in zip(starts, stops, strict=True))
 
 

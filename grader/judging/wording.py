@@ -57,7 +57,9 @@ def nearest(name: str, candidates: Iterable[str]) -> str | None:
     if same_end:
         return same_end[0]
     close = difflib.get_close_matches(_plain(name), [_plain(c) for c in others], n=1, cutoff=0.7)
-    return next((c for c in others if close and _plain(c) == close[0]), None)
+    alike = [c for c in others if close and _plain(c) == close[0]]
+    alike += [c for c in others if len(_plain(c)) >= 3 and (_plain(c) in _plain(name) or _plain(name) in _plain(c))]
+    return next(iter(alike), None)
 
 
 def listed(items: Sequence[str], limit: int = 4) -> str:

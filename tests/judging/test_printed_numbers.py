@@ -59,7 +59,7 @@ def test_printed_nan_and_inf_are_numbers_that_show_nothing() -> None:
 @given(
     st.floats(-50, 50, allow_nan=False),
     st.sampled_from(["{:.2f}", "{:.0f}", "{:+.4f}", "{: .3f}", "{:.3e}", "{:8.2f}", "{}", "{:g}", "{:.6}"]),
-    st.sampled_from(["{}", "x={} m", "({})", "pos:{}m", "<<{}>>", "位置{}，", "[{};", "a {} b", "n° {}"]),
+    st.sampled_from(["{}", "x={} m", "({})", "pos:{}m", "<<{}>>", "位置{}\uff0c", "[{};", "a {} b", "n° {}"]),
 )
 def test_a_printed_number_shows_the_value_it_was_printed_from(value: float, style: str, around: str) -> None:
     """Whatever the style and the text around it, the one number found shows the value."""

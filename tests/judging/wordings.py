@@ -18,8 +18,8 @@ def _unicode_minus(v: float) -> str:
 
 RIGHT: dict[str, Writer] = {
     "chapter hint": lambda x, y: f"Position: x={x:.2f}, y={y:.2f}",
-    "percent": lambda x, y: "Position: x=%.3f y=%.3f" % (x, y),
-    "str.format": lambda x, y: "Robot is at ({:.1f}, {:.1f})".format(x, y),
+    "percent": lambda x, y: "Position: x=%.3f y=%.3f" % (x, y),  # noqa: UP031 - students write so
+    "str.format": lambda x, y: "Robot is at ({:.1f}, {:.1f})".format(x, y),  # noqa: UP032, PLW0108 - students write so
     "bare numbers": lambda x, y: f"{x} {y}",
     "full repr": lambda x, y: f"x: {x}, y: {y}",
     "comma separated": lambda x, y: f"{x:.4f},{y:.4f}",
@@ -65,8 +65,8 @@ RIGHT: dict[str, Writer] = {
     "German comma": lambda x, y: f"Position: x={_comma(x)} m, y={_comma(y)} m",
     "German comma, semicolon": lambda x, y: f"Ort ({_comma(x, 3)}; {_comma(y, 3)})",
     "German comma list": lambda x, y: f"Ort {_comma(x, 3)}, {_comma(y, 3)}",
-    "Chinese": lambda x, y: f"机器人位置：x={x:.2f}，y={y:.2f}",
-    "Chinese without labels": lambda x, y: f"当前位置（{x:.3f}，{y:.3f}）",
+    "Chinese": lambda x, y: f"机器人位置\uff1ax={x:.2f}\uff0cy={y:.2f}",
+    "Chinese without labels": lambda x, y: f"当前位置\uff08{x:.3f}\uff0c{y:.3f}\uff09",
     "Chinese axes": lambda x, y: f"横坐标{x:.2f}纵坐标{y:.2f}",
     "Arabic": lambda x, y: f"الموقع: {x:.2f} ، {y:.2f}",
     "unicode minus": lambda x, y: f"({_unicode_minus(x)}, {_unicode_minus(y)})",

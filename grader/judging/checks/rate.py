@@ -128,7 +128,9 @@ class TopicRate:
             )
             fault = first_fault(trace)
             observed += f"; {fault_sentence(fault)}" if fault else ""
-            return not_met(f"{seen}; {observed}; {self._wanted}", evidence, fault=fault)
+            off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
+            hint = self._hint(found.rate_hz) if off else ""
+            return not_met(f"{seen}; {observed}; {self._wanted}", evidence, hint=hint, fault=fault)
         return None
 
     def _too_few(self, trace: Trace, times: tuple[int, ...]) -> Finding:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,13 +15,18 @@ from grader.judging.values import Reading, last_of_instant, published, readings
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, seconds, within
-from grader.model.trace import Endpoint, Fault, LogRecord, OutputLine, Trace
+from grader.model.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
 
 #: An answer may belong to any input that was current so long before it.
 _CURRENT_NS = 250 * NS_PER_MS
 #: A controller must speak within this time where its last answer does not fit the input: one period of 1 s and slack.
 _SPEAK_NS = 1_250 * NS_PER_MS
 _EXACT = 1e-6
+#: Share of the answers that must fit the input of one and the same delay, where there are enough of them.
+_AGREEING_SHARE = 0.75
+#: The same where time is exact and about every input is answered.
+_AGREEING_SHARE_PROMPT = 0.97
+_FEWEST_FOR_SHARE = 10
 #: Share of the inputs on one side up to which an answer to them may be missing where answers are few.
 _RARE = 0.3
 
@@ -57,7 +63,7 @@ class AnswersTogether:
         inputs, answers = readings(sent), last_of_instant(readings(answered))
         evidence = self._evidence(inputs, answers)
         return (
-            self._wrong_answer(inputs, answers, evidence)
+            self._wrong_answer(trace, inputs, answers, evidence)
             or self._stopped_sensor(trace, inputs, evidence)
             or self._stopped_controller(trace, inputs, answers, evidence)
             or self._one_sided(inputs, answers, evidence)
@@ -84,7 +90,7 @@ class AnswersTogether:
         return explain_no_message(trace, topic)
 
     def _wrong_answer(
-        self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
         for answer in answers:
             recent = _recent(inputs, answer.t_ns)
@@ -94,7 +100,29 @@ class AnswersTogether:
             reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
             reason += f"{self.input}, expected {number(self._expected(value))}"
             return not_met(reason, evidence | {"first_wrong_s": seconds(answer.t_ns)})
-        return None
+        return self._inconsistent(trace, inputs, answers, evidence)
+
+    def _inconsistent(
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+    ) -> Finding | None:
+        """Return that answers fit now this input and now that one, but at no delay most; None if they do at one."""
+        times = [r.t_ns for r in inputs]
+        later = [a for a in answers if a.t_ns - _CURRENT_NS > times[0]]
+        if len(later) < _FEWEST_FOR_SHARE:
+            return None
+        shares = []
+        for delay_ns in range(0, _CURRENT_NS + 1, _CURRENT_NS // 5):
+            for side in (bisect_left, bisect_right):
+                seen = [inputs[side(times, a.t_ns - delay_ns) - 1] for a in later]
+                fitting = sum(
+                    within(a.value, self._expected(r.value), _EXACT) for a, r in zip(later, seen, strict=True)
+                )
+                shares.append(fitting / len(later))
+        prompt = trace.clock is ClockKind.VIRTUAL and len(inputs) <= 2 * len(answers) <= 2 * len(inputs)
+        if max(shares) >= (_AGREEING_SHARE_PROMPT if prompt else _AGREEING_SHARE):
+            return None
+        reason = f"{self.output}: at best {number(100 * max(shares))} % of {len(later)} answers fit {self.input}, "
+        return not_met(f"{reason}expected all of them", evidence)
 
     def _stopped_sensor(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
         gaps = [b.t_ns - a.t_ns for a, b in pairwise(inputs)]

@@ -1,0 +1,224 @@
+"""The controller alone: thresholds, and every honest way of answering."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
+
+from grader.judging.checks.fan import ThresholdResponse
+from grader.model.errors import HarnessError
+from grader.model.exercise import Finding
+
+ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")
+OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below")
+Rule = Callable[[float], float]
+
+
+def right(value: float) -> float:
+    return 100.0 if value > 25 else 0.0
+
+
+def each(rule: Rule, values: tuple[float, ...] = FAN_VALUES, delay: float = 0.0) -> Recording:
+    """Answers each temperature."""
+    rec = scripted(values)
+    for k in range(10 * len(values)):
+        rec.number(0.5 + 0.2 * k + delay, "/fan_speed", rule(values[k // 10]))
+    return rec
+
+
+def on_change(rule: Rule, first: float | None = None, values: tuple[float, ...] = FAN_VALUES) -> Recording:
+    """Publishes on change only; `first` is the state that it starts in without saying so."""
+    rec = scripted(values)
+    state = first
+    for k in range(len(values)):
+        if rule(values[k]) != state:
+            state = rule(values[k])
+            rec.number(0.5 + 2 * k, "/fan_speed", state)
+    return rec
+
+
+def timed(
+    rule: Rule, period: float, phase: float = 0.0, lag: float = 0.0, values: tuple[float, ...] = FAN_VALUES
+) -> Recording:
+    """Publishes on a timer, from what it had `lag` seconds before: at one instant the timer may come first."""
+    rec = scripted(values)
+    for t in itertools.takewhile(lambda t: t < 17, (phase + k * period for k in range(400))):
+        value = held_at(t - lag, values)
+        if value is not None:
+            rec.number(t, "/fan_speed", rule(value))
+    return rec
+
+
+def both(rec: Recording) -> tuple[Finding, Finding]:
+    trace = rec.trace()
+    return ON.judge(trace), OFF.judge(trace)
+
+
+def earned(rec: Recording) -> tuple[int, int]:
+    return tuple(int(f.credit) for f in both(rec))  # type: ignore[return-value]
+
+
+HONEST = {
+    "each temperature": each(right),
+    "each, 50 ms later": each(right, delay=0.05),
+    "on change": on_change(right),
+    "on change, says its state at the start": on_change(right, 0.0).number(0.0, "/fan_speed", 0.0),
+    "timer 0.1 s": timed(right, 0.1),
+    "timer 0.1 s, one behind": timed(right, 0.1, lag=0.001),
+    "timer 0.2 s, in step and behind": timed(right, 0.2, phase=0.1, lag=0.2),
+    "timer 0.5 s, in step and behind": timed(right, 0.5, lag=0.001),
+    "timer 1 s": timed(right, 1.0),
+    "timer 1 s, in step and behind": timed(right, 1.0, phase=0.5, lag=0.001),
+    "old and new at one instant": each(lambda v: 0.0 if v > 25 else 100.0).add(*each(right).trace().messages()),
+    "says off before any temperature": each(right).number(0.1, "/fan_speed", 0.0),
+}
+
+
+@pytest.mark.parametrize("rec", HONEST.values(), ids=HONEST)
+def test_every_honest_way_of_answering_is_met(rec: Recording) -> None:
+    """Each temperature, on change, on timers up to a second, and what comes last at one instant."""
+    for finding in both(rec):
+        assert finding.credit == 1, finding.reason
+
+
+WRONG: dict[str, tuple[Rule, tuple[int, int]]] = {
+    ">= at 25": (lambda v: 100.0 if v >= 25 else 0.0, (1, 0)),
+    "> 26": (lambda v: 100.0 if v > 26 else 0.0, (0, 1)),
+    "whole numbers": (lambda v: 100.0 if int(v) > 25 else 0.0, (0, 1)),
+    "rounded up": (lambda v: 100.0 if round(v + 0.5) > 25 else 0.0, (1, 0)),
+    "inverted": (lambda v: 0.0 if v > 25 else 100.0, (0, 0)),
+    "always on": (lambda v: 100.0, (1, 0)),
+    "always off": (lambda v: 0.0, (0, 1)),
+    "1 for 100": (lambda v: 1.0 if v > 25 else 0.0, (0, 1)),
+    "hysteresis-like": (lambda v: 100.0 if v > 27 else 0.0, (0, 1)),
+    "nan": (lambda v: float("nan"), (0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("way", [each, on_change, lambda r: timed(r, 0.5), lambda r: timed(r, 1.0, lag=0.001)])
+def test_every_wrong_rule_loses_the_side_it_gets_wrong(name: str, way: Callable[[Rule], Recording]) -> None:
+    """Whatever the way of answering."""
+    rule, expected = WRONG[name]
+    assert earned(way(rule)) == expected
+
+
+def test_the_first_violation_is_named_with_its_temperature() -> None:
+    """>= at exactly 25 has its own hint."""
+    finding = both(each(WRONG[">= at 25"][0]))[1]
+    assert finding.reason == "t = 2.800 s, /fan_speed: 100 for 25 °C on /temperature, expected 0" or (
+        "/fan_speed: 100 for 25 °C on /temperature, expected 0" in finding.reason
+    )
+    assert finding.hint == "25 °C itself is not above 25 °C: compare with > and not with >="
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "said"),
+    [
+        ("inverted", 0, "wrong way round"),
+        ("inverted", 1, "wrong way round"),
+        ("always on", 1, "100 all the time"),
+        ("always off", 0, "0 all the time"),
+    ],
+)
+def test_wrong_logic_is_recognised(name: str, side: int, said: str) -> None:
+    """Inverted and constant answers are said to be so."""
+    assert said in both(each(WRONG[name][0]))[side].reason
+
+
+def test_rounding_is_recognised() -> None:
+    """Only the temperature just above 25 is wrong: it is cut off."""
+    assert "without rounding" in both(each(WRONG["whole numbers"][0]))[0].hint
+
+
+def test_an_unsaid_first_state_must_be_said() -> None:
+    """Before any message nobody knows the state; the first temperature at or below must be answered."""
+    on, off = both(on_change(right, 0.0))
+    assert on.credit == 1
+    assert off.credit == 0
+    assert "no answer for 21.7 °C" in off.reason
+
+
+def test_a_controller_that_stops_answering_loses() -> None:
+    """Stuck after 5 s: what it said last is no answer to later temperatures."""
+    rec = each(right)
+    rec.items = [o for o in rec.items if type(o).__name__ != "Message" or o.t_ns < 5_000_000_000]
+    assert earned(rec) == (0, 0)
+    assert "no answer" in both(rec)[0].reason
+
+
+def test_a_controller_that_died_carries_no_state() -> None:
+    """An exit is the reason, also for one that publishes on change."""
+    rec = on_change(right)
+    rec.items = [o for o in rec.items if type(o).__name__ != "Message" or o.t_ns < 5_000_000_000]
+    on, off = both(rec.crashed(5.0, "ZeroDivisionError: division by zero", 17))
+    assert (on.credit, off.credit) == (0, 0)
+    assert "fan_controller.py:17: ZeroDivisionError" in on.reason
+
+
+def test_whole_number_types_are_tried_at_their_own_steps() -> None:
+    """25 and 26 as integers."""
+    values = (22, 25, 26, 29, 24, 28, 25, 21)
+    assert earned(each(right, values)) == (1, 1)
+    assert earned(each(lambda v: 100.0 if v > 26 else 0.0, values)) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("rec", "said"),
+    [
+        (scripted().endpoint("subscription", "/temperature", node="/fan"), "/fan subscribes to /temperature"),
+        (scripted().endpoint("subscription", "/temp", node="/fan"), "nothing subscribes to /temperature"),
+        (
+            scripted().endpoint("subscription", "/temperature", durability="transient_local"),
+            "transient_local durability, which a volatile publisher does not offer",
+        ),
+        (scripted().number(1.0, "/fan", 100.0), "/fan_speed: no message"),
+        (scripted().number(1.0, "/fanspeed", 100.0), "/fanspeed has 1 message"),
+        (scripted().crashed(0.5, "AttributeError: no", 30), "fan_controller.py:30: AttributeError: no"),
+        (scripted().message(1.0, "/fan_speed", {"data": "100"}, "std_msgs/msg/String"), "carries no number"),
+        (scripted().message(1.0, "/fan_speed", {"data": True}, "std_msgs/msg/Bool"), "carries no number"),
+    ],
+)
+def test_no_answer_at_all_is_explained(rec: Recording, said: str) -> None:
+    """Whether it listened, what it published instead, how it ended."""
+    for finding in both(rec):
+        assert finding.credit == 0
+        assert finding.blocked_by is None
+        assert said in finding.reason
+
+
+def test_temperatures_sent_before_it_listened_are_not_asked_for() -> None:
+    """A controller that takes 3 s to start answers from then on."""
+    rec = scripted().endpoint("subscription", "/temperature", t_s=3.0)
+    for k in range(80):
+        t = 0.5 + 0.2 * k
+        if t >= 3.0:
+            rec.number(t, "/fan_speed", right(FAN_VALUES[k // 10]))
+    assert earned(rec) == (1, 1)
+
+
+def test_a_recording_without_the_question_cannot_be_judged() -> None:
+    """Nothing above 25 was ever sent."""
+    rec = scripted((21.0, 22.0)).number(1.0, "/fan_speed", 0.0)
+    with pytest.raises(HarnessError):
+        ON.judge(rec.trace())
+    with pytest.raises(HarnessError):
+        ON.judge(Recording().number(1.0, "/fan_speed", 0.0, FLOAT32).trace())
+
+
+@given(st.floats(0.0, 0.19))
+def test_a_short_delay_changes_nothing(delay: float) -> None:
+    """An answer within its own period is an answer."""
+    assert earned(each(right, delay=delay)) == (1, 1)
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.0, 1.0))
+def test_any_timer_up_to_a_second_is_met(period: float, phase: float) -> None:
+    """Whatever its period and phase."""
+    assert earned(timed(right, period, phase, lag=0.001)) == (1, 1)
+    assert earned(timed(lambda v: 100.0 - right(v), period, phase, lag=0.001)) == (0, 0)

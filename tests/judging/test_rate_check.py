@@ -1,0 +1,174 @@
+"""Rates, in the words of ros2 topic hz."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tracing import TWIST, Recording, twist, velocity
+
+from grader.judging.checks.rate import TopicRate
+from grader.model.quantities import NS_PER_S
+from grader.model.trace import ClockKind
+
+RATE = TopicRate("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0)
+HALF = Fraction(1, 2)
+
+
+def published_at(times: list[float], stop_s: float = 10.05) -> Recording:
+    rec = Recording(stop_s)
+    for t in times:
+        rec.message(t, "/cmd_vel", twist(), TWIST)
+    return rec
+
+
+def test_an_exact_rate_reads_like_topic_hz() -> None:
+    """200 messages in 10 s are 20 Hz."""
+    finding = RATE.judge(velocity().trace())
+    assert finding.credit == 1
+    assert finding.reason == (
+        "/cmd_vel: average rate: 20.000 Hz, min: 0.050 s, max: 0.050 s, std dev: 0.00000 s, window: 200; "
+        "expected 20 ± 1 Hz over 10.0 s"
+    )
+
+
+@pytest.mark.parametrize(
+    ("rate", "credit"),
+    [
+        (20, 1),
+        (19, 1),
+        (21, 1),
+        (18.9, HALF),
+        (18.5, HALF),
+        (18, HALF),
+        (22, HALF),
+        (17.9, 0),
+        (22.1, 0),
+        (10, 0),
+        (40, 0),
+        (2, 0),
+        (0.5, 0),
+        (1000, 0),
+    ],
+)
+def test_bands_are_inclusive(rate: float, credit: Fraction) -> None:
+    """Full within 1 Hz, half within 2 Hz, nothing beyond; the edges are inside."""
+    assert RATE.judge(velocity(rate).trace()).credit == credit
+
+
+@pytest.mark.parametrize(
+    ("rate", "hint"),
+    [
+        (10, "1/20 = 0.05"),
+        (40, "1/20 = 0.05"),
+        (2, "period in seconds"),
+        (5000, "no pacing"),
+        (18.5, "loop with sleep"),
+    ],
+)
+def test_a_wrong_rate_is_told_the_period(rate: float, hint: str) -> None:
+    """The argument of create_timer is a period in seconds."""
+    assert hint in RATE.judge(velocity(rate, stop_s=3.05 if rate > 100 else 10.05).trace()).hint
+
+
+def test_no_partly_without_a_second_tolerance() -> None:
+    """Leaving it out leaves nothing between."""
+    assert TopicRate("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S).judge(velocity(18.5).trace()).credit == 0
+
+
+def test_a_period_given_in_hertz_gives_one_message() -> None:
+    """create_timer(20, ...) sends nothing more in 10 s."""
+    finding = RATE.judge(published_at([20.0], 30.0).trace())
+    assert finding.credit == 0
+    assert "1 message, at t = 20.000 s" in finding.reason
+    assert "create_timer(0.05" in finding.hint
+
+
+def test_stopping_early_is_no_rate() -> None:
+    """20 Hz for 5 s and then nothing is not 20 Hz over 10 s."""
+    finding = RATE.judge(velocity(stop_s=5.05).trace())
+    assert finding.credit == 0
+    rec = velocity(stop_s=5.05)
+    rec.stop_s = 10.05
+    finding = RATE.judge(rec.trace())
+    assert finding.credit == 0
+    assert "stopped after 5.0 s" in finding.reason
+
+
+def test_an_exit_is_the_reason_for_stopping() -> None:
+    """The fault is named, and points to its line if it has one."""
+    rec = velocity(stop_s=5.05).exited(5.05)
+    rec.stop_s = 10.05
+    assert "exited after" in RATE.judge(rec.trace()).reason
+    rec = velocity(stop_s=5.05).crashed(5.05, line=31)
+    for rec.stop_s in (10.05, 5.05):
+        finding = RATE.judge(rec.trace())
+        assert finding.credit == 0
+        assert "node.py" not in finding.reason
+        assert "velocity_publisher.py:31: ValueError: no" in finding.reason
+        assert finding.location is not None
+
+
+def test_bursts_are_no_rate() -> None:
+    """20 messages at once each second have the average, not the rate."""
+    times = [0.05 + second + k * 0.0001 for second in range(10) for k in range(20)]
+    finding = RATE.judge(published_at(times).trace())
+    assert finding.credit == 0
+    assert "bursts" in finding.reason
+    pairs = [0.05 + 0.1 * k for k in range(100) for _ in range(2)]
+    assert "bursts" in RATE.judge(published_at(pairs).trace()).reason
+
+
+def test_everything_at_one_instant_is_no_rate() -> None:
+    """No interval, no rate, and no division by zero."""
+    assert "all at t = 1.000 s" in RATE.judge(published_at([1.0] * 50).trace()).reason
+
+
+def test_silence_is_explained() -> None:
+    """Without a message the reason is that of publishing."""
+    assert "no publisher" in RATE.judge(Recording().trace()).reason
+
+
+def test_a_late_start_is_judged_from_the_first_message() -> None:
+    """A node that thinks for 8 s first has its 10 s all the same."""
+    assert RATE.judge(velocity(start_s=8.0, stop_s=18.0).trace()).credit == 1
+
+
+def test_a_window_that_was_not_observed_is_not_judged_by_its_average() -> None:
+    """Two seconds of 20 Hz prove nothing about ten."""
+    finding = RATE.judge(velocity(start_s=8.0, stop_s=10.0).trace())
+    assert finding.credit == 0
+    assert "only 2.0 s could be observed" in finding.reason
+
+
+def test_jitter_of_single_intervals_costs_nothing() -> None:
+    """Only the average counts; a busy machine shakes intervals."""
+    times = [0.05 + 0.05 * k + (0.015 if k % 2 else 0.0) for k in range(200)]
+    rec = published_at(times)
+    rec.clock = ClockKind.WALL
+    assert RATE.judge(rec.trace()).credit == 1
+
+
+def test_a_drifting_loop_is_accepted_within_the_band() -> None:
+    """sleep(0.05) and 2 ms of work are 19.2 Hz."""
+    assert RATE.judge(velocity(1 / 0.052).trace()).credit == 1
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10**12), st.sampled_from([5, 10, 18, 19, 20, 21, 22, 30]))
+def test_shifting_all_times_changes_no_credit(shift_ns: int, rate: float) -> None:
+    """The window goes with the first message."""
+    here = RATE.judge(velocity(rate).trace()).credit
+    there = RATE.judge(velocity(rate, start_s=0.05 + shift_ns / 1e9, stop_s=10.05 + shift_ns / 1e9).trace()).credit
+    assert here == there
+
+
+@settings(deadline=None)
+@given(st.floats(10, 30), st.floats(0, 5), st.floats(0, 5))
+def test_credit_never_falls_as_the_tolerance_grows(rate: float, a: float, b: float) -> None:
+    """A wider band accepts whatever a narrower one does."""
+    trace = velocity(rate).trace()
+    narrow, wide = (TopicRate("/cmd_vel", 20.0, t, 10 * NS_PER_S).judge(trace).credit for t in sorted((a, b)))
+    assert narrow <= wide

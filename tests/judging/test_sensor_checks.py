@@ -1,0 +1,210 @@
+"""The sensor of exercise 3: its range, its chance, its log of the fan speed."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+from tracing import FLOAT32, Recording, held_at, scripted
+
+from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.model.errors import HarnessError
+
+RANGE = RandomInRange("/temperature", 20, 30)
+LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")
+SPEEDS = (100.0, 0.0, 63.271, 17.448, 100.0)
+
+
+def sensed(values: list[float], **kw: str) -> Recording:
+    rec = Recording(12.2, process="temperature_sensor.py")
+    for k, value in enumerate(values):
+        rec.number(0.2 + k * 0.2, "/temperature", value, **kw)
+    return rec
+
+
+def drawn(count: int = 60) -> list[float]:
+    rng = random.Random(7)
+    return [rng.uniform(20, 30) for _ in range(count)]
+
+
+def test_drawn_values_in_the_range_are_met() -> None:
+    """The evidence holds the extremes."""
+    finding = RANGE.judge(sensed(drawn()).trace())
+    assert finding.credit == 1
+    assert finding.evidence["messages"] == 60
+
+
+def test_temperature_messages_count_like_data() -> None:
+    """sensor_msgs/msg/Temperature carries its number elsewhere."""
+    rec = Recording(12.0)
+    for k, value in enumerate(drawn()):
+        rec.message(k * 0.2, "/temperature", {"temperature": value, "variance": 0.0}, "sensor_msgs/msg/Temperature")
+    assert RANGE.judge(rec.trace()).credit == 1
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [
+        (31.4, "above 30 °C at t = 3.200 s (31.4 °C)"),
+        (19.9, "below 20 °C at t = 3.200 s (19.9 °C)"),
+        (math.nan, "no number"),
+        (math.inf, "above 30"),
+        (-math.inf, "below 20"),
+    ],
+)
+def test_the_first_value_outside_is_named(bad: float, said: str) -> None:
+    """One is enough, with its time and value; NaN and infinities are outside."""
+    values = drawn()
+    values[15] = bad
+    finding = RANGE.judge(sensed(values).trace())
+    assert finding.credit == 0
+    assert said in finding.reason
+    assert "1 of 60" in finding.reason
+
+
+@pytest.mark.parametrize("edge", [20.0, 30.0, 30.000001907])
+def test_the_edges_are_inside(edge: float) -> None:
+    """So is what single precision makes of them."""
+    assert RANGE.judge(sensed([*drawn(), edge]).trace()).credit == 1
+
+
+@pytest.mark.parametrize("value", [25.0, 22.5])
+def test_a_constant_is_not_random(value: float) -> None:
+    """The value and the count are said."""
+    finding = RANGE.judge(sensed([value] * 60).trace())
+    assert finding.credit == 0
+    assert f"constant, {value:g} °C in all 60 messages" in finding.reason
+    assert "random.uniform(20.0, 30.0)" in finding.hint
+
+
+def test_a_ramp_is_not_random() -> None:
+    """The pattern is named."""
+    assert "ramp" in RANGE.judge(sensed([20 + k / 10 for k in range(60)]).trace()).reason
+
+
+def test_one_value_leaves_the_question_open() -> None:
+    """Chance cannot be seen in one value; the rate says what is wrong."""
+    assert RANGE.judge(sensed([25.3]).trace()).blocked_by == "topic_rate"
+    assert RANGE.judge(sensed([25.3, 21.0]).trace()).credit == 1
+    assert RANGE.judge(sensed([25.0, 25.0]).trace()).blocked_by == "topic_rate"
+
+
+def test_no_value_leaves_the_question_open() -> None:
+    """So does silence."""
+    assert RANGE.judge(Recording().trace()).blocked_by == "topic_rate"
+
+
+def test_a_string_is_no_temperature() -> None:
+    """The type is named."""
+    rec = Recording().message(1.0, "/temperature", {"data": "25.0"}, "std_msgs/msg/String")
+    finding = RANGE.judge(rec.trace())
+    assert finding.credit == 0
+    assert "std_msgs/msg/String carries no number" in finding.reason
+
+
+def hearing(write: Callable[[float], str], times: list[float] | None = None, printed: bool = False) -> Recording:
+    """A sensor that writes the newest fan speed."""
+    rec = scripted(SPEEDS, "/fan_speed", 12.2)
+    rec.process = "temperature_sensor.py"
+    rec.endpoint("subscription", "/fan_speed", FLOAT32, "/temperature_sensor")
+    for t in times if times is not None else [0.5 + 0.2 * k for k in range(50)]:
+        value = held_at(t, SPEEDS)
+        if value is not None:
+            (rec.line if printed else rec.log)(t, write(value))
+    return rec
+
+
+ON_CHANGE = [0.5, 2.5, 4.5, 6.5, 8.5]
+EACH_SECOND = [0.7 + k for k in range(11)]
+WORDINGS: dict[str, Callable[[float], str]] = {
+    "plain": lambda v: f"Fan speed: {v}",
+    "percent": lambda v: f"fan {v:.0f}%",
+    "two decimals": lambda v: f"Received fan_speed: {v:.2f}",
+    "whole": lambda v: f"speed={int(v)}",
+    "German": lambda v: f"Lüfter: {v:.1f}".replace(".", ","),
+    "repr": lambda v: f"std_msgs.msg.Float32(data={v})",
+    "Chinese": lambda v: f"风扇转速{v:.1f}",
+    "with temperature": lambda v: f"T=24.51 °C, fan={v:.1f}",
+}
+
+
+@pytest.mark.parametrize("write", WORDINGS.values(), ids=WORDINGS)
+@pytest.mark.parametrize("times", [None, ON_CHANGE, EACH_SECOND], ids=["each message", "on change", "each second"])
+def test_logged_speeds_count_however_they_are_worded(write: Callable[[float], str], times: list[float] | None) -> None:
+    """Each message, on change or on a timer; printed they are half."""
+    assert LOGS.judge(hearing(write, times).trace()).credit == 1
+    printed = LOGS.judge(hearing(write, times, printed=True).trace())
+    assert printed.credit == Fraction(1, 2)
+    assert "get_logger" in printed.hint
+
+
+def test_a_log_up_to_a_second_late_counts() -> None:
+    """A timer of 1 s may show the value before."""
+    rec = hearing(str, [])
+    for t, value in zip([3.4, 5.4, 7.4, 9.4, 11.0], SPEEDS, strict=True):
+        rec.log(t, f"fan {value}")
+    assert LOGS.judge(rec.trace()).credit == 1
+    rec = hearing(str, [])
+    for t, value in zip([3.6, 5.6, 7.6, 9.6, 11.0], SPEEDS, strict=True):
+        rec.log(t, f"fan {value}")
+    assert LOGS.judge(rec.trace()).credit == 0
+
+
+def test_something_of_its_own_is_seen_through() -> None:
+    """A sensor that logs 100 or 0 by its own temperature never shows the drawn values."""
+    finding = LOGS.judge(hearing(lambda v: f"fan {100 if v > 50 else 0}").trace())
+    assert finding.credit == 0
+    assert "what is logged is not what was received" in finding.reason
+
+
+def test_a_first_value_only_is_not_enough() -> None:
+    """The first value that is missing is named."""
+    finding = LOGS.judge(hearing(lambda v: "fan 100.0").trace())
+    assert finding.credit == 0
+    assert "3 of 5 values" in finding.reason
+    assert "the first is 0 at t = 2.500 s" in finding.reason
+
+
+def test_no_subscription_is_the_reason() -> None:
+    """Nothing can be logged that is not heard."""
+    rec = scripted(SPEEDS, "/fan_speed", 12.2).endpoint("subscription", "/fanspeed")
+    assert "subscribes to /fanspeed" in LOGS.judge(rec.trace()).reason
+
+
+def test_a_latched_subscription_is_the_reason() -> None:
+    """The policy is named."""
+    rec = scripted(SPEEDS, "/fan_speed", 12.2).endpoint("subscription", "/fan_speed", durability="transient_local")
+    assert "transient_local" in LOGS.judge(rec.trace()).reason
+
+
+def test_a_subscription_to_text_is_the_reason() -> None:
+    """A type without a number cannot be tried."""
+    rec = Recording().endpoint("subscription", "/fan_speed", "std_msgs/msg/String")
+    rec.deliver(0.5, "/fan_speed", {"data": "x"}, "std_msgs/msg/String")
+    assert "carries no number" in LOGS.judge(rec.trace()).reason
+
+
+def test_values_sent_before_anybody_listened_are_not_asked_for() -> None:
+    """A node that takes 5 s to start heard the later values only."""
+    rec = scripted(SPEEDS, "/fan_speed", 12.2)
+    rec.process = "temperature_sensor.py"
+    rec.endpoint("subscription", "/fan_speed", t_s=5.0)
+    for t in (6.0, 7.0, 9.0, 10.0):
+        rec.log(t, f"fan {held_at(t, SPEEDS)}")
+    assert LOGS.judge(rec.trace()).credit == 1
+
+
+def test_a_crash_is_the_reason() -> None:
+    """The fault is named with its line."""
+    finding = LOGS.judge(hearing(str, [0.6]).crashed(0.7, "TypeError: no", 40).trace())
+    assert finding.credit == 0
+    assert "temperature_sensor.py:40: TypeError: no" in finding.reason
+
+
+def test_a_recording_without_values_cannot_be_judged() -> None:
+    """Nothing was asked, so nothing was answered wrongly."""
+    with pytest.raises(HarnessError):
+        LOGS.judge(Recording().endpoint("subscription", "/fan_speed").trace())

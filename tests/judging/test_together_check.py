@@ -1,0 +1,162 @@
+"""Sensor and controller at once."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tracing import FLOAT32, FLOAT64, Recording
+
+from grader.judging.checks.together import AnswersTogether
+
+CHECK = AnswersTogether("/temperature", "/fan_speed", 25, 100, 0)
+
+
+def right(value: float) -> float:
+    return 100.0 if value > 25 else 0.0
+
+
+def sensor(seed: int = 3, stop_s: float = 20.2, until: float = 99.0) -> tuple[Recording, list[tuple[float, float]]]:
+    rng = random.Random(seed)
+    rec = Recording(stop_s, process="temperature_sensor.py")
+    sent = [(0.2 + 0.2 * k, rng.uniform(20, 30)) for k in range(100)]
+    sent = [(t, v) for t, v in sent if t < min(stop_s - 1e-9, until)]
+    for t, v in sent:
+        rec.number(t, "/temperature", v)
+    return rec, sent
+
+
+def each(rule: Callable[[float], float] = right, seed: int = 3, until: float = 99.0, delay: float = 0.0) -> Recording:
+    rec, sent = sensor(seed)
+    for t, v in sent:
+        if t < until:
+            rec.number(t + delay, "/fan_speed", rule(v))
+    return rec
+
+
+def on_change(
+    rule: Callable[[float], float] = right, seed: int = 3, until: float = 99.0, first: float = -1
+) -> Recording:
+    rec, sent = sensor(seed)
+    state = first
+    for t, v in sent:
+        if rule(v) != state and t < until:
+            state = rule(v)
+            rec.number(t, "/fan_speed", state)
+    return rec
+
+
+def timed(rule: Callable[[float], float] = right, period: float = 1.0, phase: float = 0.0, seed: int = 3) -> Recording:
+    rec, sent = sensor(seed)
+    for t in itertools.takewhile(lambda t: t < 20.2, (phase + k * period for k in itertools.count())):
+        seen = [v for at, v in sent if at < t]
+        if seen:
+            rec.number(t, "/fan_speed", rule(seen[-1]))
+    return rec
+
+
+@given(
+    st.integers(0, 200), st.sampled_from(["each", "delayed", "change", "silent start", "timer"]), st.floats(0.1, 1.0)
+)
+def test_every_honest_way_of_answering_is_met(seed: int, way: str, period: float) -> None:
+    """Whatever the sensor draws."""
+    rec = {
+        "each": lambda: each(seed=seed),
+        "delayed": lambda: each(seed=seed, delay=0.05),
+        "change": lambda: on_change(seed=seed),
+        "silent start": lambda: on_change(seed=seed, first=0.0),
+        "timer": lambda: timed(seed=seed, period=period, phase=0.3),
+    }[way]()
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 1, finding.reason
+
+
+@given(
+    st.integers(0, 200), st.sampled_from([each, on_change, timed]), st.sampled_from(["inverted", "> 28", "on", "nan"])
+)
+def test_every_wrong_rule_is_found(seed: int, way: Callable[..., Recording], name: str) -> None:
+    """Whatever the sensor draws and however it is answered."""
+    rule = {
+        "inverted": lambda v: 100.0 - right(v),
+        "> 28": lambda v: 100.0 if v > 28 else 0.0,
+        "on": lambda v: 100.0,
+        "nan": lambda v: float("nan"),
+    }[name]
+    # once a second it asks too seldom to tell 28 from 25; the controller alone is asked that
+    if (way, name) != (timed, "> 28"):
+        assert CHECK.judge(way(rule, seed=seed).trace()).credit == 0
+
+
+@pytest.mark.parametrize("way", [each, on_change])
+@pytest.mark.parametrize("until", [0.3, 5.0, 15.0])
+def test_a_controller_that_stops_is_found(way: Callable[..., Recording], until: float) -> None:
+    """What it said last does not fit for long."""
+    finding = CHECK.judge(way(until=until).trace())
+    assert finding.credit == 0
+    assert "nothing after" in finding.reason
+
+
+def test_a_controller_that_only_switches_on_is_found() -> None:
+    """Both answers must occur."""
+    rec, sent = sensor()
+    for t, v in sent:
+        if v > 25:
+            rec.number(t, "/fan_speed", 100.0)
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert "never 0" in finding.reason
+
+
+def test_a_sensor_that_exits_is_found() -> None:
+    """The exit is the reason."""
+    rec, sent = sensor(until=5.0)
+    for t, v in sent:
+        rec.number(t, "/fan_speed", right(v))
+    finding = CHECK.judge(rec.exited(5.1).trace())
+    assert finding.credit == 0
+    assert "temperature_sensor.py exited after 5.1 s" in finding.reason
+
+
+def test_the_first_wrong_answer_is_named() -> None:
+    """With its temperature and what was expected."""
+    finding = CHECK.judge(each(lambda v: 55.0).trace())
+    assert finding.reason.startswith("t = 0.200 s, /fan_speed: 55 for ")
+    assert "expected" in finding.reason
+
+
+def test_types_that_differ_are_said_exactly() -> None:
+    """Each file alone is right, together they cannot talk."""
+    rec, _ = sensor()
+    rec.endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor", 1)
+    rec.endpoint("subscription", "/temperature", FLOAT64, "/controller", 2)
+    rec.log(0.0, "up", process="fan_controller.py", logger="controller").line(0.0, "x", process="temperature_sensor.py")
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert finding.reason == (
+        "/temperature: temperature_sensor.py publishes std_msgs/msg/Float32, "
+        "fan_controller.py subscribes std_msgs/msg/Float64: they cannot talk"
+    )
+
+
+def test_policies_that_differ_are_said_exactly() -> None:
+    """Which policy on which side."""
+    rec, _ = sensor()
+    rec.endpoint("publisher", "/temperature", node="/a", participant=1, reliability="best_effort")
+    rec.endpoint("subscription", "/temperature", node="/b", participant=2)
+    reason = CHECK.judge(rec.trace()).reason
+    assert "/a offers best_effort reliability, /b asks for reliable: they cannot talk" in reason
+
+
+def test_silence_is_explained() -> None:
+    """No temperature, or no answer."""
+    assert "/temperature: no publisher" in CHECK.judge(Recording().trace()).reason
+    rec, _ = sensor()
+    assert "/fan_speed: no publisher" in CHECK.judge(rec.trace()).reason
+    assert "node.py:12" in CHECK.judge(Recording().crashed(0.0).trace()).reason
+    rec, _ = sensor()
+    rec.message(1.0, "/fan_speed", {"data": "100"}, "std_msgs/msg/String")
+    assert "carries no number" in CHECK.judge(rec.trace()).reason
