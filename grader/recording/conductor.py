@@ -88,7 +88,8 @@ class Conductor:
             if self._now_ns >= self._end_ns:
                 break
             self._now_ns = self._next_ns()
-        self._look_at_graph()
+        if not any(s.ended for s in self._students):
+            self._look_at_graph()  # what has ended disappears from the graph at a moment that is nobody's
         return Trace(
             scenario=self._plan.scenario,
             clock=ClockKind.VIRTUAL,
@@ -158,8 +159,7 @@ class Conductor:
             report = student.report()
             kind = None if report is None else report.get("kind")
             if report is None or kind not in ("note", "fault", "idle", "exited"):
-                self._write_output(student, final=True)
-                self._end(student, student.death(self._now_ns))
+                self._bury(student)
                 return
             self._catch_up(report)
             if kind == "note":
@@ -226,7 +226,7 @@ class Conductor:
             self._end_ns = self._now_ns
 
     def _readable(self, topic: str) -> bool:
-        return any(e.topic == topic and e.kind == "publisher" for e in self._graph.endpoints)
+        return self._observer.reads(topic)
 
     def _forward(self, sender: Student, sent: Mapping[str, int]) -> None:
         """Tell every process what is on its way to it."""
@@ -238,7 +238,9 @@ class Conductor:
                     if any(_compatible(w, r) for w in writers for r in _readers(student, name)):
                         _add(student.arrivals, channel, count)
             elif kind == "request":
-                servers = [s for s in self._students if any(c["kind"] == "service" and c["name"] == name for c in s.claims)]
+                servers = [
+                    s for s in self._students if any(c["kind"] == "service" and c["name"] == name for c in s.claims)
+                ]
                 for student in servers:
                     _add(student.arrivals, channel, count)
                     self._requesters.setdefault(name, []).extend([sender] * count)
@@ -270,7 +272,11 @@ class Conductor:
         return named and all(seen[key] >= count for key, count in wanted.items())
 
     def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
-        same = [w for w in writers if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])]
+        same = [
+            w
+            for w in writers
+            if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])
+        ]
         matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
         # A reader that takes best effort also matches reliable writers: it may see more than its own.
         return matched >= len(same) or not self._readable(claim["name"])
@@ -289,7 +295,7 @@ class Conductor:
         student.tell({"match": expected})
         answer = student.report()
         if answer is None or answer.get("kind") != "matched":
-            self._end(student, student.death(self._now_ns))
+            self._bury(student)
             return
         for name in answer.get("missing", ()):
             self._notes.append(f"{student.name}: {str(name)[:200]} was not matched in time")
@@ -315,6 +321,13 @@ class Conductor:
 
     def _write_output(self, student: Student, *, final: bool) -> None:
         self._observations += student.output(self._now_ns, final=final)
+
+    def _bury(self, student: Student) -> None:
+        """Note the end of a process that ended without a word, and what it wrote before."""
+        death = student.death(self._now_ns)
+        student.drain()
+        self._write_output(student, final=True)
+        self._end(student, death)
 
     def _end(self, student: Student, *faults: Fault) -> None:
         self._observations += faults

@@ -116,6 +116,10 @@ class Observer:
             self._readers[key] = self.node.create_subscription(message, end.topic, _nothing, qos, raw=True)
         return unknown
 
+    def reads(self, topic: str) -> bool:
+        """Return whether messages on a topic can be taken here."""
+        return any(name == topic for name, _, _ in self._readers)
+
     def watching(self, topic: str, interface: str) -> list[bool]:
         """Return the subscriptions on a topic and type: for each, whether it asks for reliability."""
         return [reliable for name, kind, reliable in self._readers if (name, kind) == (topic, interface)]
