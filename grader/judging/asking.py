@@ -80,7 +80,7 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
 
 def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
     """Return the fault that kept a file of the scenario from creating any endpoint, or None if all of them started."""
-    started = len({e.participant for e in student_endpoints(trace)})
+    started = len({e.participant for e in student_endpoints(trace)}) or int(bool(trace.messages()))
     for process in scenario.processes:
         fault = first_fault(trace, process)
         if fault is None:

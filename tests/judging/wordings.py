@@ -87,6 +87,16 @@ RIGHT: dict[str, Writer] = {
         "msg.Quaternion(x=0.0, y=0.0, z=0.1, w=0.99)), covariance=array([" + ", ".join(["0.01"] * 36) + "])), twist="
         "Twist(linear=Vector3(x=0.35, y=0.0, z=0.0), angular=Vector3(x=0.0, y=0.0, z=0.2)))"
     ),
+    "list of labels and a time": lambda x, y: f"Position (x, y) at t=12.30: ({x:.2f}, {y:.2f})",
+    "list of labels the other way and a time": lambda x, y: f"(y, x) of robot 7: {y:.2f}, {x:.2f}",
+    "numbers after each label": lambda x, y: f"x of robot 2 is {x:.2f}, y of robot 2 is {y:.2f}",
+    "message as YAML": lambda x, y: (
+        f"pose:\n  position:\n    x: {x}\n    y: {y}\n    z: 0.0\n  orientation:\n    x: 0.0\n"
+    ),
+    "French, il y a": lambda x, y: f"il y a 3 messages : x = {x:.2f}, y = {y:.2f}",
+    "arrow": lambda x, y: f"Robot -> {x:.2f} -> {y:.2f}",
+    "semicolons": lambda x, y: f"X;Y;{x:.3f};{y:.3f}",
+    "table": lambda x, y: f"| {x:>8.2f} | {y:>8.2f} |",
     "object address": lambda x, y: f"<Point object at 0x7f12ab34> {x:.3f} {y:.3f}",
     "changing words": lambda x, y: f"{'left' if x < 0 else 'right'} of the origin: {x:.2f}, {y:.2f}",
     "other record too": lambda x, y: [f"x={x:.2f} y={y:.2f}", f"speed 0.35 {x - y:.2f}"],
@@ -96,6 +106,7 @@ WRONG: dict[str, tuple[Writer, str]] = {
     "swapped": (lambda x, y: f"x={y:.2f}, y={x:.2f}", "swapped"),
     "swapped list": (lambda x, y: f"Position (x, y) = ({y:.2f}, {x:.2f})", "swapped"),
     "swapped without labels": (lambda x, y: f"{y:.3f} {x:.3f}", "swapped"),
+    "labels lie in a list": (lambda x, y: f"(y, x) at t=12.30: ({x:.2f}, {y:.2f})", "swapped"),
     "labels lie": (lambda x, y: f"y={x:.2f}, x={y:.2f}", "swapped"),
     "only x": (lambda x, y: f"x={x:.2f}", "only_x"),
     "only y": (lambda x, y: f"position {y:.2f}", "only_y"),

@@ -12,6 +12,8 @@ from grader.judging.positions.numbers import Printed
 #: Most numbers among which unlabelled pairs are sought.
 _MOST_UNLABELLED = 24
 _MOST_LABELLED_PAIRS = 60
+#: How many numbers after a list of labels may be the ones it names.
+_MOST_AFTER_LIST = 6
 _WORD = re.compile(r"[A-Z]+(?![a-zà-ɏ])|[A-ZÀ-ɏ]?[a-zà-ɏ]+|[A-Z]")
 _LABELS = {
     **dict.fromkeys(("x", "px", "posx", "xpos", "coordx", "xcoord", "xx"), "x"),
@@ -75,7 +77,8 @@ def candidate_pairs(text: str, numbers: Sequence[Printed]) -> tuple[Pair, ...]:
     plain = range(min(len(numbers), _MOST_UNLABELLED))
     if not complete:
         return tuple(combinations(plain, 2))
-    pairs = [pair for way in complete for pair in _labelled_pairs(way)][:_MOST_LABELLED_PAIRS]
+    pairs = [*(pair for way in complete for pair in _labelled_pairs(way)), *_listed_pairs(parts)]
+    pairs = pairs[:_MOST_LABELLED_PAIRS]
     bare = [i for i in plain if not any(way[i] for way in complete)]
     return tuple(dict.fromkeys([*pairs, *combinations(bare, 2)]))
 
@@ -115,6 +118,20 @@ def _by_run(parts: list[str]) -> Assignment:
         given.append(waiting[0] if waiting else "")
         waiting = waiting[1:]
     return given
+
+
+def _listed_pairs(parts: list[str]) -> list[Pair]:
+    """Return pairs in the order of a list of labels that stands apart from its numbers: `(x, y) at 12 s: 1, 2`."""
+    pairs: list[Pair] = []
+    for here, part in enumerate(parts[:-1]):
+        run = _last_run(part)
+        if "x" not in run or "y" not in run:
+            continue
+        labelled = (k for k in range(here + 1, len(parts) - 1) if _labels_in(parts[k]))
+        span = range(here, min(next(labelled, len(parts) - 1), here + _MOST_AFTER_LIST))
+        forward = run.index("x") < run.index("y")
+        pairs += [(i, j) if forward else (j, i) for i, j in combinations(span, 2)]
+    return pairs
 
 
 def _by_nearest(parts: list[str]) -> Assignment:

@@ -1,0 +1,163 @@
+"""What is true of every check: it never raises, its evidence is plain, and it does not care when a recording began."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from test_fan_check import HONEST, WRONG
+from test_fan_check import each as each_temperature
+from test_graph_check import graph
+from test_sensor_checks import drawn, hearing, sensed
+from test_together_check import each
+from tracing import FLOAT32, ODOMETRY, TWIST, Recording, position_logs, twist, velocity
+from wordings import RIGHT
+from wordings import WRONG as WRONG_POSITIONS
+
+from grader.judging.checks import CHECKS
+from grader.model.errors import HarnessError
+from grader.model.exercise import Check
+from grader.model.quantities import NS_PER_S
+from grader.model.trace import (
+    ClockKind,
+    Delivery,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Mark,
+    Message,
+    OutputLine,
+    Trace,
+)
+
+INSTANCES: dict[str, Check] = {
+    "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),
+    "topic_rate": CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0),
+    "field_values": CHECKS["field_values"]("/cmd_vel", {"linear.x": 0.5, "angular.z": 0.1}),
+    "uses_logger": CHECKS["uses_logger"]("velocity_publisher.py"),
+    "subscribes": CHECKS["subscribes"]("/odom", ODOMETRY),
+    "logs_position": CHECKS["logs_position"]("odom_subscriber.py", "/odom"),
+    "log_period": CHECKS["log_period"]("odom_subscriber.py", "/odom", NS_PER_S),
+    "waits_gracefully": CHECKS["waits_gracefully"]("odom_subscriber.py", "/odom", 5 * NS_PER_S),
+    "random_in_range": CHECKS["random_in_range"]("/temperature", 20, 30),
+    "logs_received": CHECKS["logs_received"]("temperature_sensor.py", "/fan_speed"),
+    "threshold_response": CHECKS["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above"),
+    "answers_together": CHECKS["answers_together"]("/temperature", "/fan_speed", 25, 100, 0),
+    "bidirectional_graph": CHECKS["bidirectional_graph"]("/temperature", "/fan_speed"),
+}
+TRACES = {
+    "velocity": velocity().log(0.0, "started"),
+    "half rate": velocity(10.0),
+    "crashed": velocity(stop_s=5.05).crashed(5.05),
+    "positions": position_logs(RIGHT["chapter hint"]),
+    "printed positions": position_logs(RIGHT["three records"], printed=True),
+    "swapped positions": position_logs(WRONG_POSITIONS["swapped"][0]),
+    "sensor": sensed(drawn()),
+    "sensor that listens": hearing(str),
+    "controller": HONEST["each temperature"],
+    "inverted controller": each_temperature(WRONG["inverted"][0]),
+    "together": each(),
+    "graph": graph(),
+    "empty": Recording(),
+}
+
+NAMES = st.sampled_from(["/cmd_vel", "/odom", "/temperature", "/fan_speed", "/x", "/rosout"])
+TYPES = st.sampled_from([TWIST, ODOMETRY, FLOAT32, "std_msgs/msg/String", "\ud800\n"])
+FILES = st.sampled_from(["velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py", "fan_controller.py"])
+TIMES = st.integers(0, 30 * NS_PER_S)
+NUMBERS = st.one_of(st.floats(), st.integers(), st.booleans(), st.none(), st.text(max_size=3), st.just([1.0]))
+POSITIONS = st.builds(lambda x, y: {"pose": {"pose": {"position": {"x": x, "y": y}}}}, NUMBERS, NUMBERS)
+VALUES = st.one_of(
+    st.just({}),
+    st.builds(lambda v: {"data": v}, NUMBERS),
+    st.builds(lambda v: {"temperature": v}, NUMBERS),
+    st.builds(lambda a, b: twist((a, 0, 0), (0, 0, b)), NUMBERS, NUMBERS),
+    POSITIONS,
+    st.just({"linear": 3, "pose": "\ud800"}),
+)
+TEXTS = st.one_of(st.text(max_size=40), st.builds(lambda a, b: f"x={a} y={b}", st.floats(), st.floats()))
+ENDPOINTS = st.builds(
+    Endpoint,
+    st.sampled_from(["publisher", "subscription", "?"]),
+    NAMES,
+    TYPES,
+    st.sampled_from(["/a", "/b", "", "\u202e"]),
+    st.integers(-1, 2),
+    st.sampled_from(["reliable", "best_effort", ""]),
+    st.sampled_from(["volatile", "transient_local", ""]),
+)
+OBSERVATIONS = st.one_of(
+    st.builds(Message, TIMES, NAMES, TYPES, VALUES),
+    st.builds(Delivery, TIMES, NAMES, TYPES, VALUES),
+    st.builds(LogRecord, TIMES, FILES, st.sampled_from(["INFO", "ERROR", ""]), st.text(max_size=5), TEXTS),
+    st.builds(OutputLine, TIMES, FILES, st.sampled_from(["stdout", "stderr"]), TEXTS),
+    st.builds(Fault, TIMES, FILES, st.sampled_from(list(FaultKind)), TEXTS),
+    st.builds(Mark, TIMES, st.sampled_from(["stream_starts", "stream_stops", "limit"]), NAMES),
+    st.builds(lambda t, e: GraphSnapshot(t, (), tuple(e)), TIMES, st.lists(ENDPOINTS, max_size=4)),
+)
+
+
+def asked(check: Check, trace: Trace) -> Any:
+    try:
+        return check.judge(trace)
+    except HarnessError as error:
+        return error.message
+
+
+def test_every_check_is_tried_here() -> None:
+    """A new check must join."""
+    assert list(INSTANCES) == list(CHECKS)
+    for name, check in INSTANCES.items():
+        assert type(check) is CHECKS[name]
+        assert (type(check).__doc__ or "").strip()
+
+
+@pytest.mark.parametrize("check", INSTANCES.values(), ids=INSTANCES)
+@pytest.mark.parametrize("rec", TRACES.values(), ids=TRACES)
+def test_findings_are_plain_and_steady(check: Check, rec: Recording) -> None:
+    """Credit between 0 and 1, one line of reason, evidence that is JSON, twice the same."""
+    trace = rec.trace()
+    finding = asked(check, trace)
+    if isinstance(finding, str):
+        return
+    assert isinstance(finding.credit, Fraction)
+    assert 0 <= finding.credit <= 1
+    assert finding.reason
+    assert "\n" not in finding.reason + finding.hint
+    assert not finding.hint or finding.credit < 1
+    json.dumps(dict(finding.evidence))
+    assert finding == asked(check, trace)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@given(st.lists(OBSERVATIONS, max_size=25), st.sampled_from(list(ClockKind)), st.integers(0, 30 * NS_PER_S))
+def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockKind, stop_ns: int) -> None:
+    """Whatever was observed, every check finds something or says that it was not asked."""
+    trace = Trace("alone", clock, stop_ns, tuple(sorted(observations, key=lambda o: o.t_ns)))
+    for check in INSTANCES.values():
+        finding = asked(check, trace)
+        assert isinstance(finding, str) or 0 <= finding.credit <= 1
+
+
+def shifted(trace: Trace, by_ns: int) -> Trace:
+    moved = tuple(replace(o, t_ns=o.t_ns + by_ns) for o in trace.observations)
+    return replace(trace, stop_ns=trace.stop_ns + by_ns, observations=moved)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(sorted(TRACES)), st.sampled_from(sorted(INSTANCES)), st.integers(0, 100 * NS_PER_S))
+def test_shifting_all_times_changes_no_credit(name: str, check: str, by_ns: int) -> None:
+    """Everything is judged relative to what happened in the recording."""
+    trace = TRACES[name].trace()
+    here, there = asked(INSTANCES[check], trace), asked(INSTANCES[check], shifted(trace, by_ns))
+    if isinstance(here, str) and not isinstance(there, str):
+        assert check == "waits_gracefully"  # a longer silence may be long enough
+    elif not isinstance(here, str):
+        assert (here.credit, here.blocked_by) == (there.credit, there.blocked_by)

@@ -1,0 +1,376 @@
+"""Judging an exercise: points, blocking, missing files, faults and what nobody knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tracing import ODOMETRY, TWIST, Recording, driving, position_logs, velocity
+
+from grader.judging.checks import CHECKS
+from grader.judging.judge import judge_exercise
+from grader.model.exercise import Check, Criterion, Exercise, Finding, Location, Outcome
+from grader.model.report import ExerciseReport, Verdict
+from grader.model.scenario import Scenario, Span
+from grader.model.submission import StudentFile, Submission
+from grader.model.trace import ClockKind, FaultKind, Trace
+
+FILE = "velocity_publisher.py"
+ODOM = "odom_subscriber.py"
+SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Says:
+    """A check that finds what it is told to find."""
+
+    credit: Fraction = Fraction(1)
+    blocked_by: str | None = None
+    hint: str = ""
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    location: Location | None = None
+
+    def judge(self, trace: Trace) -> Finding:
+        return Finding(self.credit, "found", self.evidence, self.location, self.hint, self.blocked_by)
+
+
+@dataclass(frozen=True)
+class Raises:
+    """A check with a mistake in it."""
+
+    def judge(self, trace: Trace) -> Finding:
+        raise ZeroDivisionError("secret\nthing")
+
+
+def criterion(
+    id_: str, check: Check, *needs: str, points: str = "6", scenario: str = "alone", hint: str = ""
+) -> Criterion:
+    return Criterion(id_, id_.upper(), Fraction(points), scenario, check, needs, hint)
+
+
+def exercise(*criteria: Criterion, files: tuple[str, ...] = (FILE,), scenarios: tuple[Scenario, ...] = ()) -> Exercise:
+    alone = Scenario("alone", files, Span(10 * SECOND))
+    return Exercise("e", "1", "E", True, files, scenarios or (alone,), criteria, "sha256:0")
+
+
+def handed_in(*names: str, missing: Mapping[str, tuple[str, ...]] | None = None) -> Submission:
+    files = {n: StudentFile(n, n) for n in names}
+    files |= {n: StudentFile(n, None, similar) for n, similar in (missing or {}).items()}
+    return Submission("s", "s", Path("s"), "sha256:1", files)
+
+
+def judged(*criteria: Criterion, rec: Recording | None = None, **rest: Any) -> dict[str, Verdict]:
+    trace = (rec or Recording()).trace(**rest)
+    report = judge_exercise(exercise(*criteria), {"alone": trace}, handed_in(FILE))
+    return {v.id: v for v in report.verdicts}
+
+
+def outcomes(report: ExerciseReport) -> dict[str, str]:
+    return {v.id: v.outcome.value for v in report.verdicts}
+
+
+@pytest.mark.parametrize(
+    ("credit", "outcome", "score"),
+    [
+        ("1", Outcome.MET, "5/2"),
+        ("1/2", Outcome.PARTLY, "5/4"),
+        ("1/3", Outcome.PARTLY, "5/6"),
+        ("0", Outcome.NOT_MET, "0"),
+    ],
+)
+def test_points_are_credit_times_points(credit: str, outcome: Outcome, score: str) -> None:
+    """As fractions, so that thirds add up."""
+    verdict = judged(criterion("a", Says(Fraction(credit)), points="2.5"))["a"]
+    assert (verdict.outcome, verdict.score, verdict.max_score) == (outcome, Fraction(score), Fraction("2.5"))
+    assert verdict.title == "A"
+
+
+@pytest.mark.parametrize("credit", [0, Fraction(1, 2), 1])
+def test_the_rubrics_hint_is_used_where_the_check_has_none(credit: Fraction) -> None:
+    """And only where something is lost."""
+    given = judged(
+        criterion("own", Says(Fraction(credit), hint="own"), hint="rubric"),
+        criterion("rubric", Says(Fraction(credit)), hint="rubric"),
+    )
+    lost = credit < 1
+    assert given["own"].hint == ("own" if lost else "")
+    assert given["rubric"].hint == ("rubric" if lost else "")
+
+
+def test_what_needs_an_unmet_criterion_is_blocked() -> None:
+    """Transitively; partly met is enough; the reason names what is needed."""
+    given = judged(
+        criterion("bad", Says(Fraction(0))),
+        criterion("half", Says(Fraction(1, 2))),
+        criterion("a", Says(), "bad"),
+        criterion("b", Says(), "half"),
+        criterion("c", Says(), "half", "a"),
+    )
+    assert [v.outcome.value for v in given.values()] == ["not_met", "partly", "blocked", "met", "blocked"]
+    assert given["a"].reason == "not judged: needs bad (not met)"
+    assert given["c"].reason == "not judged: needs a (not judged)"
+    assert given["a"].score == given["c"].score == 0
+
+
+def test_a_finding_can_name_what_blocks_it() -> None:
+    """A criterion ahead or behind, by its id; where that one is met, the finding stands."""
+    given = judged(
+        criterion("early", Says(Fraction(0), blocked_by="late")),
+        criterion("late", Says(Fraction(0))),
+        criterion("behind", Says(Fraction(0), blocked_by="late")),
+        criterion("fine", Says()),
+        criterion("stands", Says(Fraction(0), blocked_by="fine")),
+        criterion("unknown", Says(Fraction(0), blocked_by="nobody")),
+    )
+    assert given["early"].reason == given["behind"].reason == "not judged: needs late (not met)"
+    assert given["early"].outcome is given["behind"].outcome is Outcome.BLOCKED
+    assert given["stands"].outcome is given["unknown"].outcome is Outcome.NOT_MET
+    assert given["stands"].reason == "found"
+
+
+def test_two_findings_that_wait_for_each_other_are_not_both_blocked() -> None:
+    """One of them must say what is wrong."""
+    given = judged(criterion("a", Says(Fraction(0), blocked_by="b")), criterion("b", Says(Fraction(0), blocked_by="a")))
+    assert [v.outcome for v in given.values()] == [Outcome.NOT_MET, Outcome.BLOCKED]
+
+
+def test_a_finding_can_name_the_kind_of_check_that_blocks_it() -> None:
+    """A check does not know the ids of a rubric: the first check of that kind in the scenario is meant."""
+    rate = CHECKS["topic_rate"]("/temperature", 5.0, 0.25, 10 * SECOND)
+    spread = CHECKS["random_in_range"]("/temperature", 20, 30)
+    given = judged(criterion("pace", rate), criterion("range", spread))
+    assert given["range"].reason == "not judged: needs pace (not met)"
+    assert judged(criterion("range", spread))["range"].outcome is Outcome.NOT_MET
+
+
+def test_a_failed_recording_leaves_everything_undecided() -> None:
+    """Our fault costs no points and is not a zero either; what needs it is undecided too."""
+    given = judged(criterion("a", Says()), criterion("b", Says(), "a"), harness_problem="the worker died")
+    assert {v.outcome for v in given.values()} == {Outcome.UNDECIDED}
+    assert given["a"].reason == "the worker died"
+    report = judge_exercise(exercise(criterion("a", Says())), {}, handed_in(FILE))
+    assert outcomes(report) == {"a": "undecided"}
+    assert "alone was not recorded" in report.verdicts[0].reason
+
+
+def test_what_needs_an_undecided_criterion_is_undecided() -> None:
+    """Nobody knows whether it could have been judged."""
+    given = judged(criterion("a", Raises()), criterion("b", Says(), "a"), criterion("c", Says()))
+    assert [v.outcome.value for v in given.values()] == ["undecided", "undecided", "met"]
+    assert given["b"].reason == "not judged: needs a (undecided)"
+
+
+def test_a_check_that_raises_is_undecided() -> None:
+    """The reason names the check, the evidence the error; the others are judged."""
+    verdict = judged(criterion("a", Raises()))["a"]
+    assert "Raises" in verdict.reason
+    assert "ZeroDivisionError" not in verdict.reason
+    assert verdict.evidence == {"error": "ZeroDivisionError: secret thing"}
+    assert judged(criterion("a", Says(Fraction(2))))["a"].outcome is Outcome.UNDECIDED
+
+
+def test_a_missing_file_costs_one_line() -> None:
+    """The first criterion names the file looked for and the one found, the others are blocked by it."""
+    ex = exercise(criterion("a", Says()), criterion("b", Says(), "a"), criterion("c", Says()))
+    report = judge_exercise(ex, {}, handed_in(missing={FILE: ("velocitypublisher.py",)}))
+    assert outcomes(report) == {"a": "not_met", "b": "blocked", "c": "blocked"}
+    first, second, third = report.verdicts
+    assert first.reason == "velocity_publisher.py: not in the submission; found velocitypublisher.py instead"
+    assert first.hint == "rename velocitypublisher.py to velocity_publisher.py"
+    assert second.reason == third.reason == "not judged: needs velocity_publisher.py, which is missing"
+    assert report.score == 0
+
+
+def test_one_missing_file_of_two_leaves_the_other_judged() -> None:
+    """The controller's scenario runs without the sensor; the common one does not."""
+    files = ("sensor.py", "fan.py")
+    span = Span(10 * SECOND)
+    scenarios = (
+        Scenario("s", files[:1], span),
+        Scenario("f", files[1:], span),
+        Scenario("both", files, span),
+    )
+    ex = exercise(
+        criterion("rate", Says(), scenario="s"),
+        criterion("fan", Says(), scenario="f"),
+        criterion("together", Says(), scenario="both"),
+        files=files,
+        scenarios=scenarios,
+    )
+    traces = {"f": Recording().trace("f")}
+    report = judge_exercise(ex, traces, handed_in("fan.py", missing={"sensor.py": ()}))
+    assert outcomes(report) == {"rate": "not_met", "fan": "met", "together": "blocked"}
+    report = judge_exercise(ex, {}, handed_in(missing={"sensor.py": (), "fan.py": ()}))
+    assert outcomes(report) == {"rate": "not_met", "fan": "not_met", "together": "blocked"}
+
+
+EXERCISE_1 = exercise(
+    criterion("publishes_twist", CHECKS["publishes"]("/cmd_vel", TWIST)),
+    criterion("rate", CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0, 10 * SECOND, 2.0), "publishes_twist", points="10"),
+    criterion("linear", CHECKS["field_values"]("/cmd_vel", {"linear.x": 0.5}), "publishes_twist", points="5"),
+    criterion("logging", CHECKS["uses_logger"](FILE), points="4"),
+)
+
+
+def graded_1(rec: Recording) -> ExerciseReport:
+    return judge_exercise(EXERCISE_1, {"alone": rec.trace()}, handed_in(FILE))
+
+
+def test_a_right_node_gets_everything() -> None:
+    """From the table of checks to the sum."""
+    report = graded_1(velocity().log(0.0, "started"))
+    assert set(outcomes(report).values()) == {"met"}
+    assert report.score == report.max_score == 25
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "said"),
+    [
+        (FaultKind.SYNTAX_ERROR, "SyntaxError: invalid syntax (Python 3.11)", "velocity_publisher.py cannot run: "),
+        (FaultKind.EXCEPTION, "NameError: name 'Twist' is not defined", "velocity_publisher.py:12: NameError"),
+        (FaultKind.HUNG, "the constructor did not return", "cannot run"),
+        (FaultKind.EXITED, "exited with code 3", "exited after 0.0 s with code 3, before it had a publisher"),
+    ],
+)
+def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, said: str) -> None:
+    """One cause, one red line, with its place; the rest is blocked by it."""
+    rec = Recording(0.0, process=FILE).fault(0.0, kind, text, 12)
+    report = graded_1(rec)
+    assert outcomes(report) == {
+        "publishes_twist": "not_met",
+        "rate": "blocked",
+        "linear": "blocked",
+        "logging": "blocked",
+    }
+    first = report.verdicts[0]
+    assert said in first.reason
+    assert first.location == Location(FILE, 12)
+    assert report.verdicts[3].reason == "not judged: needs publishes_twist (not met)"
+    assert [(f.kind, f.line, f.scenario) for f in report.faults] == [(kind.value, 12, "alone")]
+
+
+def test_what_was_earned_before_a_crash_stays() -> None:
+    """A log record before an exception in the constructor counts."""
+    report = graded_1(Recording(5.0, process=FILE).log(0.0, "starting").crashed(0.0, "TypeError: no"))
+    assert outcomes(report)["logging"] == "met"
+    assert outcomes(report)["publishes_twist"] == "not_met"
+
+
+def test_a_fault_that_ends_a_running_node_costs_one_line() -> None:
+    """A crash at 5 s costs the rate; the log that never came is the same cause."""
+    rec = velocity(stop_s=5.05).crashed(5.05)
+    rec.stop_s = 10.05
+    report = graded_1(rec)
+    assert outcomes(report) == {"publishes_twist": "met", "rate": "not_met", "linear": "met", "logging": "blocked"}
+    assert report.verdicts[1].location == Location(FILE, 12)
+
+
+EXERCISE_2 = exercise(
+    criterion("subscribes_odom", CHECKS["subscribes"]("/odom", ODOMETRY)),
+    criterion("logs_position", CHECKS["logs_position"](ODOM, "/odom"), "subscribes_odom", points="10"),
+    criterion("log_period", CHECKS["log_period"](ODOM, "/odom", SECOND), "subscribes_odom"),
+    criterion("waits_gracefully", CHECKS["waits_gracefully"](ODOM, "/odom", 5 * SECOND), "subscribes_odom", points="8"),
+    files=(ODOM,),
+)
+
+
+def graded_2(rec: Recording) -> dict[str, str]:
+    return outcomes(judge_exercise(EXERCISE_2, {"alone": rec.trace()}, handed_in(ODOM)))
+
+
+def plain(x: float, y: float) -> str:
+    return f"x={x:.2f} y={y:.2f}"
+
+
+@pytest.mark.parametrize(
+    ("rec", "position", "period", "waits"),
+    [
+        (position_logs(plain), "met", "met", "met"),
+        (position_logs(plain, printed=True), "partly", "met", "met"),
+        (position_logs(lambda x, y: plain(y, x)), "not_met", "met", "met"),
+        (position_logs(plain, [6.0, 6.5, 7.0, 7.5, 8.0]), "met", "not_met", "met"),
+        (driving(), "not_met", "blocked", "blocked"),
+        (position_logs(lambda x, y: "got it"), "not_met", "blocked", "met"),
+        (driving().crashed(1.0, "AttributeError: 'NoneType' ..."), "blocked", "blocked", "not_met"),
+        (driving().crashed(5.0, "AttributeError: no position"), "not_met", "blocked", "blocked"),
+        (position_logs(plain).log(1.0, "no data", "ERROR"), "met", "met", "not_met"),
+        (position_logs(plain, [6.0, 7.0, 8.0]).exited(8.5), "met", "not_met", "blocked"),
+    ],
+)
+def test_each_fault_of_a_subscriber_turns_its_criterion(rec: Recording, position: str, period: str, waits: str) -> None:
+    """One cause gives one criterion that is not met, and blocked ones."""
+    expected = {"logs_position": position, "log_period": period, "waits_gracefully": waits}
+    assert graded_2(rec) == {"subscribes_odom": "met", **expected}
+
+
+def test_a_subscriber_that_does_not_subscribe_is_blocked_throughout() -> None:
+    """Everything else needs the subscription."""
+    rec = position_logs(plain)
+    rec.items = [o for o in rec.items if type(o).__name__ != "GraphSnapshot"]
+    assert list(graded_2(rec).values()) == ["not_met", "blocked", "blocked", "blocked"]
+
+
+def test_the_same_fault_in_two_scenarios_is_one_cause() -> None:
+    """It is listed once and costs one line."""
+    files = ("sensor.py", "fan.py")
+    scenarios = (Scenario("s", files[:1], Span(SECOND)), Scenario("both", files, Span(SECOND)))
+    ex = exercise(
+        criterion("rate", CHECKS["topic_rate"]("/t", 5.0, 1.0, SECOND), scenario="s"),
+        criterion("together", CHECKS["answers_together"]("/t", "/f", 25, 100, 0), scenario="both"),
+        files=files,
+        scenarios=scenarios,
+    )
+    alone = Recording(process="sensor.py").endpoint("publisher", "/t").crashed(1.0).trace("s")
+    both = Recording(process="sensor.py").endpoint("publisher", "/t").crashed(1.2).trace("both")
+    report = judge_exercise(ex, {"s": alone, "both": both}, handed_in(*files))
+    assert outcomes(report) == {"rate": "not_met", "together": "blocked"}
+    assert [(f.scenario, f.t_ns) for f in report.faults] == [("s", SECOND)]
+
+
+def test_two_files_that_cannot_start_are_two_causes() -> None:
+    """Each is named once."""
+    files = ("sensor.py", "fan.py")
+    scenarios = (Scenario("s", files[:1], Span(SECOND)), Scenario("f", files[1:], Span(SECOND)))
+    ex = exercise(
+        criterion("rate", CHECKS["topic_rate"]("/t", 5.0, 1.0, SECOND), scenario="s"),
+        criterion("on", CHECKS["threshold_response"]("/t", "/f", 25, 100, 0, "above"), scenario="f"),
+        criterion("off", CHECKS["threshold_response"]("/t", "/f", 25, 100, 0, "at_or_below"), scenario="f"),
+        files=files,
+        scenarios=scenarios,
+    )
+    bad = "SyntaxError: invalid syntax"
+    traces = {
+        "s": Recording(0.0).fault(0.0, FaultKind.SYNTAX_ERROR, bad, 3, "sensor.py").trace("s"),
+        "f": Recording(0.0).fault(0.0, FaultKind.SYNTAX_ERROR, bad, 3, "fan.py").trace("f"),
+    }
+    report = judge_exercise(ex, traces, handed_in(*files))
+    assert outcomes(report) == {"rate": "not_met", "on": "not_met", "off": "blocked"}
+
+
+def test_the_wall_clock_of_one_scenario_is_the_reports() -> None:
+    """With its reason; notes are told once."""
+    rec = Recording(clock=ClockKind.WALL)
+    trace = rec.trace(clock_reason="two threads", notes=("a note", "a note", "another"))
+    report = judge_exercise(exercise(criterion("a", Says())), {"alone": trace}, handed_in(FILE))
+    assert (report.clock, report.clock_reason) == (ClockKind.WALL, "two threads")
+    assert report.notes == ("a note", "another")
+
+
+def test_the_graph_is_the_fullest_of_the_common_scenario() -> None:
+    """Later snapshots, when nodes are going, do not count."""
+    rec = Recording().endpoint("publisher", "/t").endpoint("subscription", "/t", node="/b", participant=2, t_s=1.0)
+    rec.snapshot(9.0, rec.ends[:1])
+    report = judge_exercise(exercise(criterion("a", Says())), {"alone": rec.trace()}, handed_in(FILE))
+    assert report.graph is not None
+    assert report.graph.t_ns == SECOND
+    assert judge_exercise(exercise(), {}, handed_in(FILE)).graph is None
+
+
+def test_the_same_trace_gives_the_same_report() -> None:
+    """Judging is a function."""
+    rec = velocity(18.5).line(1.0, "x")
+    assert graded_1(rec) == graded_1(rec)
