@@ -37,6 +37,7 @@ from grader.reading.rubric_model import (
     StimulusShape,
     rubric_model,
 )
+from grader.reading.shipped import shipped_folder
 from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, read_yaml
 
 #: Largest rubric file.
@@ -201,12 +202,10 @@ def builtin_rubrics() -> Mapping[str, Path]:
     Raises:
         RubricError: The rubrics are missing from this installation, or one of them has mistakes.
     """
-    package = Path(__file__).resolve().parent.parent
-    folders = (package / "rubrics", package.parent / "rubrics")  # in a wheel, in a checkout
-    folder = next((f for f in folders if f.is_dir()), None)
-    paths = sorted(folder.glob("*.yaml")) if folder else []
+    folder = shipped_folder()
+    paths = sorted(folder.glob("*.yaml"))
     if not paths:
-        raise RubricError(f"{shown(str(folders[0]), 500)}: expected the built-in rubrics, found none", "install again")
+        raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
     exercises = [(read_rubric(path), path) for path in paths]
     exercises.sort(key=lambda pair: _number_order(pair[0].number))
     return {exercise.id: path for exercise, path in exercises}

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 from grader.judging.checks import CHECKS
 from grader.model.quantities import NS_PER_S
 from grader.model.scenario import OdometryStream
-from grader.reading import rubric_file
+from grader.reading import shipped
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.rubric_schema import rubric_schema, schema_text
 
@@ -149,6 +149,6 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatc
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr(rubric_file, "__file__", str(tmp_path / "grader" / "reading" / "rubric_file.py"))
+    monkeypatch.setattr(shipped, "__file__", str(tmp_path / "grader" / "reading" / "shipped.py"))
     assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
