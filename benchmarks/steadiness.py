@@ -1,6 +1,6 @@
-"""Grades one correct and one wrong submission again and again, half of the time under load, and compares the reports byte for byte.
+"""Grades one correct and one wrong submission again and again, half of the time under load, and compares the reports.
 
-Usage: python benchmarks/steadiness.py [RUNS]      RUNS (40) of each submission; two busy loops per core during the second half
+Usage: python benchmarks/steadiness.py [RUNS]      RUNS (40) of each; two busy loops per core during the second half
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ _PATH = click.Path(path_type=Path)
 class CommandLine(click.Group):
     """Subcommands, and the everyday command that runs when the first argument names none of them."""
 
-    def __init__(self, everyday: click.Command, **attributes: Any) -> None:  # noqa: ANN401  passed on as it is
+    def __init__(self, everyday: click.Command, **attributes: Any) -> None:
         super().__init__(**attributes)
         self.everyday = everyday
 

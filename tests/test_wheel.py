@@ -23,7 +23,13 @@ def wheel(tmp_path_factory):
 def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
     """An instructor needs nothing but the wheel; a student finds no solution in it."""
     names = zipfile.ZipFile(wheel).namelist()
-    for needed in ("exercise_1.yaml", "exercise_2.yaml", "exercise_3.yaml", "rubric.schema.json", "odometry/metadata.yaml"):
+    for needed in (
+        "exercise_1.yaml",
+        "exercise_2.yaml",
+        "exercise_3.yaml",
+        "rubric.schema.json",
+        "odometry/metadata.yaml",
+    ):
         assert f"grader/rubrics/{needed}" in names
     assert "grader/reports/report.schema.json" in names
     assert "grader/host/fastdds.xml" in names
@@ -34,11 +40,24 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
 def test_the_installed_wheel_grades_from_any_directory(wheel, tmp_path):
     """Nothing of the checkout is needed to grade, and nothing of it is used."""
     site = tmp_path / "site"
-    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", str(site), str(wheel)]
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        str(site),
+        str(wheel),
+    ]
     subprocess.run(install, check=True)
     submission = tmp_path / "ada"
     submission.mkdir()
-    (submission / "velocity_publisher.py").write_bytes((ROOT / "reference_solutions/velocity_publisher.py").read_bytes())
+    (submission / "velocity_publisher.py").write_bytes(
+        (ROOT / "reference_solutions/velocity_publisher.py").read_bytes()
+    )
     program = (
         "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
         "import grader.cli; assert grader.__file__.startswith(sys.path[0]), grader.__file__\n"

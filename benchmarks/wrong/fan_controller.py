@@ -5,9 +5,9 @@ from std_msgs.msg import Float32
 
 class FanController(Node):
     def __init__(self):
-        super().__init__('fan_controller')
-        self.sub = self.create_subscription(Float32, '/temperature', self.temperature_callback, 10)
-        self.pub = self.create_publisher(Float32, '/fan_speed', 10)
+        super().__init__("fan_controller")
+        self.sub = self.create_subscription(Float32, "/temperature", self.temperature_callback, 10)
+        self.pub = self.create_publisher(Float32, "/fan_speed", 10)
 
     def temperature_callback(self, msg):
         fan = Float32()
@@ -16,7 +16,7 @@ class FanController(Node):
         else:
             fan.data = 0.0
         self.pub.publish(fan)
-        self.get_logger().info(f'{msg.data:.2f} °C -> fan {fan.data}')
+        self.get_logger().info(f"{msg.data:.2f} °C -> fan {fan.data}")
 
 
 def main(args=None):
@@ -30,5 +30,5 @@ def main(args=None):
     rclpy.shutdown()
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

@@ -1,13 +1,13 @@
 import rclpy
-from rclpy.node import Node
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 
 
 class OdomSubscriber(Node):
     def __init__(self):
-        super().__init__('odom_subscriber')
+        super().__init__("odom_subscriber")
         self.x = self.y = None
-        self.create_subscription(Odometry, '/odom', self.cb, 10)
+        self.create_subscription(Odometry, "/odom", self.cb, 10)
         self.create_timer(1.0, self.log)
 
     def cb(self, msg):
@@ -16,7 +16,7 @@ class OdomSubscriber(Node):
 
     def log(self):
         if self.x is not None:
-            self.get_logger().info('Position: x=%.3f, y=%.3f' % (self.x, self.y))
+            self.get_logger().info("Position: x=%.3f, y=%.3f" % (self.x, self.y))
 
 
 def main(args=None):
@@ -28,5 +28,5 @@ def main(args=None):
         pass
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

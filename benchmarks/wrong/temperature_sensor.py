@@ -7,19 +7,19 @@ from std_msgs.msg import Float32
 
 class TemperatureSensor(Node):
     def __init__(self):
-        super().__init__('temperature_sensor')
-        self.pub = self.create_publisher(Float32, '/temperature', 10)
-        self.sub = self.create_subscription(Float32, '/fan_speed', self.fan_callback, 10)
+        super().__init__("temperature_sensor")
+        self.pub = self.create_publisher(Float32, "/temperature", 10)
+        self.sub = self.create_subscription(Float32, "/fan_speed", self.fan_callback, 10)
         self.timer = self.create_timer(0.2, self.publish_temperature)
 
     def publish_temperature(self):
         msg = Float32()
         msg.data = random.uniform(20.0, 30.0)
         self.pub.publish(msg)
-        self.get_logger().info(f'Temperature: {msg.data:.2f} °C')
+        self.get_logger().info(f"Temperature: {msg.data:.2f} °C")
 
     def fan_callback(self, msg):
-        self.get_logger().info(f'Fan speed: {msg.data}')
+        self.get_logger().info(f"Fan speed: {msg.data}")
 
 
 def main(args=None):
@@ -33,5 +33,5 @@ def main(args=None):
     rclpy.shutdown()
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

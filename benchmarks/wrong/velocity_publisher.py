@@ -1,12 +1,12 @@
 import rclpy
-from rclpy.node import Node
 from geometry_msgs.msg import Twist
+from rclpy.node import Node
 
 
 class VelocityPublisher(Node):
     def __init__(self):
-        super().__init__('velocity_publisher')
-        self.publisher_ = self.create_publisher(Twist, '/cmd_vel', 10)
+        super().__init__("velocity_publisher")
+        self.publisher_ = self.create_publisher(Twist, "/cmd_vel", 10)
         # 10 Hz like in the tutorial
         self.timer = self.create_timer(0.1, self.timer_callback)
 
@@ -15,7 +15,7 @@ class VelocityPublisher(Node):
         msg.linear.x = 0.5
         msg.angular.z = 0.1
         self.publisher_.publish(msg)
-        self.get_logger().info('Publishing velocity')
+        self.get_logger().info("Publishing velocity")
 
 
 def main(args=None):
@@ -27,5 +27,5 @@ def main(args=None):
         pass
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

@@ -37,7 +37,7 @@ class RecordingError(GraderError):
     """An /odom recording cannot be used; whoever named it must act."""
 
 
-class EnvironmentFault(GraderError):
+class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here
     """This machine lacks something that grading needs; whoever set it up must act."""
 
 

@@ -101,7 +101,7 @@ class Endpoint:
         topic: Absolute name.
         type: Message type.
         node: Fully qualified node name, e.g. `/odom_subscriber`.
-        participant: Number of the DDS participant in order of appearance; two processes never share one. -1 is the grader.
+        participant: Number of the DDS participant in order of appearance, one for each process; -1 is the grader.
         reliability: `reliable` or `best_effort`.
         durability: `volatile` or `transient_local`.
         depth: History depth, 0 if unknown.
@@ -175,7 +175,7 @@ class Trace:
         stop_ns: When observation ended; the window is [0, stop_ns).
         observations: In order.
         notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
-        harness_problem: What failed on our side or the machine's; empty if nothing. A trace with a problem is never judged.
+        harness_problem: What failed on our side or the machine's, and forbids judging; empty if nothing did.
     """
 
     scenario: str

@@ -1,6 +1,6 @@
 """The grader's own node: sees the graph, takes every message the students' nodes publish, publishes stimuli.
 
-With `worker.py` and `conductor.py` the only place of the grader that uses rclpy. It has no services, no parameters and no callbacks; it
+The only module of the grader's own processes that uses rclpy. It has no services, no parameters and no callbacks, and
 never waits for an executor: messages are taken when the conductor asks for them.
 """
 
@@ -144,7 +144,7 @@ class Observer:
             return Taken(topic, interface, b"", {})
         try:
             return Taken(topic, interface, cdr, plain_fields(deserialize_message(cdr, message)))
-        except Exception:  # noqa: BLE001 - rclpy gives no type for a message that can't be decoded
+        except Exception:
             self.unreadable[topic] += 1
             return Taken(topic, interface, cdr, {})
 

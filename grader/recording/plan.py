@@ -70,7 +70,7 @@ class Plan:
     clock: str
 
 
-def plan_scenario(
+def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     exercise: Exercise, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
 ) -> Plan:
     """Return a scenario with every value drawn.
@@ -153,7 +153,9 @@ def _recording(stream: OdometryStream, odometry: Odometry, seed: int) -> Planned
 
 def plan_to_json(plan: Plan) -> dict[str, Any]:
     """Return a plan as plain JSON values."""
-    data: dict[str, Any] = {name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings")}
+    data: dict[str, Any] = {
+        name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings")
+    }
     data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
     data["recordings"] = [
         {

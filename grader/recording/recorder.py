@@ -1,7 +1,7 @@
 """The supervisor's side of recording: keeps workers, hands them plans, takes traces back.
 
-A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and the plan it
-had is tried once more; a second failure becomes a trace with a problem of ours, which is never judged.
+A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and
+the plan it had is tried once more; a second failure becomes a trace with a problem of ours, which is never judged.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from grader.model.errors import HarnessError
@@ -238,4 +239,4 @@ def _worker_environment(runtime: PythonRuntime) -> Mapping[str, str]:
 
 def _package_root() -> str:
     """Return the folder that holds the grader package, so that a worker runs the same one."""
-    return os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    return str(Path(__file__).resolve().parents[2])

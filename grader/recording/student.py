@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -26,6 +27,8 @@ OUTPUT_BYTES = 1 << 20
 REPORT_BYTES = 4 << 20
 #: A text longer than this is cut.
 TEXT_CHARACTERS = 4000
+#: Real seconds that a process gets to end by itself after the stop signal.
+GRACE_S = 0.2
 #: Real seconds without a report, after which a process is taken for dead weight; the host's own watchdog is faster.
 SILENCE_S = 90.0
 
@@ -147,7 +150,7 @@ class Student:
             source.close()
             return False
         room = OUTPUT_BYTES - self._kept[stream]
-        if len(found) > room and room > 0:
+        if len(found) > room > 0:
             self.notes.append(f"{self.name}: output on {stream} beyond {OUTPUT_BYTES >> 20} MiB was not kept")
         self._streams[stream] += found[: max(0, room)]
         self._kept[stream] += len(found)
@@ -204,14 +207,10 @@ class Student:
 
     def kill(self) -> None:
         """End the process, if it has not ended, and everything it started."""
-        try:
-            self.process.wait(0.2)
-        except subprocess.TimeoutExpired:
-            pass
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.wait(GRACE_S)
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         self.process.wait()
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
 """Runs a plan on the real clock, beside a reference that tells whether the machine kept up.
 
-For what virtual time cannot hold. Nothing is stepped: processes run as they like, and whatever arrives gets the real time at which it
-came. The reference is the conductor's own loop: if it was held up for long, so may the students' nodes have been, and the
-run says nothing about them.
+For what virtual time cannot hold. Nothing is stepped: processes run as they like, and whatever arrives gets the real
+time at which it came. The reference is the conductor's own loop: if it was held up for long, so may the students' nodes
+have been, and the run says nothing about them.
 """
 
 from __future__ import annotations
@@ -174,4 +174,3 @@ class WallConductor:
         if any(numeric_field(interface) is not None for interface in asked):
             self._observer.withdraw(topic)
             self._advertise(topic, current)
-

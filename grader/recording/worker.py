@@ -1,7 +1,7 @@
 """The trusted worker: runs plans one after another in a network of its own, and answers each with a trace.
 
-Usage: python -m grader.recording.worker JSON, with an object of `isolation`, `runtime` and `line` (a descriptor). A plan is a
-JSON line on the descriptor, the answer a JSON line with `trace` or `problem`.
+Usage: python -m grader.recording.worker JSON, with an object of `isolation`, `runtime` and `line` (a descriptor).
+A plan is a JSON line on the descriptor, the answer a JSON line with `trace` or `problem`.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ class Worker:
     def _record(self, plan: Plan, domain: int) -> Trace:
         students = [self._start(plan, name, file, domain) for name, file in plan.processes]
         # rclpy takes long to import: the students' processes start meanwhile.
-        from grader.recording.conductor import Conductor
-        from grader.recording.observer import Observer
-        from grader.recording.wall import WallConductor
+        from grader.recording.conductor import Conductor  # noqa: PLC0415
+        from grader.recording.observer import Observer  # noqa: PLC0415
+        from grader.recording.wall import WallConductor  # noqa: PLC0415
 
         observer = Observer(domain)
         try:
@@ -141,7 +141,7 @@ def main() -> None:
         data = json.loads(command)
         try:
             answer = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
-        except Exception:  # noqa: BLE001 - whatever fails here is ours: the scenario is undecided, and the next one goes on
+        except Exception:
             answer = {"problem": traceback.format_exc()[-4000:]}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
