@@ -6,7 +6,7 @@ imports nothing of grader, since it runs before anything of it can be found.
 """
 
 # It starts before every student process, and pathlib would be half of its imports.
-# ruff: noqa: PTH
+# ruff: noqa: PTH102, PTH118
 
 from __future__ import annotations
 

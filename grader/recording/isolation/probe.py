@@ -5,7 +5,7 @@ be; and `submission`. The source travels on the command line, since nothing of g
 """
 
 # Every run of the grader waits for it, and pathlib would be half of its imports.
-# ruff: noqa: PTH
+# ruff: noqa: PTH108, PTH112, PTH118, PTH120, PTH123, PTH208
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def main(request: dict[str, Any]) -> None:
         "forbids writing": not any(writable(folder) for folder in folders(request["submission"])),
         "allows scratch files": writable("/tmp") and writable("/dev/shm"),  # noqa: S108
         "hides processes": {name for name in os.listdir("/proc") if name.isdigit()} <= {"1", str(os.getpid())},
-        "hides the environment outside": not content("/proc/1/environ"),
+        # bubblewrap adds PWD to what it starts, and here the outer one starts the inner one.
+        "hides the environment outside": content("/proc/1/environ") in (b"", b"PWD=/\0"),
         "has no privileges": os.getuid() != 0 and {status(name) for name in CAPABILITIES} == {"0" * 16},
         "filters system calls": status("Seccomp") == "2" and status("NoNewPrivs") == "1" and not opens_vsock(),
     }

@@ -1,0 +1,157 @@
+"""Runs small programs inside the tiers of isolation, as the recording does: a worker, and a student inside it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import grader
+from grader.model.errors import EnvironmentFault
+from grader.recording.isolation.bubblewrap import Bubblewrap
+from grader.recording.isolation.environment import runtime_environment
+from grader.recording.isolation.plain import Plain
+from grader.recording.isolation.protocol import Command, Isolation, Limits, StudentProcess
+from grader.recording.ros_installation import RosInstallation
+
+HOST = Path(grader.__file__).resolve().parent / "host"
+USER = 1000
+# Through env, since setpriv itself still finds programs with root's eyes.
+AS_USER = ("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "env")
+
+# The worker of these tests: starts the student's command that the test prepared, and ends as it ends.
+RELAY = """
+import json, subprocess, sys
+command = json.loads(sys.argv[1])
+student = subprocess.run(command["argv"], env=command["environment"], pass_fds=command["pass_fds"])
+sys.exit(student.returncode)
+"""
+
+
+@dataclass(frozen=True)
+class Sandbox:
+    """A tier, with what starts its worker as another user where the tests run as root."""
+
+    isolation: Isolation
+    ros: RosInstallation
+    submission: Path
+    start_as: tuple[str, ...] = ()
+
+    def student(
+        self, code: str, *, limits: Limits | None = None, pass_fds: tuple[int, ...] = (), **variables: str
+    ) -> Command:
+        """Return the command of a student's process that runs some code."""
+        process = StudentProcess(
+            runtime=self.ros.runtime,
+            host_folder=HOST,
+            submission=self.submission,
+            arguments=("-s", "-u", "-c", code),
+            environment={"ROS_DOMAIN_ID": "71", **variables},
+            pass_fds=pass_fds,
+        )
+        return self.isolation.student_command(process, limits or Limits())
+
+    def around(self, student: Command, **variables: str) -> Command:
+        """Return the command of a worker that runs a student's command and ends as that ends."""
+        told = {"argv": student.argv, "environment": dict(student.environment), "pass_fds": student.pass_fds}
+        argv = (sys.executable, "-I", "-S", "-c", RELAY, json.dumps(told))
+        return self.worker(argv, pass_fds=student.pass_fds, **variables)
+
+    def worker(self, argv: tuple[str, ...], *, pass_fds: tuple[int, ...] = (), **variables: str) -> Command:
+        """Return the command of a worker."""
+        environment = {**runtime_environment(self.ros.runtime), **variables}
+        command = self.isolation.worker_command(argv, environment, pass_fds)
+        return replace(command, argv=(*self.start_as, *command.argv))
+
+    def run(self, code: str, **options: object) -> subprocess.CompletedProcess[str]:
+        """Run some code as a student and return how it ended."""
+        student = self.student(code, **options)
+        try:
+            return finish(self.around(student, GITHUB_TOKEN="canary-in-the-worker"))
+        finally:
+            close(student)
+
+
+@contextlib.contextmanager
+def start(command: Command) -> Iterator[subprocess.Popen[str]]:
+    """Start a command as the grader does, and end it whatever happens."""
+    with subprocess.Popen(
+        command.argv,
+        env=dict(command.environment),
+        pass_fds=command.pass_fds,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def finish(command: Command) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    with start(command) as process:
+        out, err = process.communicate(timeout=60)
+        process.wait()
+    return subprocess.CompletedProcess(command.argv, process.returncode, out, err)
+
+
+def close(command: Command) -> None:
+    """Free what the isolation opened for a start."""
+    for descriptor in command.opened_fds:
+        os.close(descriptor)
+
+
+def walls(name: str, ros: RosInstallation, submission: Path) -> Sandbox | str:
+    """Return the sandbox of a tier, or why this machine and user cannot have it."""
+    if name == "none":
+        return Sandbox(Plain(), ros, submission)
+    try:
+        here = Bubblewrap.here()
+    except EnvironmentFault as fault:
+        return fault.message
+    if name == here.name:
+        return Sandbox(here, ros, submission)
+    if not here.as_root:
+        return "only root can try the tier of root"
+    blocked = unreachable((*AS_USER,), ros)
+    return blocked or Sandbox(replace(here, as_root=False), ros, submission, AS_USER)
+
+
+def unreachable(start_as: tuple[str, ...], ros: RosInstallation) -> str:
+    """Return why another user cannot run the interpreter of these tests; empty if it can."""
+    if shutil.which("setpriv") is None:
+        return "setpriv is not installed"
+    tried = subprocess.run(
+        (
+            *start_as,
+            str(ros.runtime.executable),
+            "-I",
+            "-S",
+            "-c",
+            "import sys; open(sys.argv[1])",
+            str(HOST / "launcher.py"),
+        ),
+        env={"LD_LIBRARY_PATH": ":".join(map(str, ros.runtime.library_paths))},
+        capture_output=True,
+        check=False,
+    )
+    return "" if tried.returncode == 0 else f"user {USER} cannot reach {ros.runtime.executable}"
+
+
+def make_submission() -> Path:
+    """Return a staged copy that any user may reach; the caller deletes it."""
+    folder = Path(tempfile.mkdtemp(prefix="staged-"))
+    folder.chmod(0o755)
+    (folder / "node.py").write_text("print('the node')\n", encoding="utf-8")
+    return folder
