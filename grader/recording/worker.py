@@ -140,7 +140,7 @@ def main() -> None:
     for command in commands:
         data = json.loads(command)
         try:
-            answer = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
+            answer: dict[str, Any] = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
         except Exception:
             answer = {"problem": traceback.format_exc()[-4000:]}
         answers.write(json.dumps(answer) + "\n")
