@@ -71,10 +71,11 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
     fault = start_failure(scenario, trace)
     if fault is None or finding.credit > 0:
         return finding
-    if fault.kind is FaultKind.EXITED:
-        reason = f"{fault_sentence(fault)}, before it had a publisher or a subscription"
+    if fault.kind is FaultKind.SYNTAX_ERROR:
+        consequence = "the file cannot run"
     else:
-        reason = f"{fault.process} cannot run: {fault_sentence(fault)}"
+        consequence = "the node had no publisher and no subscription by then"
+    reason = f"{fault_sentence(fault)}; {consequence}"
     return not_met(reason, finding.evidence, hint=fault_hint(fault), fault=fault)
 
 

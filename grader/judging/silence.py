@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from grader.judging.findings import not_met
 from grader.judging.wording import counted, fault_sentence, listed, nearest, quote, span
 from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_S
 from grader.model.trace import Endpoint, Fault, FaultKind, Message, Trace
 
 #: Topics that every node has.
@@ -20,6 +21,9 @@ _URGENCY = {
     FaultKind.EXITED: 4,
 }
 _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end of main()"
+_RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
+#: An exit up to here is one of a node that never waited for anything.
+_AT_ONCE_NS = NS_PER_S
 
 
 def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
@@ -31,8 +35,9 @@ def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
 
 def fault_hint(fault: Fault) -> str:
     """Return what to do about a fault where that is plain; empty otherwise."""
-    clean_exit = fault.kind is FaultKind.EXITED and fault.text.rstrip(".").endswith("code 0")
-    return _SPIN_HINT if clean_exit else ""
+    if fault.kind is not FaultKind.EXITED or not fault.text.rstrip(".").endswith("code 0"):
+        return ""
+    return _SPIN_HINT if fault.t_ns < _AT_ONCE_NS else _RUN_ON_HINT
 
 
 def student_endpoints(trace: Trace, kind: str | None = None) -> tuple[Endpoint, ...]:

@@ -122,7 +122,9 @@ def _outcome_of(finding: Finding) -> Outcome:
 
 def _earned(criterion: Criterion, finding: Finding) -> Verdict:
     outcome = _outcome_of(finding)
-    hint = "" if outcome is Outcome.MET else finding.hint or criterion.hint
+    # a fault is its own cause: what the rubric supposes is then beside the point
+    supposed = "" if FAULT_KEY in finding.evidence else criterion.hint
+    hint = "" if outcome is Outcome.MET else finding.hint or supposed
     return Verdict(
         id=criterion.id,
         title=criterion.title,

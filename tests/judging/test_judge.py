@@ -230,10 +230,14 @@ def test_a_right_node_gets_everything() -> None:
 @pytest.mark.parametrize(
     ("kind", "text", "said"),
     [
-        (FaultKind.SYNTAX_ERROR, "SyntaxError: invalid syntax (Python 3.11)", "velocity_publisher.py cannot run: "),
+        (
+            FaultKind.SYNTAX_ERROR,
+            "SyntaxError: invalid syntax (Python 3.11)",
+            "velocity_publisher.py:12: SyntaxError: invalid syntax (Python 3.11); the file cannot run",
+        ),
         (FaultKind.EXCEPTION, "NameError: name 'Twist' is not defined", "velocity_publisher.py:12: NameError"),
-        (FaultKind.HUNG, "the constructor did not return", "cannot run"),
-        (FaultKind.EXITED, "exited with code 3", "exited after 0.0 s with code 3, before it had a publisher"),
+        (FaultKind.HUNG, "the constructor did not return", "no publisher and no subscription by then"),
+        (FaultKind.EXITED, "exited with code 3", "exited after 0.0 s with code 3; the node had no publisher"),
     ],
 )
 def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, said: str) -> None:

@@ -26,14 +26,14 @@ def quickest(rec: Recording) -> float:
     trace = rec.trace()
     took = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         POSITION.judge(trace)
         PERIOD.judge(trace)
-        took.append(time.perf_counter() - start)
+        took.append(time.process_time() - start)
     return min(took)
 
 
 @pytest.mark.parametrize("write", LONG.values(), ids=LONG)
 def test_a_log_for_every_message_is_judged_quickly(write: Writer) -> None:
-    """About 430 messages and as many logs; the bound leaves room for a busy machine."""
+    """About 430 messages and as many logs; processor time, with room for a slow machine."""
     assert quickest(position_logs(write, ODOM_TIMES)) < 1.0

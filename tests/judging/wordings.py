@@ -113,6 +113,7 @@ WRONG: dict[str, tuple[Writer, str]] = {
     "x twice": (lambda x, y: f"x={x:.2f} y={x:.2f}", "only_x"),
     "sign of y": (lambda x, y: f"x={x:.2f}, y={-y:.2f}", "sign"),
     "both signs": (lambda x, y: f"({-x:.2f}, {-y:.2f})", "sign"),
+    "lost signs": (lambda x, y: f"x={abs(x):.2f} y={abs(y):.2f}", "sign"),
     "constant": (lambda x, y: "x=0.00, y=0.00", "constant"),
     "x and z": (lambda x, y: f"x={x:.2f}, y={0.0:.2f}", "no_y"),
     "scaled": (lambda x, y: f"x={3 * x:.2f}, y={3 * y:.2f}", "wrong"),

@@ -94,7 +94,8 @@ class ThresholdResponse:
         during = [a for a in answers if asked.start_ns <= a.t_ns < asked.stop_ns]
         wrong = [a for a in during if a.t_ns > asked.start_ns + grace_ns and not self._right(a.value, asked.value)]
         if wrong:
-            return _Violation(wrong[0].t_ns, asked, wrong[0].value)
+            first = next(a for a in during if not self._right(a.value, asked.value))
+            return _Violation(first.t_ns, asked, first.value)
         if asked.stop_ns == trace.stop_ns and asked.stop_ns - asked.start_ns <= grace_ns:
             return None  # the observation ended before an answer was due
         before = [a for a in answers if a.t_ns < asked.start_ns]
@@ -140,20 +141,30 @@ class ThresholdResponse:
         """Return what to add to the reason, and a hint; both may be empty."""
         limit = f"{number(self.threshold)}{unit_of(self.input)}"
         rule = f"publish {number(self.above)} above {limit} and {number(self.otherwise)} at or below it"
-        seen = {a.value for a in answers}
-        if self._inverted(inputs, answers):
-            return "; the answers are the wrong way round for every value", rule
-        if len(seen) == 1:
-            return f"; the answer is {number(answers[0].value)} all the time", ""
+        logic = self._logic(inputs, answers)
+        if logic:
+            return logic, rule
         mistaken = [v.held.value for v in violations]
         if self.side == "at_or_below" and all(v == self.threshold for v in mistaken):
             return "", f"{limit} itself is not above {limit}: compare with > and not with >="
         near = self.side == "above" and all(0 < v - self.threshold <= 1 for v in mistaken)
         if near and any(h.value > self.threshold + 1 for h in inputs):
             return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
-        if not any(within(s, w, _EXACT) for s in seen for w in (self.above, self.otherwise)):
-            return "", rule
-        return "", ""
+        known = any(within(a.value, w, _EXACT) for a in answers for w in (self.above, self.otherwise))
+        return "", "" if known else rule
+
+    def _logic(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> str:
+        """Return what the answers follow instead of the threshold; empty if that is not plain."""
+        if self._inverted(inputs, answers):
+            return "; the answers are the wrong way round for every value"
+        if len({a.value for a in answers}) == 1:
+            return f"; {number(answers[0].value)} is the only answer ever given"
+        return f"; once at {number(self.above)} it stays there" if self._stays_on(answers) else ""
+
+    def _stays_on(self, answers: Sequence[Reading]) -> bool:
+        values = [a.value for a in answers]
+        after = values[values.index(self.above) :] if self.above in values else []
+        return len(after) > 1 and all(v == self.above for v in after)
 
     def _inverted(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> bool:
         pairs = []

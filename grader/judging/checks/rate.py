@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from grader.judging.findings import met, not_met, partly
-from grader.judging.silence import explain_no_message, first_fault
+from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
-from grader.model.trace import ClockKind, Fault, Trace
+from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
@@ -121,7 +121,8 @@ class TopicRate:
         silence = found.stop_ns - last
         if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
             ended, fault = _ending(trace, first, last)
-            return not_met(f"{seen}; {ended}; {self._wanted}", evidence, fault=fault)
+            hint = fault_hint(fault) if fault else ""
+            return not_met(f"{seen}; {ended}; {self._wanted}", evidence, hint=hint, fault=fault)
         if found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
             observed = (
                 f"only {span(found.stop_ns - first)} could be observed, the first message came at {moment(first)}"
@@ -153,7 +154,7 @@ class TopicRate:
         rule = f"create_timer({period}, ...): the argument is the period in seconds, 1/{number(self.rate)} = {period}"
         if rate_hz > 20 * self.rate:
             return f"the loop has no pacing; use {rule}"
-        if within(rate_hz, self.rate, 0.2 * self.rate):
+        if 0.8 * self.rate <= rate_hz < self.rate:
             return f"a loop with sleep adds the time of its own work to each period; use {rule}"
         return rule
 
@@ -170,6 +171,7 @@ def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | Non
     stopped = f"stopped after {span(last_ns - first_ns)}"
     fault = next((f for f in trace.faults() if last_ns <= f.t_ns <= trace.stop_ns), None)
     if fault is not None:
-        return f"{stopped}: {fault_sentence(fault)}", fault
+        exited = fault.kind is FaultKind.EXITED
+        return fault_sentence(fault) if exited else f"{stopped}: {fault_sentence(fault)}", fault
     limit = next((m for m in trace.marks("limit") if m.t_ns >= last_ns), None)
     return (f"{stopped}: {quote(limit.detail)}" if limit else stopped), None

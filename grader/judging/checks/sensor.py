@@ -101,8 +101,10 @@ class RandomInRange:
             )
             return not_met(reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate")
         if pattern == "constant":
-            pattern = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
-        reason = f"{self.topic}: the values are not random but {pattern} ({numbers(got[:5])}, ...)"
+            shown = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
+        else:
+            shown = f"{pattern} ({numbers(got[:5])}, ...)"
+        reason = f"{self.topic}: the values are not random but {shown}"
         return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint)
 
     def _drawn(self, values: Sequence[Reading]) -> Finding:

@@ -36,7 +36,7 @@ class AnswersTogether:
     """A sensor and a controller talk to each other: each answer fits an input of the moment, and the answers go on.
 
     The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
-    lie on both sides of the threshold, both answers must occur.
+    lie on both sides of the threshold, both answers must occur; an input that never changes shows nothing.
 
     Attributes:
         input: Topic of the sensor.
@@ -158,6 +158,9 @@ class AnswersTogether:
         self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
         expected = [self._expected(r.value) for r in inputs]
+        if len({r.value for r in inputs}) == 1:
+            reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
+            return not_met(f"{reason}{unit_of(self.input)} all the time", evidence)
         # a timer of 1 s may miss what is rare; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w in expected if expected.count(w) > often}
@@ -191,14 +194,15 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     here, there = publishers[0], subscriptions[0]
     evidence = {"publisher": [here.node, here.type], "subscription": [there.node, there.type]}
     if not {e.type for e in publishers} & {e.type for e in subscriptions}:
-        said = f"{_speaker(trace, here)} publishes {quote(here.type)}, "
-        said += f"{_speaker(trace, there)} subscribes {quote(there.type)}"
+        one, other = _speakers(trace, here, there)
+        said = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
         return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint)
     policy = _incompatible(here, there)
     if policy is None:
         return None
-    said = f"{_speaker(trace, here)} offers {policy[0]}, {_speaker(trace, there)} asks for {policy[1]}"
+    one, other = _speakers(trace, here, there)
+    said = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     return not_met(f"{topic}: {said}: they cannot talk", evidence, hint="pass the queue depth 10 as QoS on both sides")
 
 
@@ -211,13 +215,17 @@ def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str
     return None
 
 
-def _speaker(trace: Trace, endpoint: Endpoint) -> str:
-    """Return the file that a node belongs to where its logs or its name tell, else the node."""
+def _speakers(trace: Trace, here: Endpoint, there: Endpoint) -> tuple[str, str]:
+    """Return the files of two nodes where the logs or the names tell both, else the nodes."""
+    files = _file_of(trace, here), _file_of(trace, there)
+    return (files[0], files[1]) if files[0] and files[1] else (quote(here.node), quote(there.node))
+
+
+def _file_of(trace: Trace, endpoint: Endpoint) -> str:
     bare = endpoint.node.strip("/").replace("/", ".")
     for record in trace.records():
         if record.logger == bare:
             return record.process
     heard: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
-    processes = dict.fromkeys(o.process for o in heard)
-    named = next((p for p in processes if p.removesuffix(".py") == bare.rsplit(".", 1)[-1]), None)
-    return named or quote(endpoint.node)
+    named = (o.process for o in heard if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
+    return next(named, "")

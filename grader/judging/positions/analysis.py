@@ -59,7 +59,8 @@ def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: Cl
     """Return the best reading: text by text or block by block, with decimal points or decimal commas."""
     during = [o for o in outputs if o.t_ns >= track.times_ns[0]]
     best = Analysis(needed=_needed(track))
-    for texts in (single_texts(during), blocks(during, clock)):
+    singly, together = single_texts(during), blocks(during, clock)
+    for texts in (singly, together) if len(together) < len(singly) else (singly,):
         for decimal_comma in (False, True):
             found = _judged(texts, track, decimal_comma=decimal_comma)
             if found.met:

@@ -50,10 +50,12 @@ class _Variant:
     sentence: str
     hint: str = _POSITION_HINT
     signs: tuple[int, int] = (1, 1)
+    absolute: bool = False
 
     def wanted(self) -> Wanted:
         def numbers_of(pose: Pose) -> tuple[float, float]:
-            return self.signs[0] * pose.at(self.first), self.signs[1] * pose.at(self.second)
+            first, second = self.signs[0] * pose.at(self.first), self.signs[1] * pose.at(self.second)
+            return (abs(first), abs(second)) if self.absolute else (first, second)
 
         return numbers_of
 
@@ -64,6 +66,7 @@ _VARIANTS = (
     _Variant("sign", X, Y, "the sign of x is the wrong way round", _SIGN_HINT, (-1, 1)),
     _Variant("sign", X, Y, "the sign of y is the wrong way round", _SIGN_HINT, (1, -1)),
     _Variant("sign", X, Y, "the signs of x and y are the wrong way round", _SIGN_HINT, (-1, -1)),
+    _Variant("sign", X, Y, "x and y have lost their signs", _SIGN_HINT, absolute=True),
     _Variant(
         "twist", _TWIST, "twist.twist.linear.y", "the logged values are the linear velocity (twist), not the pose"
     ),

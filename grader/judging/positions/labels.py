@@ -10,7 +10,7 @@ from itertools import combinations
 from grader.judging.positions.numbers import Printed
 
 #: Most numbers among which unlabelled pairs are sought.
-_MOST_UNLABELLED = 24
+_MOST_UNLABELLED = 20
 _MOST_LABELLED_PAIRS = 60
 #: How many numbers after a list of labels may be the ones it names.
 _MOST_AFTER_LIST = 6

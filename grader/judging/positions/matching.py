@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from grader.judging.positions.labels import Layout, Pair, candidate_pairs, template_of
-from grader.judging.positions.numbers import Printed, clean, printed_numbers, with_decimal_points
+from grader.judging.positions.numbers import SLACK_M, Printed, clean, printed_numbers, with_decimal_points
 from grader.judging.positions.track import Pose, Track, X, Y
 from grader.model.quantities import NS_PER_MS
 from grader.model.trace import ClockKind, LogRecord, OutputLine
@@ -109,13 +109,17 @@ def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
 def _hits(entry: Entry, pairs: Sequence[Pair], track: Track, wanted: Wanted) -> set[Pair]:
     """Return the pairs that show a current pose: both numbers of one and the same."""
     targets = [wanted(track.poses[k]) for k in track.current(entry.t_ns)]
-    firsts = {i: _shown_by(entry.numbers[i], [a for a, _ in targets]) for i in {i for i, _ in pairs}}
-    seconds = {j: _shown_by(entry.numbers[j], [b for _, b in targets]) for j in {j for i, j in pairs if firsts[i]}}
+    wanted_first, wanted_second = [a for a, _ in targets], [b for _, b in targets]
+    firsts = {i: _shown_by(entry.numbers[i], wanted_first) for i in {i for i, _ in pairs}}
+    seconds = {j: _shown_by(entry.numbers[j], wanted_second) for j in {j for i, j in pairs if firsts[i]}}
     return {(i, j) for i, j in pairs if firsts[i] and firsts[i] & seconds[j]}
 
 
 def _shown_by(number: Printed, values: Sequence[float]) -> int:
     """Return as a bit set which of the values the number shows."""
+    far = number.step + SLACK_M
+    if number.value < min(values) - far or number.value > max(values) + far:
+        return 0
     bits = 0
     for place, value in enumerate(values):
         if number.shows(value):
