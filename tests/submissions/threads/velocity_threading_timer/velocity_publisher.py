@@ -1,0 +1,33 @@
+import threading
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.again()
+
+    def again(self):
+        if not rclpy.ok():
+            return
+        t = threading.Timer(0.05, self.again)
+        t.daemon = True
+        t.start()
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+        self.get_logger().info('published')
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    node = VelocityPublisher()
+    rclpy.spin(node)
+
+
+if __name__ == '__main__':
+    main()
