@@ -31,7 +31,6 @@ from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job, Recorder
 from grader.recording.ros_installation import RosInstallation, find_ros
 
-
 #: What reports call a run without walls.
 NO_ISOLATION = "none"
 #: A submission has no more scenarios than this that are worth recording side by side.
@@ -83,15 +82,15 @@ def grade(request: Request, progress: Progress) -> Report:
     ros = find_ros()
     isolation = choose_isolation(request.isolation, ros)
     with (
-        Recorder(isolation, ros.runtime, _domains(isolation), _workers()) as recorder,
         tempfile.TemporaryDirectory(prefix="grade-") as folder,
+        Recorder(isolation, ros.runtime, _domains(isolation), scratch=Path(folder), workers=_workers()) as recorder,
     ):
         progress("reading the submission")
         recorder.warm_up(1)
         exercises = read_exercises(request)
         root = Path(folder) / "submission"
         root.mkdir()
-        Path(folder).chmod(0o755)  # noqa: S103 - a student's process of another user reads the staged copy
+        Path(folder).chmod(0o755)
         submission = stage_submission(request.submission, _wanted(exercises), root)
         odometry = read_recording(request, exercises)
         seed = seed_of(submission.digest) if request.seed is None else request.seed

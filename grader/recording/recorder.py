@@ -12,7 +12,6 @@ import os
 import queue
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,6 +23,7 @@ from typing import Any
 from grader.model.errors import HarnessError
 from grader.model.trace import ClockKind, Trace
 from grader.recording.codec import trace_from_json
+from grader.recording.isolation.environment import quick_discovery, runtime_environment
 from grader.recording.isolation.protocol import Isolation, PythonRuntime
 from grader.recording.plan import Plan, plan_to_json
 
@@ -41,14 +41,15 @@ class WorkerProcess:
         isolation: The tier it runs in, and starts student processes in.
         runtime: Interpreter and ROS.
         domains: Gives the number of a ROS domain that nobody else uses.
+        scratch: A folder for what ROS writes beside its work.
     """
 
-    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int]) -> None:
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
         self._domains = domains
         self._line, theirs = socket.socketpair()
         request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": _runtime_to_json(runtime)}
         argv = [str(runtime.executable), "-s", "-u", "-m", "grader.recording.worker", json.dumps(request)]
-        command = isolation.worker_command(argv, _worker_environment(runtime), (theirs.fileno(),))
+        command = isolation.worker_command(argv, _worker_environment(runtime, scratch), (theirs.fileno(),))
         self._process = subprocess.Popen(
             command.argv,
             env=dict(command.environment),
@@ -112,10 +113,13 @@ class Recorder:
         isolation: The tier.
         runtime: Interpreter and ROS.
         domains: Gives ROS domains, a new one for every scenario.
+        scratch: A folder for what ROS writes beside its work; the caller removes it.
         workers: How many scenarios are recorded at the same time.
     """
 
-    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], workers: int) -> None:
+    def __init__(
+        self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], *, scratch: Path, workers: int
+    ) -> None:
         self._isolation = isolation
         self._runtime = runtime
         self._domains = _Shared(domains)
@@ -124,6 +128,9 @@ class Recorder:
         self._lock = threading.Lock()
         self._closed = False
         self._count = workers
+        self._scratch = scratch
+        # The system ends a worker with the thread that started it: these threads live as long as the recorder.
+        self._pool = ThreadPoolExecutor(workers, thread_name_prefix="recorder")
         for _ in range(workers):
             self._idle.put(None)
 
@@ -137,19 +144,12 @@ class Recorder:
         """Start so many workers now, so that they are ready when the first plan comes."""
         for _ in range(min(count, self._count)):
             self._idle.get()
-            self._idle.put(self._start())
+            self._idle.put(self._start())  # in the caller's thread, which outlives the recorder
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""
-        pool = ThreadPoolExecutor(self._count, thread_name_prefix="recorder")
-        try:
-            futures = [pool.submit(self._record, job, progress) for job in jobs]
-            return [future.result() for future in futures]
-        finally:
-            # After an interruption nobody waits for the scenarios under way: their workers are ended.
-            if sys.exc_info()[0] is not None:
-                self.close()
-            pool.shutdown(wait=True, cancel_futures=True)
+        futures = [self._pool.submit(self._record, job, progress) for job in jobs]
+        return [future.result() for future in futures]
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
         progress(job.title)
@@ -174,7 +174,7 @@ class Recorder:
         with self._lock:
             if self._closed:
                 raise HarnessError("worker: the recorder is closed")
-            worker = WorkerProcess(self._isolation, self._runtime, self._domains)
+            worker = WorkerProcess(self._isolation, self._runtime, self._domains, self._scratch)
             self._alive.append(worker)
             return worker
 
@@ -185,12 +185,13 @@ class Recorder:
                 worker.close()
 
     def close(self) -> None:
-        """End every worker."""
+        """End every worker; what is under way is given up."""
         with self._lock:
             self._closed = True
             alive, self._alive = self._alive, []
         for worker in alive:
             worker.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
 
 
 class _Shared:
@@ -218,25 +219,17 @@ def _runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
     }
 
 
-def _worker_environment(runtime: PythonRuntime) -> Mapping[str, str]:
+def _worker_environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
     """Return the whole environment of a worker: nothing of the caller's but where to find programs."""
+    package_root = Path(__file__).resolve().parents[2]
+    environment = runtime_environment(runtime)
+    python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
     from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
-    environment = {
-        "HOME": "/tmp",  # noqa: S108 - nothing is written there
-        "LANG": "C.UTF-8",
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "LD_LIBRARY_PATH": ":".join(map(str, runtime.library_paths)),
-        "PYTHONPATH": ":".join([*map(str, runtime.python_paths), _package_root()]),
-        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
-        "SKIP_DEFAULT_XML_FILE": "1",
-        "FASTRTPS_DEFAULT_PROFILES_FILE": f"{_package_root()}/grader/host/fastdds.xml",
-        "OPENBLAS_NUM_THREADS": "1",
-        **runtime.environment,
+    return {
+        **environment,
+        **quick_discovery(str(package_root / "grader" / "host")),
+        "PYTHONPATH": os.pathsep.join([*python_paths, str(package_root)]),
+        "HOME": str(scratch),
+        "ROS_LOG_DIR": str(scratch),
         **from_caller,
     }
-    return {name: value for name, value in environment.items() if value}
-
-
-def _package_root() -> str:
-    """Return the folder that holds the grader package, so that a worker runs the same one."""
-    return str(Path(__file__).resolve().parents[2])

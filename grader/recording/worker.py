@@ -17,6 +17,7 @@ from typing import Any
 from grader.model.trace import Trace
 from grader.recording.codec import trace_to_json
 from grader.recording.isolation.choose import isolation_from_name
+from grader.recording.isolation.environment import quick_discovery
 from grader.recording.isolation.protocol import Isolation, Limits, PythonRuntime, StudentProcess
 from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
@@ -94,7 +95,7 @@ class Worker:
                     "ROS_DOMAIN_ID": str(domain),
                     "RCUTILS_CONSOLE_OUTPUT_FORMAT": LOG_FORMAT,
                     "RCUTILS_COLORIZED_OUTPUT": "0",
-                    "FASTRTPS_DEFAULT_PROFILES_FILE": f"{self._isolation.host_seen_at}/fastdds.xml",
+                    **quick_discovery(self._isolation.host_seen_at),
                     "ROS_PYTHON_CHECK_FIELDS": "1",
                     "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
                 },
