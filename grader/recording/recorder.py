@@ -227,7 +227,7 @@ def _worker_environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, s
     from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
     return {
         **environment,
-        **quick_discovery(str(package_root / "grader" / "host")),
+        **quick_discovery(package_root / "grader" / "host", runtime),
         "PYTHONPATH": os.pathsep.join([*python_paths, str(package_root)]),
         "HOME": str(scratch),
         "ROS_LOG_DIR": str(scratch),

@@ -95,7 +95,7 @@ class Worker:
                     "ROS_DOMAIN_ID": str(domain),
                     "RCUTILS_CONSOLE_OUTPUT_FORMAT": LOG_FORMAT,
                     "RCUTILS_COLORIZED_OUTPUT": "0",
-                    **quick_discovery(self._isolation.host_seen_at),
+                    **quick_discovery(self._isolation.host_seen_at, self._runtime),
                     "ROS_PYTHON_CHECK_FIELDS": "1",
                     "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
                 },

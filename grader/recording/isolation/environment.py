@@ -25,15 +25,31 @@ FEW_RESOURCES: Mapping[str, str] = {
 }
 
 
-def quick_discovery(host_folder: str) -> dict[str, str]:
-    """Return the variables that make Fast DDS repeat itself quickly.
+#: ROS releases with Fast DDS 2, whose profiles differ from those of Fast DDS 3 in variable and element names.
+WITH_FAST_DDS_2 = ("humble", "iron", "jazzy")
+
+
+def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
+    """Return the variable that names a Fast DDS profile.
 
     Args:
-        host_folder: Where the process sees the `host` package, which holds the profile.
+        folder: Where the process sees the profiles.
+        name: `NAME.xml` there is for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
+        distro: ROS release, e.g. `jazzy`.
     """
-    # Fast DDS 2 reads the first name, Fast DDS 3 the second.
-    names = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-    return dict.fromkeys(names, f"{host_folder}/fastdds.xml")
+    if distro in WITH_FAST_DDS_2:
+        return {"FASTRTPS_DEFAULT_PROFILES_FILE": f"{folder}/{name}.xml"}
+    return {"FASTDDS_DEFAULT_PROFILES_FILE": f"{folder}/{name}3.xml"}
+
+
+def quick_discovery(host_folder: str | Path, runtime: PythonRuntime) -> dict[str, str]:
+    """Return the variable that makes Fast DDS repeat itself quickly; the profile lies in the `host` package."""
+    return dds_profile(host_folder, "fastdds", distro_of(runtime.environment))
+
+
+def distro_of(environment: Mapping[str, str]) -> str:
+    """Return the ROS release that an environment is for."""
+    return environment.get("ROS_DISTRO", "jazzy")
 
 
 def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:

@@ -12,18 +12,11 @@ from pathlib import Path
 
 import grader
 from grader.model.errors import HarnessError
-from grader.recording.isolation.environment import student_environment
+from grader.recording.isolation.environment import dds_profile, distro_of, student_environment
 from grader.recording.isolation.protocol import Command, Limits, StudentProcess
 
 NAME = "none"
 START = Path(__file__).with_name("plain_start.py")
-
-# There is no network of its own here: Fast DDS keeps to the loopback address, on both sides.
-# Fast DDS 2 reads the first name, Fast DDS 3 the second.
-LOOPBACK_ONLY = {
-    name: str(Path(__file__).with_name("loopback.xml"))
-    for name in ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +50,7 @@ class Plain:
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
         """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
         start = _start("/", made=False, limits={})
-        return Command((*start, *argv), {**environment, **LOOPBACK_ONLY}, tuple(pass_fds))
+        return Command((*start, *argv), {**environment, **_loopback_only(environment)}, tuple(pass_fds))
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process.
@@ -69,9 +62,15 @@ class Plain:
             raise HarnessError("isolation none: expected ROS_DOMAIN_ID for a student's process, found none")
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
         start = _start(str(folder), made=True, limits=_by_resource(limits))
-        environment = {**student_environment(process, folder / "home"), **LOOPBACK_ONLY}
+        environment = student_environment(process, folder / "home")
+        environment |= _loopback_only(environment)
         argv = (*start, str(process.runtime.executable), *process.arguments)
         return Command(argv, environment, tuple(process.pass_fds))
+
+
+def _loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
+    """Keep Fast DDS to the loopback address, on both sides: there is no network of its own here."""
+    return dds_profile(Path(__file__).parent, "loopback", distro_of(environment))
 
 
 def _start(folder: str, *, made: bool, limits: Mapping[str, int]) -> tuple[str, ...]:
