@@ -72,6 +72,7 @@ HONEST = {
     "timer 0.1 s, one behind": timed(right, 0.1, lag=0.001),
     "timer 0.2 s, in step and behind": timed(right, 0.2, phase=0.1, lag=0.2),
     "timer 0.5 s, in step and behind": timed(right, 0.5, lag=0.001),
+    "timer 0.5 s, nearly a period behind": timed(right, 0.5, phase=0.4, lag=0.45),
     "timer 1 s": timed(right, 1.0),
     "timer 1 s, in step and behind": timed(right, 1.0, phase=0.5, lag=0.001),
     "old and new at one instant": each(lambda v: 0.0 if v > 25 else 100.0).add(*each(right).trace().messages()),
