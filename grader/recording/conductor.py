@@ -121,14 +121,14 @@ class Conductor:
             (
                 s
                 for s in self._students
-                if not s.ended and (s.arrivals or (s.wake_ns is not None and s.wake_ns <= self._now_ns))
+                if not s.ended and (s.arrivals or s.nudged or (s.wake_ns is not None and s.wake_ns <= self._now_ns))
             ),
             None,
         )
 
     def _step(self, student: Student) -> None:
         """Tell one process the time and what is on its way, and handle its report."""
-        arrivals, student.arrivals = student.arrivals, {}
+        arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
         self._free_until_ns = self._quiet_until(student)
         free_ns = EPOCH_NS + self._free_until_ns
         student.tell({"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals})
@@ -297,6 +297,7 @@ class Conductor:
         if answer is None or answer.get("kind") != "matched":
             self._bury(student)
             return
+        student.nudged = True  # a match is an event that a node may have a callback for
         for name in answer.get("missing", ()):
             self._notes.append(f"{student.name}: {str(name)[:200]} was not matched in time")
 
