@@ -1,0 +1,29 @@
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.create_timer(0.05, self.tick)
+        self.get_logger().info('started')
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+
+
+def main():
+    rclpy.init()
+    executor = EventsExecutor()
+    executor.add_node(VelocityPublisher())
+    executor.spin()
+
+
+if __name__ == '__main__':
+    main()

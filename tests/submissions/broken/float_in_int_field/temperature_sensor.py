@@ -1,0 +1,29 @@
+import random
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Int32
+
+
+class TemperatureSensor(Node):
+    def __init__(self):
+        super().__init__('temperature_sensor')
+        self.pub = self.create_publisher(Int32, '/temperature', 10)
+        self.create_subscription(Int32, '/fan_speed', self.fan, 10)
+        self.create_timer(0.2, self.tick)
+
+    def tick(self):
+        msg = Int32()
+        msg.data = random.uniform(20.0, 30.0)
+        self.pub.publish(msg)
+
+    def fan(self, msg):
+        self.get_logger().info(f'fan {msg.data}')
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    rclpy.spin(TemperatureSensor())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,30 @@
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.create_timer(0.05, self.tick)
+        self.create_timer(1.0, self.clean_up)
+
+    def clean_up(self):
+        self.get_logger().info('cleaning up')
+        self.destroy_publisher(self.pub)
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(VelocityPublisher())
+
+
+if __name__ == '__main__':
+    main()

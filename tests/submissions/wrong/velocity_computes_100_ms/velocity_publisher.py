@@ -1,0 +1,35 @@
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+import time
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.publisher_ = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.timer_callback)
+
+    def timer_callback(self):
+        end = time.process_time() + 0.1
+        while time.process_time() < end:
+            self.total = sum(i * i for i in range(1000))
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.publisher_.publish(msg)
+        self.get_logger().info('computed')
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    node = VelocityPublisher()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,35 @@
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.publisher_ = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.timer_callback)
+        self.speeds = [0.5] * 120
+        self.n = 0
+
+    def timer_callback(self):
+        msg = Twist()
+        msg.linear.x = self.speeds[self.n]
+        msg.angular.z = 0.1
+        self.publisher_.publish(msg)
+        self.n += 1
+        self.get_logger().info(f'message {self.n}')
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    node = VelocityPublisher()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
