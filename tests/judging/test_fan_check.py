@@ -184,10 +184,10 @@ def test_whole_number_types_are_tried_at_their_own_steps() -> None:
     ],
 )
 def test_no_answer_at_all_is_explained(rec: Recording, said: str) -> None:
-    """Whether it listened, what it published instead, how it ended."""
+    """Whether it listened, what it published instead, how it ended; said once, and the other side waits for it."""
     for finding in both(rec):
         assert finding.credit == 0
-        assert finding.blocked_by is None
+        assert finding.blocked_by == "threshold_response"
         assert said in finding.reason
 
 

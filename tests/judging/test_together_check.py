@@ -151,6 +151,32 @@ def test_policies_that_differ_are_said_exactly() -> None:
     assert "/a offers best_effort reliability, /b asks for reliable: they cannot talk" in reason
 
 
+@pytest.mark.parametrize(
+    ("offered", "said"),
+    [
+        ({"reliability": "best_effort"}, "/b offers best_effort reliability, /a asks for reliable: they cannot talk"),
+        ({"type_": FLOAT64}, "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32: they cannot talk"),
+    ],
+)
+def test_right_answers_that_the_sensor_cannot_hear_are_not_enough(offered: dict[str, str], said: str) -> None:
+    """Each file alone is right, but the two cannot talk in both directions."""
+    rec = each()
+    rec.endpoint("subscription", "/fan_speed", FLOAT32, "/a", 1)
+    rec.endpoint("publisher", "/fan_speed", **{"type_": FLOAT32, **offered}, node="/b", participant=2)
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert said in finding.reason
+
+
+def test_one_way_in_which_the_sensor_hears_the_answers_is_enough() -> None:
+    """A second subscription that does not fit takes nothing away."""
+    rec = each()
+    rec.endpoint("subscription", "/fan_speed", FLOAT32, "/a", 1)
+    rec.endpoint("subscription", "/fan_speed", FLOAT64, "/a", 1)
+    rec.endpoint("publisher", "/fan_speed", FLOAT32, "/b", 2)
+    assert CHECK.judge(rec.trace()).credit == 1
+
+
 def test_silence_is_explained() -> None:
     """No temperature, or no answer."""
     assert "/temperature: no publisher" in CHECK.judge(Recording().trace()).reason

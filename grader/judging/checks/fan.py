@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -62,13 +62,14 @@ class ThresholdResponse:
         inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
-            return self._silent(trace)
+            return self._once(self._silent(trace))
         mine = [h for h in inputs if self._on_side(h.value)]
         if not mine:
             return self._nothing_asked(trace)
         answers = last_of_instant(readings(messages))
         if not answers:
-            return not_met(f"{self.output}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+            type_ = messages[0].type
+            return self._once(not_met(f"{self.output}: {quote(type_)} carries no number", {"type": type_}))
         violations = [v for v in (self._violation(h, answers, trace) for h in mine) if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
@@ -79,6 +80,10 @@ class ThresholdResponse:
         )
         reason += f"{number(self.threshold)}{unit_of(self.input)} ({numbers(h.value for h in mine)})"
         return met(reason, evidence)
+
+    def _once(self, finding: Finding) -> Finding:
+        """Return a finding that says the same about both sides, so that the second waits for the first."""
+        return replace(finding, blocked_by="threshold_response")
 
     def _on_side(self, value: float) -> bool:
         return (value > self.threshold) == (self.side == "above")

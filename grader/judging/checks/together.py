@@ -35,6 +35,8 @@ _RARE = 0.3
 class AnswersTogether:
     """A sensor and a controller talk to each other: each answer fits an input of the moment, and the answers go on.
 
+    Where the sensor subscribes to the answers, types and QoS must let it hear them.
+
     The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
     lie on both sides of the threshold, both answers must occur; an input that never changes shows nothing.
 
@@ -67,6 +69,7 @@ class AnswersTogether:
             or self._stopped_sensor(trace, inputs, evidence)
             or self._stopped_controller(trace, inputs, answers, evidence)
             or self._one_sided(inputs, answers, evidence)
+            or _kept_apart(trace, self.output)
             or self._all_well(inputs, answers, evidence)
         )
 
@@ -189,19 +192,18 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     """Return why the two ends of a topic cannot talk, their types or their QoS; None if they can."""
     publishers = [e for e in student_endpoints(trace, "publisher") if e.topic == topic]
     subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == topic]
-    if not publishers or not subscriptions:
+    pairs = [(p, s) for p in publishers for s in subscriptions if p.participant != s.participant]
+    alike = [(p, s) for p, s in pairs if p.type == s.type]
+    if not pairs or any(_incompatible(p, s) is None for p, s in alike):
         return None
-    here, there = publishers[0], subscriptions[0]
+    here, there = (alike or pairs)[0]
     evidence = {"publisher": [here.node, here.type], "subscription": [there.node, there.type]}
-    if not {e.type for e in publishers} & {e.type for e in subscriptions}:
-        one, other = _speakers(trace, here, there)
+    one, other = _speakers(trace, here, there)
+    policy = _incompatible(here, there)
+    if not alike or policy is None:
         said = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
         return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint)
-    policy = _incompatible(here, there)
-    if policy is None:
-        return None
-    one, other = _speakers(trace, here, there)
     said = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     return not_met(f"{topic}: {said}: they cannot talk", evidence, hint="pass the queue depth 10 as QoS on both sides")
 
