@@ -18,7 +18,7 @@ import grader
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.model.report import Report
 from grader.reports.delivery import FORMATS, Output, deliver, prepared
-from grader.reports.escape import shown
+from grader.reports.escape import encoded, shown
 
 if TYPE_CHECKING:
     from grader.session import Progress
@@ -152,6 +152,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     """
     wanted = prepared((*outputs, Output("json")) if as_json else outputs)
     from grader import session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+    from grader.recording.studio import NO_ISOLATION  # noqa: PLC0415
 
     request = session.Request(
         submission=submission,
@@ -164,15 +165,42 @@ def _grade(  # noqa: PLR0913  one parameter an option
     )
     with _progress(wanted=not no_progress) as progress:
         report = session.grade(request, progress)
-    if isolation == "auto" and report.environment.isolation == session.NO_ISOLATION:
+    if isolation == "auto" and report.environment.isolation == NO_ISOLATION:
         _warn(*report.notes[-1:])
     deliver(report, wanted)
     return exit_code(report, min_score)
 
 
+@click.command(name="observe")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_PATH)
+@click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
+@click.option("--odom-bag", type=_PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(["auto", "none"]), default="auto", help="As for grading.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
+def _observe(  # noqa: PLR0913  one parameter an option
+    *, files: tuple[Path, ...], duration: float, odom_bag: Path | None, clock: str, isolation: str, as_json: bool
+) -> int:
+    """Run nodes together, without a rubric, and say what they do.
+
+    Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
+    """
+    from grader import observing  # noqa: PLC0415  as for grading
+    from grader.reports.observed import render_summary, summary_to_json  # noqa: PLC0415
+
+    request = observing.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
+    with _progress(wanted=True) as progress:
+        summary = observing.observe(request, progress)
+    text = summary_to_json(summary) if as_json else render_summary(summary)
+    sys.stdout.buffer.write(encoded(text, sys.stdout.encoding or "utf-8"))
+    sys.stdout.flush()
+    return ALL_MET
+
+
 #: The command `grade`; further subcommands are added to it.
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
 _grade.context_settings = app.context_settings
+app.add_command(_observe)
 
 
 def main() -> None:

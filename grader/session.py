@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import difflib
-import os
 import platform
-import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -24,17 +22,10 @@ from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.submission import stage_submission
 from grader.recording.bag import Odometry, read_odometry
-from grader.recording.domains import private_domains, shared_domains
-from grader.recording.isolation.choose import choose_isolation
 from grader.recording.isolation.protocol import Isolation
 from grader.recording.plan import plan_scenario, seed_of
-from grader.recording.recorder import Job, Recorder
-from grader.recording.ros_installation import RosInstallation, find_ros
-
-#: What reports call a run without walls.
-NO_ISOLATION = "none"
-#: A submission has no more scenarios than this that are worth recording side by side.
-MOST_WORKERS = 4
+from grader.recording.recorder import Job
+from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,35 +70,26 @@ def grade(request: Request, progress: Progress) -> Report:
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    ros = find_ros()
-    isolation = choose_isolation(request.isolation, ros)
-    with (
-        tempfile.TemporaryDirectory(prefix="grade-") as folder,
-        Recorder(isolation, ros.runtime, _domains(isolation), scratch=Path(folder), workers=_workers()) as recorder,
-    ):
+    with open_studio(request.isolation) as studio:
         progress("reading the submission")
-        recorder.warm_up(1)
         exercises = read_exercises(request)
-        root = Path(folder) / "submission"
+        root = studio.folder / "submission"
         root.mkdir()
-        Path(folder).chmod(0o755)
         submission = stage_submission(request.submission, _wanted(exercises), root)
         odometry = read_recording(request, exercises)
         seed = seed_of(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
-        traces = dict(zip(jobs, recorder.record(list(jobs.values()), progress), strict=True))
-        if request.clock == "auto":
-            traces.update(record_on_wall_clock(jobs, traces, recorder, progress))
+        traces = studio.record(jobs, request.clock, progress)
         reports = tuple(_judge(exercise, traces, submission) for exercise in exercises)
     return Report(
         name=submission.name,
         path=request.submission,
         digest=submission.digest,
-        environment=_environment(ros, isolation),
+        environment=_environment(studio),
         seed=seed,
         exercises=reports,
         duration_s=time.perf_counter() - started,
-        notes=(*submission.notes, *_isolation_notes(isolation)),
+        notes=(*submission.notes, *_isolation_notes(studio.isolation)),
     )
 
 
@@ -136,32 +118,16 @@ def plan_jobs(
     request: Request, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
 ) -> dict[tuple[str, str], Job]:
     """Return what has to be recorded, by exercise and scenario; a scenario with a missing file is left out."""
-    clock = "wall" if request.clock == "wall" else "virtual"
+    clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
             f"exercise {exercise.number}: {scenario.id.replace('_', ' ')}",
-            plan_scenario(exercise, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+            plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
         )
         for exercise in exercises
         for scenario in exercise.scenarios
         if all(submission.files[name].found for name in scenario.processes)
     }
-
-
-def record_on_wall_clock(
-    jobs: Mapping[tuple[str, str], Job],
-    traces: Mapping[tuple[str, str], Trace],
-    recorder: Recorder,
-    progress: Progress,
-) -> dict[tuple[str, str], Trace]:
-    """Record again, one after another, the scenarios to which virtual time does no justice."""
-    again = {}
-    for key, trace in traces.items():
-        if trace.clock_reason and not trace.harness_problem:
-            job = jobs[key]
-            on_wall = Job(f"{job.title}, on the wall clock", replace(job.plan, clock="wall"))
-            again[key] = replace(recorder.record([on_wall], progress)[0], clock_reason=trace.clock_reason)
-    return again
 
 
 def _judge(exercise: Exercise, traces: Mapping[tuple[str, str], Trace], submission: Submission) -> ExerciseReport:
@@ -173,14 +139,6 @@ def _wanted(exercises: Sequence[Exercise]) -> list[str]:
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
 
 
-def _workers() -> int:
-    return min(len(os.sched_getaffinity(0)), MOST_WORKERS)
-
-
-def _domains(isolation: Isolation) -> Iterator[int]:
-    return shared_domains() if isolation.name == NO_ISOLATION else private_domains()
-
-
 def _isolation_notes(isolation: Isolation) -> tuple[str, ...]:
     """Say that the submission ran without walls, and why."""
     if isolation.name != NO_ISOLATION:
@@ -189,12 +147,12 @@ def _isolation_notes(isolation: Isolation) -> tuple[str, ...]:
     return (f"the submission ran without a sandbox: {why or 'as asked'}",)
 
 
-def _environment(ros: RosInstallation, isolation: Isolation) -> Environment:
+def _environment(studio: Studio) -> Environment:
     return Environment(
         grader=grader.__version__,
-        ros_distro=ros.distro,
-        rclpy=ros.rclpy_version,
+        ros_distro=studio.ros.distro,
+        rclpy=studio.ros.rclpy_version,
         rmw="rmw_fastrtps_cpp",
         python=platform.python_version(),
-        isolation=isolation.name,
+        isolation=studio.isolation.name,
     )

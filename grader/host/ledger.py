@@ -16,6 +16,7 @@ from . import originals
 
 #: Topics that every node has; nobody waits for them.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
+BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_service"})
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, a message that was announced is waited for before it is given up as lost.
 ARRIVAL_S = 1.0
@@ -41,6 +42,7 @@ class Ledger:
         self.changed = False
         self.lost: Counter[str] = Counter()
         self.contexts: list[weakref.ref[Any]] = []
+        self._nodes: list[weakref.ref[Any]] = []
 
     def add(self, kind: str, endpoint: Any) -> None:
         """Remember a new endpoint."""
@@ -65,20 +67,33 @@ class Ledger:
                 if endpoint.topic_name in BACKGROUND:
                     continue
                 qos = endpoint.qos_profile
-                claims.append({
-                    "kind": kind,
-                    "name": endpoint.topic_name,
-                    "type": type_name(endpoint.msg_type),
-                    "reliable": _reliable(qos, kind),
-                    "latched": qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-                })
+                claims.append(
+                    {
+                        "kind": kind,
+                        "name": endpoint.topic_name,
+                        "type": type_name(endpoint.msg_type),
+                        "reliable": _reliable(qos, kind),
+                        "latched": qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+                    }
+                )
         claims += [
             {"kind": kind, "name": service_name(endpoint), "type": type_name(endpoint.srv_type)}
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
             if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
         ]
-        return claims
+        return claims + [claim for node in self.nodes() for claim in _parameters(node)]
+
+    def nodes(self) -> list[Any]:
+        """Return the nodes that still exist, oldest first."""
+        alive = (reference() for reference in self._nodes)
+        return [node for node in alive if node is not None and _valid(node)]
+
+    def add_node(self, node: Any) -> None:
+        """Remember a new node and its context."""
+        self._nodes.append(weakref.ref(node))
+        self.contexts.append(weakref.ref(node.context))
+        self.changed = True
 
     def expect(self, arrivals: dict[str, int]) -> None:
         """Add what the grader says is on its way, and wait until it is here."""
@@ -160,6 +175,16 @@ def _valid(endpoint: Any) -> bool:
         return False
 
 
+def _parameters(node: Any) -> list[dict[str, str]]:
+    """Return the parameters that a node has declared, without those that every node has."""
+    own = node.get_fully_qualified_name()
+    return [
+        {"kind": "parameter", "name": f"{own}:{name}", "type": repr(parameter.value)[:200]}
+        for name, parameter in sorted(getattr(node, "_parameters", {}).items())
+        if name not in BACKGROUND_PARAMETERS
+    ]
+
+
 def service_name(endpoint: Any) -> str:
     """Return the resolved name of a service or client."""
     with endpoint.handle:
@@ -193,7 +218,13 @@ def _matches(kind: str, endpoint: Any) -> int:
 
 def _await_ready(receiver: Any, context: Any) -> bool:
     """Wait, in real time, until one message can be taken from a receiver."""
-    kind = "subscription" if hasattr(receiver, "topic_name") else "client" if hasattr(receiver, "call_async") else "service"
+    kind = (
+        "subscription"
+        if hasattr(receiver, "topic_name")
+        else "client"
+        if hasattr(receiver, "call_async")
+        else "service"
+    )
     with context.handle, receiver.handle:
         wait_set = REAL_WAIT_SET(kind == "subscription", 0, 0, kind == "client", kind == "service", 0, context.handle)
         wait_set.clear_entities()

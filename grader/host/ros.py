@@ -258,17 +258,24 @@ def _install_endpoints(ledger: Ledger) -> None:
     }
     for kind, cls in kinds.items():
         _register(ledger, kind, cls)
-    note_nodes(lambda context: ledger.contexts.append(weakref.ref(context)))
+    note_nodes(ledger.add_node)
+    declare = rclpy.node.Node.declare_parameters
+
+    def declared(self: Any, *args: Any, **kwargs: Any) -> Any:
+        ledger.changed = True
+        return declare(self, *args, **kwargs)
+
+    rclpy.node.Node.declare_parameters = functools.wraps(declare)(declared)
 
 
-def note_nodes(note_context: Callable[[Any], None] = lambda _: None) -> None:
-    """Remember every node that is made from now on."""
+def note_nodes(note: Callable[[Any], None] = lambda _: None) -> None:
+    """Remember every node that is made from now on; `note` hears of each when it is complete."""
     create = rclpy.node.Node.__init__
 
     def make_node(self: Any, *args: Any, **kwargs: Any) -> None:
         MADE_NODES.append(weakref.ref(self))
         create(self, *args, **kwargs)
-        note_context(self.context)
+        note(self)
 
     rclpy.node.Node.__init__ = functools.wraps(create)(make_node)
 
@@ -290,8 +297,13 @@ def _register(ledger: Ledger, kind: str, cls: Any) -> None:
 
 def install_looks(clock: VirtualClock) -> None:
     """Let time pass for programs that do nothing but look whether something has happened."""
-    watched = ((rclpy.context.Context, "ok"), (rclpy.task.Future, "done"), (rclpy.client.Client, "service_is_ready"),
-               (rclpy.publisher.Publisher, "get_subscription_count"), (rclpy.subscription.Subscription, "get_publisher_count"))
+    watched = (
+        (rclpy.context.Context, "ok"),
+        (rclpy.task.Future, "done"),
+        (rclpy.client.Client, "service_is_ready"),
+        (rclpy.publisher.Publisher, "get_subscription_count"),
+        (rclpy.subscription.Subscription, "get_publisher_count"),
+    )
     for cls, name in watched:
         original = getattr(cls, name)
 

@@ -150,6 +150,25 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
+class Offer:
+    """What a process says that it offers or uses beside topics; shown to people, never judged.
+
+    Attributes:
+        t_ns: When it said so.
+        process: File name of the student process.
+        kind: `service`, `client` or `parameter`.
+        name: Absolute name; of a parameter `/node:name`.
+        detail: Service type, or the parameter's value.
+    """
+
+    t_ns: int
+    process: str
+    kind: str
+    name: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
 class Mark:
     """A moment of the scenario itself.
 
@@ -161,7 +180,7 @@ class Mark:
     detail: str = ""
 
 
-Observation = Message | Delivery | LogRecord | OutputLine | GraphSnapshot | Fault | Mark
+Observation = Message | Delivery | LogRecord | OutputLine | GraphSnapshot | Fault | Offer | Mark
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from grader.model.trace import (
     Mark,
     Message,
     Observation,
+    Offer,
     OutputLine,
     Trace,
 )
@@ -53,7 +54,7 @@ def observation_to_json(observation: Observation) -> list[Any]:
     if isinstance(observation, Fault):
         fields = [getattr(observation, name) for name in Fault.__slots__]
         return ["fault", *fields[:2], observation.kind.value, *fields[3:6], list(observation.frames)]
-    kinds = {LogRecord: "log", OutputLine: "line", Mark: "mark"}
+    kinds = {LogRecord: "log", OutputLine: "line", Offer: "offer", Mark: "mark"}
     return [kinds[type(observation)], *(getattr(observation, name) for name in type(observation).__slots__)]
 
 
@@ -147,6 +148,12 @@ def _fault(fields: list[Any]) -> Fault:
     )
 
 
+def _offer(fields: list[Any]) -> Offer:
+    t_ns, *texts = fields
+    process, kind, name, detail = map(_text, texts)
+    return Offer(_whole(t_ns), process, kind, name, detail)
+
+
 def _mark(fields: list[Any]) -> Mark:
     t_ns, name, detail = fields
     return Mark(_whole(t_ns), _text(name), _text(detail))
@@ -177,5 +184,6 @@ READERS: Mapping[str, Callable[[list[Any]], Observation]] = {
     "line": _line,
     "graph": _graph,
     "fault": _fault,
+    "offer": _offer,
     "mark": _mark,
 }

@@ -20,6 +20,7 @@ from grader.model.trace import (
     Mark,
     Message,
     Observation,
+    Offer,
     Trace,
 )
 from grader.recording.ending import ending_fault, reported_fault
@@ -189,7 +190,16 @@ class Conductor:
         self._forward(student, sent)
         if isinstance(report.get("endpoints"), list) and report["kind"] == "idle":
             student.claims = [c for c in report["endpoints"] if _is_claim(c)]
+            self._note_offers(student)
             self._match()
+
+    def _note_offers(self, student: Student) -> None:
+        """Write down the services, clients and parameters that a process has not told of before."""
+        for claim in student.claims:
+            offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
+            if claim["kind"] in ("service", "client", "parameter") and offer not in student.offers:
+                student.offers.add(offer)
+                self._observations.append(Offer(self._now_ns, student.name, *offer))
 
     def _collect(self, sent: Mapping[str, int]) -> None:
         """Wait until everything published has been taken here, and write it down."""

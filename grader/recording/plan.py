@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.model.exercise import Exercise
 from grader.model.scenario import Between, JustAbove, JustBelow, NumberSpec, NumberStream, OdometryStream, Scenario
 from grader.model.submission import Submission
 from grader.recording.bag import Odometry, window
@@ -71,19 +70,19 @@ class Plan:
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
-    exercise: Exercise, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
+    exercise: str, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
 ) -> Plan:
     """Return a scenario with every value drawn.
 
     Args:
-        exercise: The exercise it belongs to.
+        exercise: Id of the exercise it belongs to.
         scenario: What to run.
         submission: Whose files run; every process of the scenario has one.
         seed: Every drawn value follows from it, the exercise and the scenario.
         odometry: The recording, if the scenario plays one.
         clock: `virtual` or `wall`.
     """
-    draw = random.Random(derive(seed, "stimuli", exercise.id, scenario.id))  # noqa: S311 - it has to repeat
+    draw = random.Random(derive(seed, "stimuli", exercise, scenario.id))  # noqa: S311 - it has to repeat
     numbers = tuple(_numbers(s, draw) for s in scenario.stimuli if isinstance(s, NumberStream))
     recordings = tuple(
         _recording(s, odometry, draw.getrandbits(32))
@@ -94,7 +93,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         scenario=scenario.id,
         processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
         root=str(submission.root),
-        host_seed=derive(seed, "host", exercise.id, scenario.id),
+        host_seed=derive(seed, "host", exercise, scenario.id),
         duration_ns=scenario.span.duration_ns,
         first_message_on=scenario.span.after_first_message_on or "",
         wait_at_most_ns=scenario.span.wait_at_most_ns,

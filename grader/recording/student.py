@@ -44,6 +44,7 @@ class Student:
         claims: Its endpoints, as it says.
         arrivals: What it has not yet been told is on its way to it.
         told: The counterparts it has been told to wait for.
+        offers: What it has told of services, clients and parameters.
         nudged: Whether it should look again at this instant, because its endpoints were matched.
         ended: Whether it has ended.
         used_ns: Processor time it has used, as it says.
@@ -58,6 +59,7 @@ class Student:
     claims: list[dict[str, Any]] = field(default_factory=list)
     arrivals: dict[str, int] = field(default_factory=dict)
     told: dict[str, dict[str, int]] = field(default_factory=dict)
+    offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False
     ended: bool = False
     used_ns: int = 0

@@ -118,7 +118,7 @@ def _number(value: Fraction | float) -> int | float:
     return int(rounded) if rounded.is_integer() else rounded
 
 
-def _plain(value: object) -> Any:  # noqa: ANN401  JSON values have no narrower type
+def _plain(value: object) -> Any:
     """Return evidence as JSON values; what JSON cannot say becomes text."""
     if isinstance(value, Mapping):
         return {valid_unicode(str(key)): _plain(item) for key, item in value.items()}

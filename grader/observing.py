@@ -1,0 +1,89 @@
+"""Runs nodes without a rubric, and says what they do: what `grade observe` calls."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.judging.summary import summarise
+from grader.model.errors import HarnessError, SubmissionError
+from grader.model.quantities import NS_PER_S
+from grader.model.scenario import OdometryStream, Scenario, Span
+from grader.model.submission import Submission
+from grader.model.summary import Summary
+from grader.reading.submission import stage_submission
+from grader.recording.bag import read_odometry
+from grader.recording.plan import plan_scenario, seed_of
+from grader.recording.recorder import Job
+from grader.recording.studio import open_studio, planned_clock
+from grader.session import Progress
+
+#: When a recording that was named begins to play; so long the nodes see no odometry.
+ODOMETRY_AFTER_NS = NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class ObserveRequest:
+    """What is to be observed, and how.
+
+    Attributes:
+        files: Python files, each of which runs as a process of its own.
+        duration_ns: How long they are observed.
+        odom_bag: An /odom recording to play to them, if any.
+        clock: `virtual`, `wall` or `auto`.
+        isolation: `auto` or `none`.
+    """
+
+    files: tuple[Path, ...]
+    duration_ns: int = 10 * NS_PER_S
+    odom_bag: Path | None = None
+    clock: str = "auto"
+    isolation: str = "auto"
+
+
+def observe(request: ObserveRequest, progress: Progress) -> Summary:
+    """Run the files together and return what they did.
+
+    Raises:
+        GraderError: Something that the run needs cannot be used.
+    """
+    names = _names(request.files)
+    odometry = None if request.odom_bag is None else read_odometry(request.odom_bag)
+    with open_studio(request.isolation) as studio:
+        submission = _stage(request.files, names, studio.folder)
+        stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
+        scenario = Scenario("observed", tuple(names), Span(request.duration_ns), () if odometry is None else (stream,))
+        seed, clock = seed_of(submission.digest), planned_clock(request.clock)
+        plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
+        trace = studio.record({"observed": Job("observing", plan)}, request.clock, progress)["observed"]
+    if trace.harness_problem:
+        raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
+    return summarise(trace, names, studio.isolation.name)
+
+
+def _names(files: tuple[Path, ...]) -> list[str]:
+    """Return the files' names, which must differ; raises SubmissionError for anything but .py files."""
+    for file in files:
+        if not file.is_file() or file.suffix != ".py":
+            raise SubmissionError(f"{file}: expected a .py file, found none", "name the files of the nodes to run")
+    names = [file.name for file in files]
+    for name in names:
+        if names.count(name) > 1:
+            raise SubmissionError(f"{name}: expected different file names, found it twice", "rename one of them")
+    return names
+
+
+def _stage(files: tuple[Path, ...], names: list[str], into: Path) -> Submission:
+    """Stage the folder that holds all files, so that their helper modules are there; a lone file may come alone."""
+    root = into / "submission"
+    root.mkdir()
+    folder = os.path.commonpath([file.resolve().parent for file in files])
+    try:
+        return stage_submission(folder, names, root)
+    except SubmissionError:
+        if len(files) > 1:
+            raise
+    alone = into / "alone"
+    alone.mkdir()
+    return stage_submission(str(files[0]), names, alone)
