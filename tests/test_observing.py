@@ -1,0 +1,100 @@
+"""Looking at nodes without a rubric: the summary of a trace, its text and its JSON, and one real run."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader.judging.summary import summarise
+from grader.model.quantities import NS_PER_MS, NS_PER_S
+from grader.model.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Offer, Trace
+from grader.reports.observed import render_summary, summary_to_json
+
+ROOT = Path(__file__).resolve().parent.parent
+FLOAT = "std_msgs/msg/Float32"
+
+
+def an_end(kind, topic="/t", node="/a"):
+    return Endpoint(kind, topic, FLOAT, node, 0, "reliable", "volatile")
+
+
+def a_trace(*observations, stop_s=10):
+    return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
+
+
+def messages(count, period_ms=100, value=lambda n: float(n)):
+    return [Message(n * period_ms * NS_PER_MS, "/t", FLOAT, {"data": value(n)}) for n in range(count)]
+
+
+def test_a_topic_is_described_by_its_pace_and_its_values():
+    """n - 1 gaps between n messages; numbers by their dotted names, NaN left out."""
+    odd = Message(NS_PER_S, "/t", FLOAT, {"data": float("nan"), "deep": {"x": 1, "flag": True, "list": [5]}})
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    (topic,) = summarise(a_trace(graph, *messages(10), odd), ["a.py"], "none").topics
+    assert (topic.messages, topic.first_s, topic.pace.rate_hz) == (11, 0.0, pytest.approx(10.0))
+    assert (topic.pace.min_s, topic.pace.max_s) == (pytest.approx(0.1), pytest.approx(0.1))
+    assert topic.ranges == {"data": (0.0, 9.0), "deep.x": (1.0, 1.0)}
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_too_few_messages_have_no_pace(count):
+    """No division by nothing; also not for messages of one instant."""
+    graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
+    (topic,) = summarise(a_trace(graph, *messages(count)), ["a.py"], "none").topics
+    assert (topic.pace, topic.messages) == (None, count)
+    (topic,) = summarise(a_trace(graph, *messages(5, period_ms=0)), ["a.py"], "none").topics
+    assert topic.pace is None
+
+
+def test_the_text_says_what_was_seen():
+    """Nodes, topics, who is at which end, services and parameters, records; long lists are cut and counted."""
+    ends = (an_end("publisher"), an_end("subscription", node="/b"))
+    records = [LogRecord(n, "a.py", "INFO", "a", f"line {n}") for n in range(20)]
+    offers = [Offer(0, "a.py", "service", "/go", "std_srvs/srv/Trigger"), Offer(0, "a.py", "parameter", "/a:x", "1.5")]
+    trace = a_trace(GraphSnapshot(0, ("/a", "/b"), ends), *offers, *messages(3), *records)
+    text = render_summary(summarise(trace, ["a.py"], "none"))
+    for line in (
+        "a.py: 10.0 s on the virtual clock",
+        "published by /a (reliable, volatile)",
+        "subscribed by /b (reliable, volatile)",
+        "3 messages, the first at t = 0.000 s; average rate: 10.000 Hz",
+        "data: 0 to 2",
+        "service /go [std_srvs/srv/Trigger]",
+        "parameter /a:x = 1.5",
+        "/a ──/t──▶ /b",
+        "[INFO] [a]: line 0",
+        "and 8 more (--json shows them)",
+    ):
+        assert line in text
+
+
+def test_hostile_text_stays_text():
+    """Nothing a node says can steer the terminal, and the JSON stays valid UTF-8."""
+    record = LogRecord(0, "a.py", "INFO", "a", "\x1b[2J\u202e\udcff")
+    summary = summarise(a_trace(record), ["a.py"], "none")
+    assert not set("\x1b\u202e\udcff") & set(render_summary(summary))
+    assert json.loads(summary_to_json(summary).encode())["records"][0]["severity"] == "INFO"
+
+
+@pytest.mark.ros
+def test_nodes_are_observed_for_real():
+    """Both reference nodes of exercise 3 run together; what they do comes out as JSON and as text."""
+    grade = str(Path(sys.executable).with_name("grade"))
+    files = [str(ROOT / "reference_solutions" / name) for name in ("temperature_sensor.py", "fan_controller.py")]
+    command = [grade, "observe", *files, "--duration", "5"]
+    told = json.loads(subprocess.run([*command, "--json"], check=True, capture_output=True).stdout)
+    assert told["nodes"] == ["/fan_controller", "/temperature_sensor"]
+    assert [(t["name"], round(t["rate_hz"], 6)) for t in told["topics"]] == [("/fan_speed", 5.0), ("/temperature", 5.0)]
+    assert told["faults"] == []
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "/temperature_sensor ──/temperature──▶ /fan_controller" in text
+
+
+def test_a_file_that_is_none_is_one_line():
+    """Exit code 2, the name and what to do; nothing is started."""
+    grade = str(Path(sys.executable).with_name("grade"))
+    done = subprocess.run([grade, "observe", "nope.py"], check=False, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[0] == "error: nope.py: expected a .py file, found none"
