@@ -167,6 +167,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
         report = session.grade(request, progress)
     if isolation == "auto" and report.environment.isolation == NO_ISOLATION:
         _warn(*report.notes[-1:])
+    if report.environment.ros_distro not in session.TRIED_ON:
+        _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted)
     return exit_code(report, min_score)
 

@@ -28,6 +28,10 @@ from grader.recording.recorder import Job
 from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
 
 
+#: ROS releases that the test suite passes on.
+TRIED_ON = ("jazzy", "kilted")
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
     """What is to be graded, and how.
@@ -89,7 +93,7 @@ def grade(request: Request, progress: Progress) -> Report:
         seed=seed,
         exercises=reports,
         duration_s=time.perf_counter() - started,
-        notes=(*submission.notes, *_isolation_notes(studio.isolation)),
+        notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio.isolation)),
     )
 
 
@@ -137,6 +141,13 @@ def _judge(exercise: Exercise, traces: Mapping[tuple[str, str], Trace], submissi
 
 def _wanted(exercises: Sequence[Exercise]) -> list[str]:
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+
+
+def _release_notes(distro: str) -> tuple[str, ...]:
+    """Say that nobody has tried this ROS release with the grader, if so."""
+    if distro in TRIED_ON:
+        return ()
+    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED_ON)}",)
 
 
 def _isolation_notes(isolation: Isolation) -> tuple[str, ...]:

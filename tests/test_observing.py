@@ -24,12 +24,12 @@ def a_trace(*observations, stop_s=10):
     return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
 
 
-def messages(count, period_ms=100, value=lambda n: float(n)):
+def messages(count, period_ms=100, value=float):
     return [Message(n * period_ms * NS_PER_MS, "/t", FLOAT, {"data": value(n)}) for n in range(count)]
 
 
 def test_a_topic_is_described_by_its_pace_and_its_values():
-    """n - 1 gaps between n messages; numbers by their dotted names, NaN left out."""
+    """There are n - 1 gaps between n messages; numbers go by their dotted names, NaN is left out."""
     odd = Message(NS_PER_S, "/t", FLOAT, {"data": float("nan"), "deep": {"x": 1, "flag": True, "list": [5]}})
     graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
     (topic,) = summarise(a_trace(graph, *messages(10), odd), ["a.py"], "none").topics
