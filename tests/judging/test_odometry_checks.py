@@ -118,3 +118,21 @@ def test_a_recording_without_the_silence_cannot_be_judged() -> None:
         WaitsGracefully("odom_subscriber.py", "/odom", 6 * NS_PER_S).judge(position_logs(plain).trace())
     with pytest.raises(HarnessError, match="nothing was played"):
         PERIOD.judge(Trace("alone", ClockKind.VIRTUAL, NS_PER_S, ()))
+
+
+def test_waiting_that_goes_on_as_before_is_no_sign_of_data() -> None:
+    """A node that never spins says that it waits, before the data and after."""
+    rec = driving()
+    for t in range(1, 24):
+        rec.log(float(t), "waiting for odometry", process="odom_subscriber.py")
+    finding = WAITS.judge(rec.trace())
+    assert finding.credit == 0
+    assert finding.blocked_by == "logs_position"
+
+
+def test_a_text_that_was_not_there_before_is_a_sign_of_data() -> None:
+    """Also without a number."""
+    rec = driving()
+    for t in range(1, 24):
+        rec.log(float(t), "waiting" if t < 6 else "odometry received", process="odom_subscriber.py")
+    assert WAITS.judge(rec.trace()).credit == 1

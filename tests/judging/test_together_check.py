@@ -151,6 +151,31 @@ def test_policies_that_differ_are_said_exactly() -> None:
     assert "/a offers best_effort reliability, /b asks for reliable: they cannot talk" in reason
 
 
+def answered(values: list[float]) -> Recording:
+    rec = Recording(20.2, process="temperature_sensor.py")
+    for k, value in enumerate(values):
+        rec.number(0.2 + 0.2 * k, "/temperature", value).number(0.2 + 0.2 * k, "/fan_speed", right(value))
+    return rec
+
+
+@pytest.mark.parametrize("low", [20.0, 0.0, 25.01])
+def test_temperatures_drawn_from_one_side_never_change_the_fan(low: float) -> None:
+    """Every answer is right, but the fan speed never changes."""
+    rng = random.Random(5)
+    finding = CHECK.judge(answered([rng.uniform(low, low + 4.9) for _ in range(100)]).trace())
+    assert finding.credit == 0
+    assert "/fan_speed: never changes, because /temperature stays between" in finding.reason
+
+
+@given(st.integers(0, 10_000), st.floats(0.01, 0.3))
+def test_a_slow_random_walk_need_not_reach_the_threshold(seed: int, step: float) -> None:
+    """It wanders within one side for 20 s, through no fault of its own."""
+    rng = random.Random(seed)
+    values = list(itertools.accumulate((rng.uniform(-step, step) for _ in range(99)), initial=22.0))
+    if max(values) <= 25:
+        assert CHECK.judge(answered(values).trace()).credit == 1
+
+
 @pytest.mark.parametrize(
     ("offered", "said"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -27,6 +28,7 @@ _LONGEST_GAP = 2.2
 #: Share of the messages from which on logs are taken for one a message.
 _ONE_A_MESSAGE = 0.8
 _MOST_IN_EVIDENCE = 60
+_DIGIT = re.compile(r"\d")
 
 
 def _track(trace: Trace, process: str, topic: str) -> Track | Finding:
@@ -244,7 +246,10 @@ class WaitsGracefully:
         return replace(found, location=location)
 
     def _works(self, trace: Trace, first_ns: int) -> Finding:
-        after = min((o.t_ns for o in written(trace, self.process) if o.t_ns >= first_ns), default=None)
+        outputs = written(trace, self.process)
+        before = {o.text for o in outputs if o.t_ns < first_ns and not _DIGIT.search(o.text)}
+        # a text without a number that goes on as before the data is the waiting, not the data
+        after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
             return not_met(f"{alive}, but no sign that the data arrived", blocked_by="logs_position")

@@ -29,6 +29,10 @@ _AGREEING_SHARE_PROMPT = 0.97
 _FEWEST_FOR_SHARE = 10
 #: Share of the inputs on one side up to which an answer to them may be missing where answers are few.
 _RARE = 0.3
+#: Fewest steps that show in which range a sensor draws, and how many usual steps that range holds at most. Independent
+#: draws span 3 to 5 of their steps, a random walk of so many steps spans 10 and more.
+_FEWEST_TO_STAY = 40
+_STEPS_IN_RANGE = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +42,8 @@ class AnswersTogether:
     Where the sensor subscribes to the answers, types and QoS must let it hear them.
 
     The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
-    lie on both sides of the threshold, both answers must occur; an input that never changes shows nothing.
+    lie on both sides of the threshold, both answers must occur. An input that never changes, or that is drawn again and
+    again from one side only, shows nothing; one that wanders too slowly to reach the other side is let pass.
 
     Attributes:
         input: Topic of the sensor.
@@ -164,6 +169,10 @@ class AnswersTogether:
         if len({r.value for r in inputs}) == 1:
             reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
             return not_met(f"{reason}{unit_of(self.input)} all the time", evidence)
+        if len(set(expected)) == 1 and _stays(inputs):
+            low, high = min(r.value for r in inputs), max(r.value for r in inputs)
+            reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
+            return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence)
         # a timer of 1 s may miss what is rare; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w in expected if expected.count(w) > often}
@@ -179,6 +188,13 @@ class AnswersTogether:
             f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
         )
         return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
+
+
+def _stays(inputs: Sequence[Reading]) -> bool:
+    """Return whether the inputs jump about in all of their range, and do not wander slowly towards the rest of it."""
+    steps = [abs(b.value - a.value) for a, b in pairwise(inputs)]
+    values = [r.value for r in inputs]
+    return len(steps) >= _FEWEST_TO_STAY and max(values) - min(values) <= _STEPS_IN_RANGE * statistics.median(steps)
 
 
 def _recent(inputs: Sequence[Reading], t_ns: int) -> list[Reading]:
