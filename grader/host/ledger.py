@@ -49,6 +49,11 @@ class Ledger:
         self._endpoints[kind].append(weakref.ref(endpoint))
         self.changed = True
 
+    def forget(self, endpoint: Any) -> None:
+        """Expect nothing more at an endpoint that is being destroyed."""
+        self._expected.pop(endpoint, None)
+        self.changed = True
+
     def alive(self, kind: str) -> list[Any]:
         """Return the endpoints of a kind that still exist, oldest first."""
         found = []

@@ -108,6 +108,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
         def __init__(self, *counts: Any) -> None:
             super().__init__(*counts)
             self._events = counts[5]
+            self._room = sum(counts[:6])
             self._added: list[tuple[Callable[..., Any], Any]] = []
             self._timers: list[Any] = []
             self._receivers: list[int] = []
@@ -172,6 +173,8 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
                         return
                     wakes = [t for t in (deadline_ns, self._next_timer_ns()) if t is not None]
                     scheduler.pause(min(wakes, default=None), polls=True)
+                if len(self._added) < self._room:
+                    return  # actions add what they wait for behind our back: the executor builds the set anew
                 # Polling has emptied the set of everything that was not ready.
                 super().clear_entities()
                 for add, entity in self._added:
@@ -288,7 +291,7 @@ def _register(ledger: Ledger, kind: str, cls: Any) -> None:
         ledger.add(kind, self)
 
     def destroyed(self: Any) -> None:
-        ledger.changed = True
+        ledger.forget(self)
         destroy(self)
 
     cls.__init__ = functools.wraps(make)(registered)
