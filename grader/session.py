@@ -20,13 +20,13 @@ from grader.model.submission import Submission
 from grader.model.trace import Trace
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
+from grader.reading.sources import read_sources
 from grader.reading.submission import stage_submission
 from grader.recording.bag import Odometry, read_odometry
 from grader.recording.isolation.protocol import Isolation
 from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job
 from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
-
 
 #: ROS releases that the test suite passes on.
 TRIED_ON = ("jazzy", "kilted")
@@ -84,7 +84,8 @@ def grade(request: Request, progress: Progress) -> Report:
         seed = seed_of(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
         traces = studio.record(jobs, request.clock, progress)
-        reports = tuple(_judge(exercise, traces, submission) for exercise in exercises)
+        sources = read_sources(submission)
+        reports = tuple(_judge(exercise, traces, submission, sources) for exercise in exercises)
     return Report(
         name=submission.name,
         path=request.submission,
@@ -134,9 +135,14 @@ def plan_jobs(
     }
 
 
-def _judge(exercise: Exercise, traces: Mapping[tuple[str, str], Trace], submission: Submission) -> ExerciseReport:
+def _judge(
+    exercise: Exercise,
+    traces: Mapping[tuple[str, str], Trace],
+    submission: Submission,
+    sources: Mapping[str, str],
+) -> ExerciseReport:
     own = {scenario: trace for (owner, scenario), trace in traces.items() if owner == exercise.id}
-    return judge_exercise(exercise, own, submission)
+    return judge_exercise(exercise, own, submission, sources)
 
 
 def _wanted(exercises: Sequence[Exercise]) -> list[str]:

@@ -5,21 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from grader.judging.asking import Answer, ask
+from grader.judging.diagnosis.diagnose import diagnose
 from grader.judging.silence import on_student_topic
 from grader.judging.verdicts import Bench
 from grader.model.exercise import Exercise
-from grader.model.report import ExerciseReport, ReportedFault
+from grader.model.report import ExerciseReport, ReportedFault, Verdict
 from grader.model.submission import Submission
 from grader.model.trace import ClockKind, Fault, GraphSnapshot, Trace
 
 
-def judge_exercise(exercise: Exercise, traces: Mapping[str, Trace], submission: Submission) -> ExerciseReport:
+def judge_exercise(
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None = None,
+) -> ExerciseReport:
     """Return the report of one exercise; pure.
 
     Args:
         exercise: What is asked.
         traces: Scenario id -> what was recorded; scenarios with a missing file have none.
         submission: Says which files were found, and what was found instead.
+        sources: Wanted file name -> its text, to find the causes of lost points in; None leaves them unexplained.
 
     One cause costs one criterion: a criterion that fails for a file, a fault or another criterion that has been named
     before is blocked by it, not lost once more. A check that raises, and a recording that failed, leave a criterion
@@ -36,11 +43,21 @@ def judge_exercise(exercise: Exercise, traces: Mapping[str, Trace], submission: 
         required=exercise.required,
         clock=ClockKind.WALL if reasons else ClockKind.VIRTUAL,
         clock_reason=next((r for r in reasons if r), ""),
-        verdicts=bench.verdicts(),
+        verdicts=_explained(bench.verdicts(), exercise, traces, submission, sources),
         faults=_faults(recorded),
         notes=tuple(dict.fromkeys(note for _, t in recorded for note in t.notes)),
         graph=_graph(exercise, traces),
     )
+
+
+def _explained(
+    verdicts: tuple[Verdict, ...],
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None,
+) -> tuple[Verdict, ...]:
+    return verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:

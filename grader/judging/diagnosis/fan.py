@@ -1,0 +1,270 @@
+"""Causes behind a controller that answers wrongly: the comparison, the numbers, or an answer that is not sent."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.diagnosis.constants import Constant, constant
+from grader.judging.diagnosis.fields import given_leaf
+from grader.judging.diagnosis.silence import silent_topic
+from grader.judging.diagnosis.source import Source, chain, last_name, subtree
+from grader.judging.diagnosis.wiring import made_for, publish_calls, reached, roots
+from grader.judging.values import published, readings
+from grader.judging.wording import number
+from grader.model.quantities import within
+
+_EXACT = 1e-6
+_ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)
+
+
+@dataclass(frozen=True, slots=True)
+class _Switch:
+    """One comparison with a number, turned so that the number stands on the right."""
+
+    node: ast.Compare
+    op: ast.cmpop
+    limit: Constant
+    tested: ast.expr
+
+
+def _controller(case: Case) -> tuple[Source, ThresholdResponse | AnswersTogether] | None:
+    """Return the controller's source, if it answers at all."""
+    check = case.criterion.check
+    if not isinstance(check, (ThresholdResponse, AnswersTogether)) or case.fault is not None or silent_topic(case):
+        return None
+    if isinstance(check, AnswersTogether) and "never changes, because" in case.verdict.reason:
+        return None
+    owners = [s for s in case.sources.values() if made_for(s, "publisher", check.output) is not None]
+    return (owners[0], check) if len(owners) == 1 else None
+
+
+def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
+    """Return the comparisons with one number, with that limit if one is given."""
+    found = []
+    for node in source.all(ast.Compare):
+        if len(node.ops) != 1:
+            continue
+        left, right = constant(source, node.left), constant(source, node.comparators[0])
+        op: ast.cmpop = node.ops[0]
+        if right is not None and left is None and isinstance(op, _ORDERS):
+            found.append(_Switch(node, op, right, node.left))
+        elif left is not None and right is None and isinstance(op, _ORDERS):
+            found.append(_Switch(node, _turned(op), left, node.comparators[0]))
+    return [s for s in found if limit is None or within(s.limit.value, limit, _EXACT)]
+
+
+def _turned(op: ast.cmpop) -> ast.cmpop:
+    return {ast.Gt: ast.Lt(), ast.GtE: ast.LtE(), ast.Lt: ast.Gt(), ast.LtE: ast.GtE()}.get(type(op), op)
+
+
+def _rows(case: Case) -> list[tuple[float, float | None, float]]:
+    """Return (input, answer, expected) of each input that was held."""
+    rows = case.evidence("rows")
+    good = [r for r in rows if isinstance(r, (list, tuple)) and len(r) == 4] if isinstance(rows, (list, tuple)) else []
+    return [(float(r[1]), None if r[2] is None else float(r[2]), float(r[3])) for r in good]
+
+
+def _wrong_inputs(case: Case) -> list[float]:
+    return [v for v, got, want in _rows(case) if got is None or not within(got, want, _EXACT)]
+
+
+def _at_the_threshold(case: Case) -> Clue | None:
+    """Only the threshold itself is answered wrongly."""
+    found = _controller(case)
+    if found is None or not isinstance(found[1], ThresholdResponse):
+        return None
+    source, check = found
+    wrong = _wrong_inputs(case)
+    if not wrong or any(not within(v, check.threshold, _EXACT) for v in wrong):
+        return None
+    for switch in _switches(source, check.threshold):
+        code = source.code(switch.node, 40)
+        if isinstance(switch.op, ast.GtE):
+            hint = f"{code} is true at exactly {number(check.threshold)}: write > instead of >="
+            return Clue(hint, source.place(switch.node))
+        if isinstance(switch.op, ast.Lt):
+            hint = f"{code} is false at exactly {number(check.threshold)}: write <= instead of <"
+            return Clue(hint, source.place(switch.node))
+    return None
+
+
+def _inverted(case: Case) -> Clue | None:
+    """The answers are the wrong way round."""
+    found = _controller(case)
+    if found is None or not isinstance(found[1], ThresholdResponse):
+        return None
+    source, check = found
+    away = [(v, got) for v, got, _ in _rows(case) if not within(v, check.threshold, _EXACT) and got is not None]
+    flipped = [within(got, check.otherwise if v > check.threshold else check.above, _EXACT) for v, got in away]
+    both = len({v > check.threshold for v, _ in away}) == 2
+    switches = _switches(source, check.threshold)
+    if not both or not all(flipped) or len(switches) != 1:
+        return None
+    code = source.code(switches[0].node, 40)
+    limit = number(check.threshold)
+    hint = f"the branches of {code} are the wrong way round: {number(check.above)} belongs above {limit}"
+    return Clue(f"{hint}, {number(check.otherwise)} at or below it", source.place(switches[0].node), key="inverted")
+
+
+def _rounded(case: Case) -> Clue | None:
+    """The input is cut or rounded before it is compared."""
+    found = _controller(case)
+    if found is None or not isinstance(found[1], ThresholdResponse):
+        return None
+    source, check = found
+    wrong = _wrong_inputs(case)
+    if not wrong or any(not 0 < abs(v - check.threshold) < 1 for v in wrong):
+        return None
+    for switch in _switches(source, check.threshold):
+        calls = [n for n in subtree(switch.tested) if isinstance(n, ast.Call)]
+        calls = [c for c in calls if last_name(c.func) in ("int", "round", "floor", "ceil", "trunc")]
+        if calls:
+            hint = (
+                f"{source.code(calls[0], 40)} changes values near {number(check.threshold)}: compare the value itself"
+            )
+            return Clue(hint, source.place(switch.node), key="rounded")
+    return None
+
+
+def _other_threshold(case: Case) -> Clue | None:
+    found = _controller(case)
+    if found is None or not isinstance(found[1], ThresholdResponse):
+        return None
+    source, check = found
+    others = [s for s in _switches(source) if 0 < abs(s.limit.value - check.threshold) <= 10 and s.limit.value > 1]
+    wrong = _wrong_inputs(case)
+    if _switches(source, check.threshold) or len(others) != 1 or not wrong:
+        return None
+    lower, upper = sorted((check.threshold, others[0].limit.value))
+    if any(not lower - _EXACT <= v <= upper + _EXACT for v in wrong):
+        return None
+    hint = f"{source.code(others[0].node, 40)} compares with {number(others[0].limit.value)}: the limit is "
+    return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
+
+
+def _wrong_answer(case: Case) -> Clue | None:
+    """A number is sent that the exercise does not know."""
+    found = _controller(case)
+    if found is None:
+        return None
+    source, check = found
+    strange = {r.value for r in readings(published(case.trace, check.output))}
+    strange -= {check.above, check.otherwise}
+    if len(strange) != 1:
+        return None
+    value = next(iter(strange))
+    if isinstance(check, ThresholdResponse):
+        sides = {want for _, got, want in _rows(case) if got is not None and within(got, value, _EXACT)}
+        wanted = number(next(iter(sides))) if len(sides) == 1 else f"{number(check.above)} or {number(check.otherwise)}"
+    else:
+        wanted = f"{number(check.above)} or {number(check.otherwise)}"
+    places = [n for n in _answers(source) if _is_worth(source, n, value)]
+    if len(places) != 1:
+        return None
+    hint = f"{source.code(places[0])} answers {number(value)}: it must be {wanted}"
+    return Clue(hint, source.place(places[0]), key=f"answer:{number(value)}")
+
+
+def _answers(source: Source) -> list[ast.AST]:
+    """Return the places at which an answer is chosen: assignments, arguments and the arms of conditionals."""
+    places: list[ast.AST] = list(given_leaf(source, "data"))
+    places += [a for a in source.all(ast.Assign) if a not in places and len(a.targets) == 1]
+    places += [arm for e in source.all(ast.IfExp) for arm in (e.body, e.orelse)]
+    return places
+
+
+def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
+    expression = node.value if isinstance(node, (ast.Assign, ast.keyword)) else node
+    if not isinstance(expression, ast.expr):
+        return False
+    # the number itself, not another name for it: else one mistake is seen at two places
+    worth = constant(source, expression) if not isinstance(expression, (ast.Name, ast.Attribute)) else None
+    return worth is not None and within(worth.value, value, _EXACT)
+
+
+def _one_branch(case: Case) -> Clue | None:
+    """An answer is sent on one side of the threshold only."""
+    found = _controller(case)
+    if found is None:
+        return None
+    source, check = found
+    given = {r.value for r in readings(published(case.trace, check.output))}
+    item = made_for(source, "publisher", check.output)
+    if given not in ({check.above}, {check.otherwise}):
+        return None
+    for call in publish_calls(source, item):
+        tests = [n for n in source.around(call) if isinstance(n, ast.If)]
+        if len(tests) == 1 and not tests[0].orelse and _tests_threshold(source, tests[0].test, check.threshold):
+            missing = next(v for v in (check.above, check.otherwise) if v not in given)
+            hint = f"{source.code(call)} runs only under 'if {source.code(tests[0].test, 40)}'"
+            return Clue(f"{hint}: publish {number(missing)} otherwise", source.place(tests[0]), key="one_branch")
+    return None
+
+
+def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
+    inside = set(subtree(test))
+    return any(s.node in inside for s in _switches(source, threshold))
+
+
+def _latched(case: Case) -> Clue | None:
+    """Something is set on one side of the threshold, and nothing ever takes it back."""
+    found = _controller(case)
+    if found is None:
+        return None
+    source, check = found
+    item = made_for(source, "subscription", check.input)
+    inside: Iterable[ast.AST] = list(reached(source, roots(source, item.callback))) if item is not None else []
+    for node in inside:
+        if not isinstance(node, ast.If) or node.orelse:
+            continue
+        stores = [n for s in node.body for n in subtree(s) if isinstance(n, ast.Attribute)]
+        kept = [n for n in stores if isinstance(n.ctx, ast.Store) and chain(n) == f"self.{n.attr}"]
+        for store in kept:
+            others = [n for n in source.stores(chain(store)) if n is not store and not _in_constructor(source, n)]
+            read = any(chain(n) == chain(store) and isinstance(n.ctx, ast.Load) for n in source.all(ast.Attribute))
+            once = _asks_none(node.test, chain(store)) or _tests_threshold(source, node.test, check.threshold)
+            if not others and read and once:
+                hint = f"{chain(store)} is set under 'if {source.code(node.test, 40)}' and never again"
+                return Clue(f"{hint}: decide anew for each value", source.place(node), key="latched")
+    return None
+
+
+def _in_constructor(source: Source, node: ast.AST) -> bool:
+    function = source.function_of(node)
+    return function is not None and function.name == "__init__"
+
+
+def _asks_none(test: ast.expr, name: str) -> bool:
+    if isinstance(test, ast.Compare) and chain(test.left) == name:
+        return any(isinstance(c, ast.Constant) and c.value is None for c in test.comparators)
+    return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) and chain(test.operand) == name
+
+
+def _no_number(case: Case) -> Clue | None:
+    """Answers in a type that carries no number."""
+    found = _controller(case)
+    if found is None or "carries no number" not in case.verdict.reason:
+        return None
+    source, check = found
+    item = made_for(source, "publisher", check.output)
+    if item is None:
+        return None
+    hint = f"{source.code(item.call)}: {item.type} carries no number, use a numeric type such as Float32"
+    return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
+
+
+FAN = (
+    Cause("answer_without_number", _no_number),
+    Cause("at_the_threshold", _at_the_threshold),
+    Cause("inverted", _inverted),
+    Cause("rounded", _rounded),
+    Cause("other_threshold", _other_threshold),
+    Cause("wrong_answer", _wrong_answer),
+    Cause("one_branch", _one_branch),
+    Cause("latched", _latched),
+)

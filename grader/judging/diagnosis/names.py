@@ -1,0 +1,196 @@
+"""Names that students need and misspell: what is imported from where, and what Node and messages have."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+#: Message and service packages that exist where submissions run.
+PACKAGES = (
+    "std_msgs",
+    "geometry_msgs",
+    "nav_msgs",
+    "sensor_msgs",
+    "std_srvs",
+    "builtin_interfaces",
+    "action_msgs",
+    "actionlib_msgs",
+    "diagnostic_msgs",
+    "lifecycle_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "service_msgs",
+    "shape_msgs",
+    "stereo_msgs",
+    "trajectory_msgs",
+    "unique_identifier_msgs",
+    "visualization_msgs",
+)
+#: What exists under ROS 1 only, and what takes its place.
+ROS_1 = {
+    "rospy": "rclpy",
+    "roslib": "rclpy",
+    "roscpp": "rclpy",
+    "rosgraph": "rclpy",
+    "actionlib": "rclpy.action",
+    "dynamic_reconfigure": "ROS 2 parameters: declare_parameter",
+}
+ROS_1_CALLS = {
+    "Publisher": "self.create_publisher",
+    "Subscriber": "self.create_subscription",
+    "Timer": "self.create_timer",
+    "Rate": "self.create_timer",
+    "init_node": "rclpy.init and a Node",
+    "spin": "rclpy.spin",
+    "loginfo": "self.get_logger().info",
+    "is_shutdown": "rclpy.ok",
+    "Service": "self.create_service",
+    "get_param": "self.get_parameter",
+}
+#: Read-only properties of Node.
+NODE_PROPERTIES = (
+    "publishers",
+    "subscriptions",
+    "clients",
+    "services",
+    "timers",
+    "guards",
+    "waitables",
+    "executor",
+    "context",
+    "handle",
+    "default_callback_group",
+)
+#: Methods of Node that students call.
+NODE_METHODS = (
+    "create_publisher",
+    "create_subscription",
+    "create_timer",
+    "create_rate",
+    "create_client",
+    "create_service",
+    "create_guard_condition",
+    "destroy_node",
+    "destroy_timer",
+    "destroy_publisher",
+    "destroy_subscription",
+    "get_logger",
+    "get_clock",
+    "get_name",
+    "get_namespace",
+    "get_parameter",
+    "declare_parameter",
+    "declare_parameters",
+    "set_parameters",
+    "add_on_set_parameters_callback",
+    "count_publishers",
+    "count_subscribers",
+    "get_topic_names_and_types",
+)
+RCLPY = (
+    "init",
+    "spin",
+    "spin_once",
+    "spin_until_future_complete",
+    "shutdown",
+    "try_shutdown",
+    "ok",
+    "create_node",
+    "get_default_context",
+    "get_global_executor",
+)
+PUBLISHER = ("publish", "get_subscription_count", "wait_for_all_acked", "destroy", "assert_liveliness")
+LOGGER = ("debug", "info", "warning", "warn", "error", "fatal", "set_level", "get_child", "log", "get_effective_level")
+
+_STD = "Bool Byte Char Empty Float32 Float64 Header Int8 Int16 Int32 Int64 UInt8 UInt16 UInt32 UInt64 String ColorRGBA "
+_STD += "Float32MultiArray Float64MultiArray Int32MultiArray"
+_GEOMETRY = "Accel Point Point32 PointStamped Polygon Pose Pose2D PoseArray PoseStamped PoseWithCovariance Quaternion "
+_GEOMETRY += "PoseWithCovarianceStamped Transform TransformStamped Twist TwistStamped TwistWithCovariance Vector3 "
+_GEOMETRY += "Vector3Stamped Wrench QuaternionStamped"
+_SENSOR = "BatteryState CameraInfo CompressedImage FluidPressure Illuminance Image Imu JointState Joy LaserScan "
+_SENSOR += "MagneticField NavSatFix PointCloud2 Range RelativeHumidity Temperature"
+_QOS = "QoSProfile ReliabilityPolicy DurabilityPolicy HistoryPolicy LivelinessPolicy QoSReliabilityPolicy "
+_QOS += "QoSDurabilityPolicy QoSHistoryPolicy qos_profile_sensor_data qos_profile_system_default"
+#: Names by the module that has them.
+MODULES = {
+    "std_msgs.msg": tuple(_STD.split()),
+    "geometry_msgs.msg": tuple(_GEOMETRY.split()),
+    "nav_msgs.msg": ("Odometry", "Path", "OccupancyGrid", "MapMetaData", "GridCells"),
+    "sensor_msgs.msg": tuple(_SENSOR.split()),
+    "std_srvs.srv": ("SetBool", "Trigger"),
+    "builtin_interfaces.msg": ("Time", "Duration"),
+    "rclpy.node": ("Node",),
+    "rclpy.qos": tuple(_QOS.split()),
+    "rclpy.executors": ("SingleThreadedExecutor", "MultiThreadedExecutor", "ExternalShutdownException"),
+    "rclpy.callback_groups": ("ReentrantCallbackGroup", "MutuallyExclusiveCallbackGroup"),
+    "rclpy.duration": ("Duration",),
+    "rclpy.time": ("Time",),
+    "rclpy.clock": ("Clock", "ClockType"),
+    "rclpy.parameter": ("Parameter",),
+    "rclpy.logging": ("get_logger", "LoggingSeverity"),
+    "rclpy.exceptions": ("ParameterNotDeclaredException",),
+    "threading": ("Thread", "Event", "Lock"),
+    "functools": ("partial",),
+    "datetime": ("datetime", "timedelta"),
+}
+#: Modules that are imported by their own name.
+PLAIN_MODULES = ("rclpy", "time", "math", "random", "sys", "os", "threading", "datetime", "functools", "json", "signal")
+_ALIASES = {"np": "import numpy as np", "numpy": "import numpy", "sleep": "from time import sleep"}
+_ALIASES |= {"uniform": "from random import uniform", "randint": "from random import randint"}
+
+#: How to come to a field that people look for in the wrong message.
+FIELDS = {
+    ("PoseWithCovariance", "position"): "msg.pose.pose.position",
+    ("PoseWithCovariance", "orientation"): "msg.pose.pose.orientation",
+    ("Odometry", "position"): "msg.pose.pose.position",
+    ("Odometry", "orientation"): "msg.pose.pose.orientation",
+    ("Odometry", "x"): "msg.pose.pose.position.x",
+    ("Odometry", "y"): "msg.pose.pose.position.y",
+    ("Odometry", "linear"): "msg.twist.twist.linear",
+    ("Odometry", "angular"): "msg.twist.twist.angular",
+    ("Odometry", "data"): "msg.pose.pose.position",
+    ("Pose", "x"): "msg.pose.pose.position.x",
+    ("Pose", "y"): "msg.pose.pose.position.y",
+    ("PoseWithCovariance", "x"): "msg.pose.pose.position.x",
+    ("PoseWithCovariance", "y"): "msg.pose.pose.position.y",
+    ("TwistWithCovariance", "linear"): "msg.twist.twist.linear",
+    ("TwistWithCovariance", "angular"): "msg.twist.twist.angular",
+    ("Twist", "x"): "msg.linear.x",
+    ("Twist", "y"): "msg.linear.y",
+    ("Twist", "z"): "msg.angular.z",
+    ("Temperature", "data"): "msg.temperature",
+}
+_NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "String")
+#: Fields of the messages that the exercises use.
+MESSAGE_FIELDS = {
+    "Twist": ("linear", "angular"),
+    "Vector3": ("x", "y", "z"),
+    "Point": ("x", "y", "z"),
+    "Quaternion": ("x", "y", "z", "w"),
+    "Odometry": ("header", "child_frame_id", "pose", "twist"),
+    "PoseWithCovariance": ("pose", "covariance"),
+    "TwistWithCovariance": ("twist", "covariance"),
+    "Pose": ("position", "orientation"),
+    "Temperature": ("header", "temperature", "variance"),
+    **dict.fromkeys(_NUMBERS, ("data",)),
+}
+
+
+def import_of(name: str) -> str:
+    """Return the line that imports a name; empty if several or none do."""
+    if name in _ALIASES:
+        return _ALIASES[name]
+    if name in PLAIN_MODULES:
+        return f"import {name}"
+    if name in PACKAGES:
+        return ""
+    homes = [module for module, names in MODULES.items() if name in names]
+    return f"from {homes[0]} import {name}" if len(homes) == 1 else ""
+
+
+def closest(name: str, candidates: Iterable[str], cutoff: float = 0.75) -> str:
+    """Return the candidate that a name is very likely a slip for; empty if none is."""
+    name = name[:80]
+    plain = {c.lower().replace("_", ""): c for c in sorted(set(candidates) - {name}) if len(c) <= 80}
+    found = difflib.get_close_matches(name.lower().replace("_", ""), plain, n=1, cutoff=cutoff)
+    return plain[found[0]] if found else ""

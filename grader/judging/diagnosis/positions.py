@@ -1,0 +1,157 @@
+"""Causes behind wrong position logs: the attribute that is read instead, or the assignment that mixes things up."""
+
+from __future__ import annotations
+
+import ast
+
+from grader.judging.checks.odometry import LogsPosition
+from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.diagnosis.logs import position_log
+from grader.judging.diagnosis.source import Source, chain, first_line, last_name
+from grader.judging.diagnosis.wiring import made, reached, roots
+from grader.model.exercise import Outcome
+
+_POSITION = "msg.pose.pose.position"
+
+
+def _found(case: Case, *causes: str) -> Source | None:
+    """Return the source if the check found one of these things in the logs."""
+    check = case.criterion.check
+    lost = isinstance(check, LogsPosition) and case.verdict.outcome is Outcome.NOT_MET and case.fault is None
+    return case.source if lost and case.evidence("cause") in causes else None
+
+
+def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
+    """Return the outermost reads of attributes whose dotted name has a part."""
+    found = []
+    for node in source.all(ast.Attribute):
+        whole = not isinstance(source.parents.get(node), ast.Attribute)
+        dotted = f"{chain(node)}."
+        if whole and isinstance(node.ctx, ast.Load) and any(f".{part}." in dotted for part in parts):
+            found.append(node)
+    return found
+
+
+def _other_part(case: Case) -> Clue | None:
+    """The velocity or the orientation is read instead of the position."""
+    for name, parts in (("twist", ("twist",)), ("orientation", ("orientation",)), ("constant", ("orientation",))):
+        source = _found(case, name)
+        reads = _reads(source, *parts) if source is not None else []
+        if source is None or not reads or (name == "constant" and _reads(source, "position")):
+            continue
+        what = "velocity" if name == "twist" else "orientation"
+        hint = f"{source.code(reads[0], 50)} is the {what}: the position is {_POSITION}.x and .y"
+        return Clue(hint, source.place(reads[0]))
+    return None
+
+
+def _swapped(case: Case) -> Clue | None:
+    source = _found(case, "swapped")
+    if source is None:
+        return None
+    for statement in source.all(ast.Assign):
+        target, value = chain(statement.targets[0]), chain(statement.value)
+        if "." in value and {_axis(target), _axis(value)} == {"x", "y"}:
+            hint = f"{source.code(statement)} mixes up x and y"
+            return Clue(hint, source.place(statement))
+        clue = _swapped_pair(source, statement)
+        if clue is not None:
+            return clue
+    call = position_log(case)
+    if call is None or _order_in(call)[:2] != ["y", "x"]:
+        return None
+    return Clue(f"y stands before x in {source.code(call, 60)}", source.place(call))
+
+
+def _axis(name: str) -> str:
+    last = name.rpartition(".")[2].strip("_").lower()
+    ends = last.rpartition("_")[2]
+    return ends if ends in ("x", "y") else (last[-1:] if last in ("px", "py", "posx", "posy") else "")
+
+
+def _swapped_pair(source: Source, statement: ast.Assign) -> Clue | None:
+    """`x, y = p.y, p.x`."""
+    target, value = statement.targets[0], statement.value
+    if not isinstance(target, ast.Tuple) or not isinstance(value, ast.Tuple):
+        return None
+    left = [_axis(chain(e)) for e in target.elts]
+    right = [_axis(chain(e)) for e in value.elts]
+    if left == ["x", "y"] and right == ["y", "x"]:
+        return Clue(f"{source.code(statement)} mixes up x and y", source.place(statement))
+    return None
+
+
+def _order_in(call: ast.Call) -> list[str]:
+    """Return in which order a log names things that end in x or y."""
+    reads = [n for a in call.args for n in ast.walk(a) if isinstance(n, (ast.Attribute, ast.Name)) and _axis(chain(n))]
+    whole = [n for n in reads if not isinstance(n, ast.Name) or n.id in ("x", "y")]
+    places = sorted(whole, key=lambda n: (first_line(n), n.col_offset))
+    return [_axis(chain(n)) for n in places]
+
+
+def _no_sign(case: Case) -> Clue | None:
+    """`abs()` takes the sign away."""
+    source = _found(case, "wrong", "sign", "no_sign", "abs")
+    call = position_log(case) if source is not None else None
+    if source is None or call is None:
+        return None
+    function = source.function_of(call)
+    calls = [c for c in source.all(ast.Call) if last_name(c.func) in ("abs", "fabs") and len(c.args) == 1]
+    near = [c for c in calls if source.function_of(c) is function or "pos" in source.code(c)]
+    if not near:
+        return None
+    return Clue(f"{source.code(near[0])} takes the sign away: log the number as it is", source.place(near[0]))
+
+
+def _wrong_axis(case: Case) -> Clue | None:
+    """Z in the place of y, or one number only."""
+    source = _found(case, "no_y", "no_x")
+    if source is not None:
+        reads = [n for n in source.all(ast.Attribute) if n.attr == "z" and isinstance(n.ctx, ast.Load)]
+        missing = "y" if case.evidence("cause") == "no_y" else "x"
+        if len(reads) == 1:
+            hint = f"{source.code(reads[0], 50)} is the height: {missing} of the position is asked for"
+            return Clue(hint, source.place(reads[0]))
+        return None
+    source = _found(case, "only_x", "only_y")
+    call = position_log(case) if source is not None else None
+    if source is None or call is None:
+        return None
+    missing = "y" if case.evidence("cause") == "only_x" else "x"
+    return Clue(f"{source.code(call, 60)} shows one number: log {_POSITION}.{missing} too", source.place(call))
+
+
+def _kept_first(case: Case) -> Clue | None:
+    """The callback stores a position only while there is none."""
+    source = _found(case, "first_value")
+    if source is None:
+        return None
+    for item in made(source, "subscription"):
+        for node in reached(source, roots(source, item.callback)):
+            if isinstance(node, ast.If) and _asks_for_none(node.test) and _stores(node):
+                hint = f"under 'if {source.code(node.test, 40)}' only the first message is stored: store each one"
+                return Clue(hint, source.place(node))
+    return None
+
+
+def _asks_for_none(test: ast.expr) -> bool:
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        return True
+    none = isinstance(test, ast.Compare) and any(
+        isinstance(c, ast.Constant) and c.value is None for c in test.comparators
+    )
+    return none and isinstance(test, ast.Compare) and isinstance(test.ops[0], (ast.Is, ast.Eq))
+
+
+def _stores(node: ast.If) -> bool:
+    stored = (n for s in node.body for n in ast.walk(s) if isinstance(n, ast.Attribute))
+    return not node.orelse and any(isinstance(n.ctx, ast.Store) for n in stored)
+
+
+POSITIONS = (
+    Cause("other_part", _other_part),
+    Cause("swapped_axes", _swapped),
+    Cause("no_sign", _no_sign),
+    Cause("wrong_axis", _wrong_axis),
+    Cause("kept_first", _kept_first),
+)

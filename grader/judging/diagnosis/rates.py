@@ -1,0 +1,236 @@
+"""Causes behind a wrong rate: a period in the wrong unit, a callback that is held up, a loop without a pace."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from grader.judging.checks.rate import TopicRate
+from grader.judging.diagnosis.case import Case, Cause, Clue, lines_of
+from grader.judging.diagnosis.constants import Constant, constant
+from grader.judging.diagnosis.endings import head_of
+from grader.judging.diagnosis.silence import silent_topic, timer_code
+from grader.judging.diagnosis.source import Loop, Source, argument, chain, first_line, last_name
+from grader.judging.diagnosis.wiring import Made, made, made_for, publish_calls, reached, roots
+from grader.judging.wording import number
+
+#: How far the rate that the text gives may lie from the measured one.
+_SAME = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class _Paced:
+    """A rate that was asked for and another that was found, with the calls that publish."""
+
+    source: Source
+    calls: Sequence[ast.Call]
+    wanted_hz: float
+    found_hz: float
+    first_s: float
+    count: int
+
+    @property
+    def period_s(self) -> float:
+        return 1 / self.wanted_hz
+
+    def timers(self) -> list[Made]:
+        """Return the timers whose callbacks publish."""
+        return [
+            item
+            for item in made(self.source, "timer")
+            if set(self.calls) & set(reached(self.source, roots(self.source, item.callback)))
+        ]
+
+
+def _paced(case: Case) -> _Paced | None:
+    check = case.criterion.check
+    if not isinstance(check, TopicRate) or case.source is None or case.fault is not None or silent_topic(case):
+        return None
+    calls = publish_calls(case.source, made_for(case.source, "publisher", check.topic))
+    found, first, count = (case.evidence(key) for key in ("rate_hz", "first_s", "window"))
+    known = float(found) if isinstance(found, (int, float)) else math.nan
+    first_s = float(first) if isinstance(first, (int, float)) else math.nan
+    return _Paced(case.source, calls, check.rate, known, first_s, count if isinstance(count, int) else 0)
+
+
+def _same(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=_SAME)
+
+
+def _period(case: Case) -> Clue | None:
+    """The period of the timer is what makes the rate."""
+    paced = _paced(case)
+    timers = paced.timers() if paced is not None else []
+    if paced is None or len(timers) != 1:
+        return None
+    worth = constant(paced.source, timers[0].period)
+    if worth is None or _same(worth.value, paced.period_s):
+        return None
+    if worth.value == 0:
+        hint = f"{timer_code(paced.source, timers[0])} never pauses: the period is {number(paced.period_s)} s"
+        return Clue(hint, paced.source.place(worth.origin))
+    explains = _same(1 / worth.value, paced.found_hz) or (paced.count <= 2 and _same(worth.value, paced.first_s))
+    return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
+
+
+def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float) -> Clue:
+    wanted_s = number(1 / wanted_hz)
+    is_ = f"{timer_code(source, timer)} is called every {number(worth.value)} s"
+    if _same(worth.value, wanted_hz):
+        hint = f"{is_}: {number(worth.value)} is the rate; the period is 1/{number(wanted_hz)} = {wanted_s} s"
+    elif _same(worth.value, 1000 / wanted_hz):
+        hint = f"{is_}: the period is in seconds, not in milliseconds: {wanted_s}"
+    else:
+        rate = number(1 / worth.value)
+        hint = f"{is_}, which is {rate} Hz; {number(wanted_hz)} Hz is a period of {wanted_s} s"
+    return Clue(hint, source.place(worth.origin), key=f"period:{timer.call.lineno}")
+
+
+def _held_up(case: Case) -> Clue | None:
+    """The callback of the timer sleeps, or never returns."""
+    paced = _paced(case)
+    if paced is None or not paced.found_hz < paced.wanted_hz:
+        return None
+    for timer in paced.timers():
+        for node in reached(paced.source, roots(paced.source, timer.callback)):
+            if isinstance(node, ast.While) and _pause(paced.source, node):
+                hint = f"the loop '{head_of(paced.source, node)}' keeps {_name(paced.source, node)} from returning"
+                return Clue(f"{hint}: let the timer call it again instead", paced.source.place(node))
+        sleeps = _sleeps(paced.source, reached(paced.source, roots(paced.source, timer.callback)))
+        total = sum(s.value for s in sleeps)
+        if sleeps and total > paced.period_s and _same(1 / total, paced.found_hz):
+            call = sleeps[0].origin
+            hint = f"{paced.source.code(call)} holds up the callback: take it out, the timer sets the pace"
+            return Clue(hint, paced.source.place(call))
+    return None
+
+
+def _name(source: Source, node: ast.AST) -> str:
+    function = source.function_of(node)
+    return function.name if function is not None else "the callback"
+
+
+def _sleeps(source: Source, nodes: Iterable[ast.AST]) -> list[Constant]:
+    """Return the sleeps of known length, the call as origin."""
+    found = []
+    for node in nodes:
+        if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
+            worth = constant(source, argument(node, 0, "secs"))
+            if worth is not None and worth.value > 0:
+                found.append(Constant(worth.value, node))
+    return sorted(found, key=lambda s: first_line(s.origin))
+
+
+def _pause(source: Source, loop: ast.AST) -> list[Constant]:
+    return _sleeps(source, reached(source, [loop]))
+
+
+def _several(case: Case) -> Clue | None:
+    """Each round publishes more than once, or several timers publish."""
+    paced = _paced(case)
+    timers = paced.timers() if paced is not None else []
+    if paced is None or not timers or math.isnan(paced.found_hz):
+        return None
+    times = round(paced.found_hz / paced.wanted_hz)
+    if times < 2 or not math.isclose(paced.found_hz, times * paced.wanted_hz, rel_tol=_SAME):
+        return None
+    periods = [constant(paced.source, t.period) for t in timers]
+    if not all(p is not None and _same(p.value, paced.period_s) for p in periods):
+        return None
+    if len(timers) == times:
+        hint = (
+            f"{len(timers)} timers publish, in {lines_of(timers[0].call, *(t.call for t in timers[1:]))}: one is enough"
+        )
+        return Clue(hint, paced.source.place(timers[-1].call))
+    inside = [c for c in reached(paced.source, roots(paced.source, timers[0].callback)) if c in paced.calls]
+    if len(timers) == 1 and len(inside) == times:
+        hint = f"publish is called {times} times a round, in {lines_of(inside[0], *inside[1:])}: once is enough"
+        return Clue(hint, paced.source.place(max(inside, key=first_line)))
+    return None
+
+
+def _loop_pace(case: Case) -> Clue | None:
+    """A loop publishes, and what it waits for is not the period asked for."""
+    paced = _paced(case)
+    if paced is None or paced.timers() or math.isnan(paced.found_hz):
+        return None
+    source = paced.source
+    rates = list(source.calls("create_rate", "Rate"))
+    worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
+    if worth is not None and _same(worth.value, paced.found_hz):
+        hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz are asked for"
+        return Clue(hint, source.place(worth.origin))
+    loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
+    return _pace_of(paced, loops[-1]) if loops else None
+
+
+def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
+    source, wanted = paced.source, number(paced.period_s)
+    pauses = _pause(source, loop)
+    total = sum(p.value for p in pauses)
+    if not pauses:
+        return _no_pause(paced, loop)
+    call = pauses[0].origin
+    if len(pauses) == 1 and _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
+        hint = (
+            f"{source.code(call)} makes {number(1 / total)} Hz; {number(paced.wanted_hz)} Hz is a pause of {wanted} s"
+        )
+        return Clue(hint, source.place(call))
+    if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
+        hint = f"{source.code(call)} comes on top of the time that the rest of the loop takes: a timer keeps the pace"
+        return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))
+    return None
+
+
+def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
+    waits = {"wait", "wait_for", "get", "join", "sleep", "sleep_until", "sleep_for", "spin_once", "select"}
+    inside = {last_name(n.func) for n in reached(paced.source, [loop]) if isinstance(n, ast.Call)}
+    if inside & waits or paced.found_hz < 5 * paced.wanted_hz:
+        return None
+    head = "while" if isinstance(loop, ast.While) else "for"
+    hint = f"the {head} loop publishes without a pause: use create_timer({number(paced.period_s)}, ...)"
+    return Clue(hint, paced.source.place(loop))
+
+
+def _published_once(case: Case) -> Clue | None:
+    """No timer and no loop leads to publish."""
+    paced = _paced(case)
+    if paced is None or paced.count != 1 or paced.timers() or not paced.calls:
+        return None
+    source = paced.source
+    loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
+    timers = list(source.calls("create_timer", "Timer"))
+    if loops or timers or any(set(paced.calls) & set(_heard(source, s)) for s in made(source, "subscription")):
+        return None
+    hint = f"{source.code(paced.calls[0])} runs once only: let a timer call it"
+    return Clue(f"{hint}, create_timer({number(paced.period_s)}, ...)", source.place(paced.calls[0]))
+
+
+def _heard(source: Source, item: Made) -> list[ast.AST]:
+    return list(reached(source, roots(source, item.callback)))
+
+
+def _stopped_itself(case: Case) -> Clue | None:
+    """A callback cancels its timer or destroys the node."""
+    paced = _paced(case)
+    if paced is None or ("stopped" not in case.verdict.reason and paced.count != 1):
+        return None
+    for timer in paced.timers():
+        for node in reached(paced.source, roots(paced.source, timer.callback)):
+            ends = isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel")
+            if ends and isinstance(node, ast.Call):
+                hint = f"{paced.source.code(node)} ends the publishing: it has to go on until the node is stopped"
+                return Clue(hint, paced.source.place(node))
+    return None
+
+
+RATES = (
+    Cause("period", _period),
+    Cause("callback_held_up", _held_up),
+    Cause("published_several_times", _several),
+    Cause("stopped_itself", _stopped_itself),
+    Cause("loop_pace", _loop_pace),
+    Cause("published_once", _published_once),
+)

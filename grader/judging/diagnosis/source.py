@@ -1,0 +1,215 @@
+"""A student's file as a syntax tree that is safe to ask: nothing here raises for any text, however strange."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from grader.judging.wording import quote
+from grader.model.exercise import Location
+
+#: Files longer than this are not parsed: no node that a person writes for an exercise comes near.
+LONGEST_SOURCE = 100_000
+#: Longest quotation of code inside a hint.
+CODE_LENGTH = 70
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+Loop = ast.While | ast.For
+Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+AnyNode = TypeVar("AnyNode", bound=ast.AST)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One graded file.
+
+    Attributes:
+        file: Path inside the submission, as locations have it.
+        lines: The text by lines, without their ends.
+        nodes: Every node of the syntax tree that has a line, in the order of the text; empty if it cannot be parsed.
+        tree: The syntax tree, or None if the text cannot be parsed.
+        parents: Node -> the node around it.
+    """
+
+    file: str
+    lines: Sequence[str] = ()
+    nodes: Sequence[ast.AST] = ()
+    tree: ast.Module | None = None
+    parents: dict[ast.AST, ast.AST] = field(default_factory=dict)
+
+    def all(self, kind: type[AnyNode]) -> Iterator[AnyNode]:
+        """Yield the nodes of a kind in the order of the text."""
+        for node in self.nodes:
+            if isinstance(node, kind):
+                yield node
+
+    def loops(self) -> list[Loop]:
+        """Return the loops in the order of the text."""
+        return [n for n in self.nodes if isinstance(n, Loop)]
+
+    def names(self) -> list[ast.Name | ast.Attribute]:
+        """Return every name, plain or after a dot, in the order of the text."""
+        return [n for n in self.nodes if isinstance(n, (ast.Name, ast.Attribute))]
+
+    def stores(self, dotted: str) -> list[ast.Attribute]:
+        """Return where an attribute such as `self.x` is assigned, in the order of the text."""
+        return [n for n in self.all(ast.Attribute) if isinstance(n.ctx, ast.Store) and chain(n) == dotted]
+
+    def calls(self, *names: str) -> Iterator[ast.Call]:
+        """Yield the calls of functions or methods by the last part of their name."""
+        for call in self.all(ast.Call):
+            if last_name(call.func) in names:
+                yield call
+
+    def on_line(self, line: int, kind: type[AnyNode]) -> Iterator[AnyNode]:
+        """Yield the nodes of a kind that a line is part of, the outermost first."""
+        for node in self.all(kind):
+            if covers(node, line):
+                yield node
+
+    def function_at(self, line: int) -> Function | None:
+        """Return the innermost function or method that a line is part of."""
+        return next((f for f in reversed(self.functions()) if covers(f, line)), None)
+
+    def around(self, node: ast.AST) -> Iterator[ast.AST]:
+        """Yield the nodes around a node, the nearest first."""
+        inner: ast.AST | None = self.parents.get(node)
+        while inner is not None:
+            yield inner
+            inner = self.parents.get(inner)
+
+    def function_of(self, node: ast.AST) -> Function | None:
+        """Return the function or method that a node is in."""
+        return next((n for n in self.around(node) if isinstance(n, Function)), None)
+
+    def class_of(self, node: ast.AST) -> ast.ClassDef | None:
+        """Return the class that a node is in."""
+        return next((n for n in self.around(node) if isinstance(n, ast.ClassDef)), None)
+
+    def functions(self, name: str | None = None) -> list[Function]:
+        """Return the functions and methods of a name, or all."""
+        return [n for n in self.nodes if isinstance(n, Function) and name in (None, n.name)]
+
+    def is_method(self, function: Function) -> bool:
+        """Return whether a function stands directly in a class and is not static."""
+        static = any(last_name(d) == "staticmethod" for d in function.decorator_list)
+        return isinstance(self.parents.get(function), ast.ClassDef) and not static
+
+    def place(self, node: ast.AST) -> Location:
+        """Return where a node begins."""
+        return Location(self.file, first_line(node))
+
+    def line(self, number: int) -> str:
+        """Return a line of the text, from 1; empty if there is none."""
+        return self.lines[number - 1] if 1 <= number <= len(self.lines) else ""
+
+    def code(self, node: ast.AST, length: int = CODE_LENGTH) -> str:
+        """Return a node as it is written, on one line, cut to `length` characters."""
+        first, last = first_line(node), last_line(node)
+        rows = [self.line(n)[: 4 * CODE_LENGTH].encode() for n in range(first, min(last, first + 4) + 1)]
+        if not rows:
+            return ""
+        if last == first:
+            rows[0] = rows[0][: getattr(node, "end_col_offset", None)]
+        elif len(rows) == last - first + 1:
+            rows[-1] = rows[-1][: getattr(node, "end_col_offset", None)]
+        rows[0] = rows[0][getattr(node, "col_offset", 0) :]
+        return quote(b" ".join(rows).decode(errors="replace"), length)
+
+
+def read(file: str, text: str) -> Source:
+    """Return a file ready to be asked; one that cannot be parsed has lines only."""
+    lines = tuple(text[:LONGEST_SOURCE].split("\n"))
+    tree = _parsed(text) if len(text) <= LONGEST_SOURCE else None
+    if tree is None:
+        return Source(file, lines)
+    parents: dict[ast.AST, ast.AST] = {}
+    nodes: list[ast.AST] = []
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        if hasattr(node, "lineno"):
+            nodes.append(node)
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, (ast.expr_context, ast.operator, ast.unaryop, ast.cmpop, ast.boolop)):
+                parents[child] = node
+                waiting.append(child)
+    nodes.sort(key=lambda n: (first_line(n), getattr(n, "col_offset", 0), -last_line(n)))
+    return Source(file, lines, tuple(nodes), tree, parents)
+
+
+def _parsed(text: str) -> ast.Module | None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the student's doubtful escapes are not ours
+        try:
+            return ast.parse(text.removeprefix("\ufeff"))
+        except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError):
+            return None
+
+
+def first_line(node: ast.AST) -> int:
+    """Return the line that a node begins on."""
+    return int(getattr(node, "lineno", 0))
+
+
+def last_line(node: ast.AST) -> int:
+    """Return the line that a node ends on."""
+    return int(getattr(node, "end_lineno", 0) or first_line(node))
+
+
+def covers(node: ast.AST, line: int) -> bool:
+    """Return whether a line is one of those that a node is written on."""
+    return first_line(node) <= line <= last_line(node)
+
+
+def last_name(node: ast.AST | None) -> str:
+    """Return the last part of a name such as `self.get_logger().info`; empty for anything else."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def chain(node: ast.AST | None) -> str:
+    """Return a dotted name, calls in it as `()`: `self.get_logger().info`; empty where it starts with anything else."""
+    parts: list[str] = []
+    while True:
+        if isinstance(node, ast.Attribute):
+            parts.append("." + node.attr)
+            node = node.value
+        elif isinstance(node, ast.Call):
+            parts.append("()")
+            node = node.func
+        elif isinstance(node, ast.Name):
+            parts.append(node.id)
+            return "".join(reversed(parts))
+        else:
+            return ""
+
+
+def argument(call: ast.Call, place: int, name: str) -> ast.expr | None:
+    """Return an argument by its place or its name."""
+    if place < len(call.args) and not any(isinstance(a, ast.Starred) for a in call.args[: place + 1]):
+        return call.args[place]
+    return next((k.value for k in call.keywords if k.arg == name), None)
+
+
+def parameters(function: Scope) -> list[str]:
+    """Return the names of the positional parameters."""
+    return [a.arg for a in (*function.args.posonlyargs, *function.args.args)]
+
+
+def text_of(node: ast.AST | None) -> str | None:
+    """Return the text of a string literal."""
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def subtree(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield a node and everything in it, in no particular order, without what inner classes hold."""
+    waiting = [node]
+    while waiting:
+        here = waiting.pop()
+        yield here
+        waiting.extend(c for c in ast.iter_child_nodes(here) if not isinstance(c, ast.ClassDef))

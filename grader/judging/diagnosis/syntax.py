@@ -1,0 +1,93 @@
+"""Causes behind files that Python cannot read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.wording import quote
+from grader.model.trace import FaultKind
+
+_PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
+_OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))
+#: What Python says, and what to do; the first that fits counts.
+_SAYINGS: Sequence[tuple[str, str]] = (
+    (r"^TabError", "indent every line with spaces only, four a level: this one mixes tabs and spaces with others"),
+    (r"expected ':'", "a colon is missing at the end of: {code}"),
+    (r"unindent does not match", "the line begins with {indent}: indent it exactly as the other lines of its block"),
+    (r"unexpected indent", "the line begins with {indent}, more than its block: indent it as the line above"),
+    (r"expected an indented block after", "indent what belongs to the line above, or write pass there"),
+    (r"'(.)' was never closed", "a bracket that is opened here is never closed: {code}"),
+    (r"unmatched '(.)'", "there is one closing bracket too many: {code}"),
+    (r"does not match opening parenthesis", "the brackets do not match: {code}"),
+    (
+        r"invalid character '.' \(U\+(2018|2019|201C|201D|00B4|201E)\)",
+        "these are typographic quotation marks; type them again as ' or \"",
+    ),
+    (r"invalid non-printable character", "an invisible character was copied along: type the line again"),
+    (r"unterminated (triple-quoted )?string literal", "the quotation mark at the end of the text is missing: {code}"),
+    (r"Maybe you meant '==' or ':=' instead|Maybe you meant '==' instead", "to compare, write == instead of ="),
+    (r"Perhaps you forgot a comma", "a comma is probably missing in: {code}"),
+    (r"'return' outside function", "return stands outside a function: indent it as the function's other lines"),
+)
+
+
+def _syntax(case: Case) -> Clue | None:
+    if case.fault is None or case.fault.kind is not FaultKind.SYNTAX_ERROR:
+        return None
+    row = case.source.line(case.fault.line) if case.source is not None else ""
+    text = case.fault.text
+    return _python_2(text, row) or _newer_f_string(text, row) or _other_language(text, row) or _said(text, row)
+
+
+def _python_2(text: str, row: str) -> Clue | None:
+    if "call to 'print'" not in text:
+        return None
+    found = _PRINT.match(row[:200])
+    shown = f"print({found['what'].strip()})" if found else "print(...)"
+    return Clue(f"this is Python 2; in Python 3 print is a function: {quote(shown, 70)}", key="python_2")
+
+
+def _newer_f_string(text: str, row: str) -> Clue | None:
+    version = re.search(r"read by Python 3\.(\d+)", text)
+    if "f-string" not in text or version is None or int(version[1]) >= 12:
+        return None
+    nested = re.search(r"""[fF](['"])[^'"]*\{[^}'"]*\1""", row[:500])
+    if nested is None:
+        return None
+    other = '"' if nested[1] == "'" else "'"
+    hint = f"Python 3.{version[1]}, which reads the file here, wants other quotation marks inside the braces"
+    return Clue(f"{hint} than around them: {other}")
+
+
+def _other_language(text: str, row: str) -> Clue | None:
+    if "invalid syntax" not in text:
+        return None
+    right = next((word for pattern, word in _OPERATORS if re.search(pattern, row[:500])), None)
+    return Clue(f"in Python this is written {right}: {quote(row, 60)}") if right else None
+
+
+def _said(text: str, row: str) -> Clue | None:
+    hint = next((hint for pattern, hint in _SAYINGS if re.search(pattern, text)), None)
+    if hint is None or ("{code}" in hint and not row.strip()):
+        return None
+    return Clue(hint.format(code=quote(row, 60), indent=_indent(row)))
+
+
+def _indent(row: str) -> str:
+    blank = row[: len(row) - len(row.lstrip())]
+    tabs, spaces = blank.count("\t"), blank.count(" ")
+    parts = [f"{n} {word}{'s' if n != 1 else ''}" for n, word in ((tabs, "tab"), (spaces, "space")) if n]
+    return " and ".join(parts) or "no space"
+
+
+def _encoding(case: Case) -> Clue | None:
+    if case.fault is None or case.fault.kind is not FaultKind.SYNTAX_ERROR:
+        return None
+    if "encoding" in case.fault.text or "codec can't decode" in case.fault.text:
+        return Clue("save the file as UTF-8")
+    return None
+
+
+SYNTAX = (Cause("syntax", _syntax), Cause("encoding", _encoding))
