@@ -1,0 +1,163 @@
+"""Real nodes over real DDS, from a folder to a score: the set of submissions, bad input, and what stays behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from grader.session import Request, grade
+
+ROOT = Path(__file__).resolve().parent.parent
+SUBMISSIONS = ROOT / "tests" / "submissions"
+EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
+GRADE = str(Path(sys.executable).with_name("grade"))
+
+pytestmark = pytest.mark.ros
+
+
+def say_nothing(step):
+    del step
+
+
+def outcomes(report):
+    """Return the outcome of every criterion that is not met, and what a student reads about it."""
+    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
+    told = {v.id: f"{v.reason} | hint: {v.hint}" for v in verdicts}
+    return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}, told
+
+
+def run(*arguments, **options):
+    return subprocess.run([GRADE, *map(str, arguments)], check=False, capture_output=True, text=True, **options)
+
+
+@pytest.mark.parametrize("folder", EXPECTED)
+def test_a_submission_gets_what_it_is_worth(folder):
+    """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
+    wanted = EXPECTED[folder]
+    report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"])), say_nothing)
+    found, told = outcomes(report)
+    assert found == wanted["expected"], told
+
+
+def test_the_reference_solutions_score_full_on_the_virtual_clock():
+    """All that the exercises ask can be done, and needs no wall clock."""
+    report = grade(Request(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
+    assert outcomes(report)[0] == {}
+    assert (report.score, report.max_score, report.final) == (100, 100, True)
+
+
+def test_the_template_runs_and_earns_nothing_yet():
+    """The baseline of the skeletons: no crash, no point, nothing undecided."""
+    report = grade(Request(str(ROOT / "student_template")), say_nothing)
+    assert (report.score, report.final) == (0, True)
+    assert [fault for exercise in report.exercises for fault in exercise.faults] == []
+
+
+def test_the_wall_clock_gives_the_same_verdict():
+    """A correct publisher is correct on either clock; the report says which one it was."""
+    request = Request(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
+    report = grade(request, say_nothing)
+    assert report.exercises[0].clock.value == "wall"
+    lost = {i: o for i, o in outcomes(report)[0].items() if o != "undecided"}  # a busy machine decides nothing
+    assert lost == {}
+
+
+def test_the_same_files_give_the_same_report():
+    """Byte for byte, but for the duration; the seed follows from the files."""
+    texts = []
+    for _ in range(2):
+        report = json.loads(run(ROOT / "benchmarks" / "wrong", "--json").stdout)
+        report.pop("duration_s")
+        texts.append(json.dumps(report))
+    assert texts[0] == texts[1]
+
+
+def test_another_seed_plays_another_part_of_the_recording():
+    """What a student could hard-code is drawn."""
+    seeds = [
+        json.loads(run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--json", "--seed", seed).stdout)
+        for seed in (1, 2)
+    ]
+    assert [report["score"] for report in seeds] == [30, 30]
+    evidence = [report["exercises"][0]["criteria"][1]["evidence"] for report in seeds]
+    assert evidence[0] != evidence[1]
+
+
+@pytest.mark.parametrize("bag", ["neato_square", "turtlebot3_path/path.mcap", "standing_best_effort"])
+def test_recordings_of_other_robots_can_be_played(bag):
+    """A correct subscriber is correct on anybody's odometry, whatever its pace and its QoS."""
+    path = ROOT.parent / "shared" / "bags" / bag
+    if not path.exists():
+        pytest.skip(f"{path} is not on this machine")
+    done = run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--odom-bag", path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_interrupting_the_grader_leaves_nothing_behind(tmp_path):
+    """Ctrl-C: exit code 130, one line, no process and no folder."""
+    submission = tmp_path / "endless"
+    submission.mkdir()
+    (submission / "velocity_publisher.py").write_text("while True: pass\n")
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    command = [GRADE, str(submission), "--exercise", "velocity_publisher"]
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: processes_in(tmp_path))
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert (process.returncode, told) == (130, "interrupted: no report was made\n")
+    wait_for(lambda: not processes_in(tmp_path))
+    assert [path.name for path in tmp_path.iterdir()] == ["endless"]
+
+
+def test_killing_the_grader_ends_what_it_started(tmp_path):
+    """SIGKILL gives no time to tidy up: the folder stays, but nothing runs on."""
+    submission = tmp_path / "endless"
+    submission.mkdir()
+    (submission / "velocity_publisher.py").write_text("while True: pass\n")
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    command = [GRADE, str(submission), "--exercise", "velocity_publisher"]
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wait_for(lambda: processes_in(tmp_path))
+    process.kill()
+    process.wait()
+    wait_for(lambda: not processes_in(tmp_path))
+
+
+def wait_for(condition, seconds=60):
+    """Wait until a condition holds; fail if it never does."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it never came to that"
+        time.sleep(0.05)
+
+
+def processes_in(folder):
+    """Return the sandboxed processes whose submission was staged below a folder, as the mount tables say."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and entry.name != str(os.getpid()):
+            try:
+                command = (entry / "cmdline").read_bytes().decode(errors="replace")
+                mounts = (entry / "mountinfo").read_text(errors="replace")
+            except OSError:
+                continue
+            if "launcher.py" in command and f"{folder}/" in mounts + command:
+                found.append(entry.name)
+    return found
+
+
+def test_a_submission_is_never_written_to(tmp_path):
+    """Not even compiled files appear beside the student's."""
+    submission = tmp_path / "ada"
+    submission.mkdir()
+    source = (ROOT / "reference_solutions" / "velocity_publisher.py").read_bytes()
+    (submission / "velocity_publisher.py").write_bytes(source)
+    before = (submission.stat().st_mtime_ns, sorted(submission.iterdir()))
+    assert run(submission, "--exercise", "velocity_publisher").returncode == 0
+    assert (submission.stat().st_mtime_ns, sorted(submission.iterdir())) == before
