@@ -37,6 +37,8 @@ class VirtualClock:
         """Set the time; it never goes back."""
         if now_ns > self.now_ns:
             self.now_ns, self._sent = now_ns, 0
+            if not self._yielding:
+                self.busy()  # looks between two pauses are no busy loop, however many pauses there are
 
     def look(self) -> int:
         """Return the time to a program that asks for it, letting time pass if it does nothing else."""
@@ -69,4 +71,3 @@ class VirtualClock:
         if self._sent >= MESSAGES_AT_ONCE and not self._yielding:
             self._sent = 0
             self._yield()
-

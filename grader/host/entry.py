@@ -73,7 +73,8 @@ def warn_of_shadows(folder: str, say: Say) -> None:
     for name in sorted(os.listdir(folder)):
         module, extension = os.path.splitext(name)
         if extension == ".py" and (module in sys.stdlib_module_names or module in ROS_MODULES):
-            say(f"{name} has the name of a module that Python or ROS needs: `python3` would import it instead; rename it")
+            shadows = f"{name} has the name of a module that Python or ROS needs"
+            say(f"{shadows}: `python3` would import it instead; rename it")
 
 
 def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, file: str, say: Say) -> None:
@@ -84,14 +85,18 @@ def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, file: s
         return
     main = namespace.get("main")
     if callable(main) and not _calls_at_top_level(tree, "main"):
-        say(f"{file}: nothing calls main(), so `python3 {file}` would do nothing; "
-            "add: if __name__ == '__main__': main()")
+        say(
+            f"{file}: nothing calls main(), so `python3 {file}` would do nothing; "
+            "add: if __name__ == '__main__': main()"
+        )
         main()
         return
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
-        say(f"{file}: nothing starts {nodes[0].__name__}, so `python3 {file}` would do nothing; "
-            "add a main() that calls rclpy.init(), makes the node and spins it")
+        say(
+            f"{file}: nothing starts {nodes[0].__name__}, so `python3 {file}` would do nothing; "
+            "add a main() that calls rclpy.init(), makes the node and spins it"
+        )
         spin(nodes[0])
 
 
@@ -100,7 +105,8 @@ def _calls_at_top_level(tree: ast.Module, name: str) -> bool:
     return any(
         isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == name
         for statement in tree.body
-        if not isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)) and not _never_true(statement)
+        if not isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef))
+        and not _never_true(statement)
         for node in ast.walk(statement)
     )
 
@@ -111,7 +117,7 @@ def _never_true(statement: ast.stmt) -> bool:
         return False
     names = {node.id for node in ast.walk(statement.test) if isinstance(node, ast.Name)}
     texts = {node.value for node in ast.walk(statement.test) if isinstance(node, ast.Constant)}
-    return "__name__" in names and "__main__" not in texts
+    return "__name__" in texts or ("__name__" in names and "__main__" not in texts)
 
 
 def _node_classes(namespace: dict[str, Any]) -> list[Any]:
@@ -134,7 +140,22 @@ def spin(node_class: Any) -> None:
 
 
 #: Modules of ROS that a student's file name may hide.
-ROS_MODULES = frozenset({
-    "rclpy", "std_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_srvs", "example_interfaces", "numpy", "yaml",
-    "rcl_interfaces", "builtin_interfaces", "rosidl_parser", "rosgraph_msgs", "em", "lark",
-})
+ROS_MODULES = frozenset(
+    {
+        "rclpy",
+        "std_msgs",
+        "geometry_msgs",
+        "nav_msgs",
+        "sensor_msgs",
+        "std_srvs",
+        "example_interfaces",
+        "numpy",
+        "yaml",
+        "rcl_interfaces",
+        "builtin_interfaces",
+        "rosidl_parser",
+        "rosgraph_msgs",
+        "em",
+        "lark",
+    }
+)

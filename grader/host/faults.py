@@ -31,7 +31,13 @@ class Describer:
         version = ".".join(map(str, sys.version_info[:2]))
         text = f"{type(error).__name__}: {error.msg} (read by Python {version})"
         file = os.path.realpath(error.filename or "")
-        return {"kind": "syntax_error", "text": text, "file": self._relative(file), "line": error.lineno or 0, "frames": []}
+        return {
+            "kind": "syntax_error",
+            "text": text,
+            "file": self._relative(file),
+            "line": error.lineno or 0,
+            "frames": [],
+        }
 
     def stack(self, frame: FrameType | None, kind: str, text: str) -> dict[str, Any]:
         """Return where a thread stands as a fault."""
@@ -58,6 +64,6 @@ def one_line(error: BaseException) -> str:
     """Return an exception as its last line in a traceback, without line breaks and not longer than 500 characters."""
     try:
         text = "".join(traceback.format_exception_only(type(error), error)).strip()
-    except Exception:  # noqa: BLE001 - the student's own __str__ may raise anything
+    except Exception:  # the student's own __str__ may raise anything
         text = type(error).__name__
     return " ".join(text.split())[:500]

@@ -1,21 +1,23 @@
-"""Counts what this process has sent and still expects, and lists its endpoints, so that the grader can settle an instant.
+"""Counts what this process has sent and still expects, and lists its endpoints.
 
-The counts only settle; no verdict rests on them.
+The counts only let the grader settle an instant; no verdict rests on them.
 """
 
 from __future__ import annotations
 
 import weakref
-from collections import Counter
+from collections import Counter, deque
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 
 from . import originals
 
 #: Topics that every node has; nobody waits for them.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
+#: Durations of QoS policies from here on mean for ever.
+INFINITE_NS = 9_000_000_000_000_000_000
 BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_service"})
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, a message that was announced is waited for before it is given up as lost.
@@ -36,6 +38,7 @@ class Ledger:
     def __init__(self) -> None:
         self.sent: Counter[str] = Counter()
         self._expected: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+        self._kept: weakref.WeakKeyDictionary[Any, deque[Any]] = weakref.WeakKeyDictionary()
         self._endpoints: dict[str, list[weakref.ref[Any]]] = {
             kind: [] for kind in ("publisher", "subscription", "client", "service")
         }
@@ -52,6 +55,7 @@ class Ledger:
     def forget(self, endpoint: Any) -> None:
         """Expect nothing more at an endpoint that is being destroyed."""
         self._expected.pop(endpoint, None)
+        self._kept.pop(endpoint, None)
         self.changed = True
 
     def alive(self, kind: str) -> list[Any]:
@@ -79,6 +83,8 @@ class Ledger:
                         "type": type_name(endpoint.msg_type),
                         "reliable": _reliable(qos, kind),
                         "latched": qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+                        "deadline_ns": finite_ns(qos.deadline),
+                        "manual": qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
                     }
                 )
         claims += [
@@ -104,14 +110,31 @@ class Ledger:
         """Add what the grader says is on its way, and wait until it is here."""
         for channel, count in arrivals.items():
             for receiver in self._receivers(channel):
-                depth = _depth(receiver)
-                self._expected[receiver] = min(self._expected.get(receiver, 0) + count, depth)
+                before = self._expected.get(receiver, 0)
+                self._expected[receiver] = before + count
+                # That something can be read says nothing about the newest where older ones were left unread.
+                if channel.startswith("topic ") and before + count > 1:
+                    self._keep_all(receiver)
         self.await_arrivals(list(self._expected))
+
+    def _keep_all(self, subscription: Any) -> None:
+        """Take everything that is on its way to a subscription nobody reads, and keep what its queue would hold."""
+        kept = self._kept.setdefault(subscription, deque(maxlen=_depth(subscription)))
+        while self._expected.get(subscription, 0) > 0 and self.await_arrivals([subscription]):
+            with subscription.handle:
+                found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            self._expected[subscription] -= 1
+            if found is not None:
+                kept.append(found)
+
+    def kept(self, subscription: Any) -> deque[Any]:
+        """Return the messages that were taken for a subscription ahead of time, oldest first."""
+        return self._kept.get(subscription) or deque()
 
     def took(self, receiver: Any) -> None:
         """Note that one message was taken from a subscription, client or service."""
-        if self._expected.get(receiver, 0) > 0:
-            self._expected[receiver] -= 1
+        # below 0: taken before it was announced, as a node's own messages are
+        self._expected[receiver] = self._expected.get(receiver, 0) - 1
 
     def await_arrivals(self, receivers: list[Any]) -> bool:
         """Wait, in real time, until everything expected by some receivers can be taken; return whether any can be."""
@@ -127,9 +150,13 @@ class Ledger:
                 self._expected[receiver] = 0
         return arrived
 
+    def keeps_anything(self) -> bool:
+        """Return whether any message was taken ahead of time."""
+        return any(self._kept.values())
+
     def expects_anything(self) -> bool:
         """Return whether anything is on its way."""
-        return any(self._expected.values())
+        return any(count > 0 for count in self._expected.values())
 
     def _context(self) -> Any:
         contexts = (reference() for reference in reversed(self.contexts))
@@ -205,6 +232,12 @@ def _reliable(qos: Any, kind: str) -> bool:
     if qos.reliability in (ReliabilityPolicy.SYSTEM_DEFAULT, ReliabilityPolicy.UNKNOWN):
         return kind == "publisher"  # the defaults of DDS: a writer is reliable, a reader is not
     return bool(qos.reliability != ReliabilityPolicy.BEST_EFFORT)
+
+
+def finite_ns(duration: Any) -> int:
+    """Return a QoS duration in nanoseconds; 0 for none, which DDS calls infinite."""
+    nanoseconds = int(duration.nanoseconds)
+    return nanoseconds if 0 < nanoseconds < INFINITE_NS else 0
 
 
 def _depth(receiver: Any) -> int:

@@ -16,7 +16,7 @@ class Link:
 
     def __init__(self, descriptor: int) -> None:
         self._socket = socket.socket(fileno=descriptor)
-        self._socket.setblocking(True)
+        self._socket.settimeout(None)
         self._lines = self._socket.makefile("rb")
         self._sending = originals.allocate_lock()
 

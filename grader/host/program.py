@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import importlib
 import os
 import random
 import signal
@@ -83,7 +84,7 @@ def play(request: dict[str, Any], describer: Describer, link: Link) -> dict[str,
         ending["code"] = exit_code(leaving)
     except KeyboardInterrupt:
         ending["code"] = 130
-    except BaseException as error:  # noqa: BLE001 - whatever the student's code raises becomes a fault
+    except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
@@ -96,8 +97,8 @@ def finish_threads() -> None:
     """Wait for the threads that keep a Python process alive, as the interpreter does at its end."""
     for call in reversed(getattr(threading, "_threading_atexits", [])):
         call()
-    for thread in threading.enumerate():
-        if thread is not threading.current_thread() and not thread.daemon:
+    while threads := [t for t in threading.enumerate() if t is not threading.current_thread() and not t.daemon]:
+        for thread in threads:
             thread.join()
 
 
@@ -118,8 +119,18 @@ def seed_randomness(seed: str) -> None:
     def urandom(count: int, /) -> bytes:
         return source.randbytes(count)
 
-    os.urandom = urandom
+    def getrandom(size: int, flags: int = 0) -> bytes:
+        return urandom(size)
+
+    seed_generator = random.Random.seed
+
+    def seed_from_source(self: random.Random, a: Any = None, version: int = 2) -> None:
+        seed_generator(self, int.from_bytes(urandom(32), "big") if a is None else a, version)
+
+    os.urandom, os.getrandom = urandom, getrandom
     random._urandom = urandom  # type: ignore[attr-defined]
+    random.Random.seed = seed_from_source  # type: ignore[method-assign]
+    random.seed = random._inst.seed
     random.seed(seed + "/random")
     numpy = sys.modules.get("numpy")
     if numpy is not None:
@@ -128,11 +139,8 @@ def seed_randomness(seed: str) -> None:
 
 def preload() -> None:
     """Import what nearly every node imports, before time starts."""
-    import geometry_msgs.msg
-    import nav_msgs.msg
-    import sensor_msgs.msg
-    import std_msgs.msg
-    import std_srvs.srv
+    for name in ("geometry_msgs.msg", "nav_msgs.msg", "sensor_msgs.msg", "std_msgs.msg", "std_srvs.srv"):
+        importlib.import_module(name)
 
 
 def flush() -> None:

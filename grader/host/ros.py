@@ -88,7 +88,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     def sleep_until(self: Clock, until: Time, context: Any = None) -> bool:
         context = context or rclpy.utilities.get_default_context()
         if not context.ok():
-            raise rclpy.exceptions.NotInitializedException()
+            raise rclpy.exceptions.NotInitializedException
         if until.clock_type != self._clock_type:
             raise ValueError("until's clock type does not match this clock's type")
         while clock.now_ns < until.nanoseconds and context.ok():
@@ -144,6 +144,17 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
 
         def add_event(self, entity: Any) -> Any:
             return self._add(super().add_event, entity)
+
+        def get_ready_entities(self, kind: str) -> Any:
+            ready = super().get_ready_entities(kind)
+            return [*ready, *(p for p in self._kept() if p not in ready)] if kind == "subscription" else ready
+
+        def _kept(self) -> list[int]:
+            """Return the subscriptions of this set whose messages were taken ahead of time."""
+            if not ledger.keeps_anything():
+                return []
+            known = ledger.handles()
+            return [p for p in self._receivers if p in known and ledger.kept(known[p])]
 
         def _ready(self) -> bool:
             return any(self.get_ready_entities(kind) for kind in KINDS) or any(
@@ -245,11 +256,24 @@ def _counting_take(name: str, ledger: Ledger, clock: VirtualClock) -> Callable[.
 
     def counted_take(self: Any, receiver: Any) -> Any:
         clock.busy()
+        if name == "_take_subscription" and (kept := ledger.kept(receiver)):
+            return _handing_over(receiver, kept.popleft())
         taken = take(self, receiver)
         ledger.took(receiver)
         return taken
 
     return counted_take
+
+
+def _handing_over(subscription: Any, found: tuple[Any, Any]) -> Callable[[], Any]:
+    """Return what an executor runs for a message that was taken ahead of time, as rclpy's own executors make it."""
+    message_only = subscription._callback_type is rclpy.subscription.Subscription.CallbackType.MessageOnly
+    arguments = found[:1] if message_only else found
+
+    async def execute() -> None:
+        await rclpy.executors.await_or_execute(subscription.callback, *arguments)
+
+    return execute
 
 
 def _install_endpoints(ledger: Ledger) -> None:

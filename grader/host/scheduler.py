@@ -32,7 +32,8 @@ class Scheduler:
 
     Args:
         now_ns: Returns the virtual time.
-        ask_for_time: Called when nothing can run, with the least deadline or None; returns when time or the world moved.
+        ask_for_time: Called when nothing can run, with the least deadline or None; returns when time or the world has
+            moved.
     """
 
     def __init__(self, now_ns: Callable[[], int], ask_for_time: Callable[[int | None], None]) -> None:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from . import originals, threads
+from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
 from .scheduler import Scheduler
@@ -46,7 +46,8 @@ class VirtualTime:
         self._used_ns = 0
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, report_fault)
-        threads.install_sleep_and_clocks(self.scheduler, self.clock)
+        times.install_looks(self.clock)
+        times.install_sleep_and_clocks(self.scheduler, self.clock)
         threads.install_selectors(self.scheduler, self.clock)
 
     def install_ros(self) -> None:
@@ -60,7 +61,7 @@ class VirtualTime:
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
         ros.install_traffic(self._ledger, self.clock, lambda: self._converse(self.clock.now_ns))
         ros.install_looks(self.clock)
-        threads.install_wall_time(self.clock)
+        times.install_wall_time(self.clock)
         self._notice_output(ros)
 
     def _notice_output(self, ros: Any) -> None:
@@ -138,7 +139,7 @@ class VirtualTime:
             self._ledger.expect(answer["arrivals"])
 
     def _may_go_on(self, wake_ns: int) -> bool:
-        """Return whether time may move on without asking: nothing else happens until then, and nothing is to be told."""
+        """Return whether time may move on unasked: nothing else happens until then, and nothing is to be told."""
         return (
             self.clock.now_ns < wake_ns < self._free_until_ns
             and not self.unreported

@@ -24,7 +24,8 @@ class Watchdog:
         link: The line to the grader.
         time: Says since when the student's code has been running.
         describer: Names the student's frames.
-        limits: `start_cpu_s` and `wake_up_cpu_s`, processor seconds until it first blocks and between two such moments; `blocked_s`, real seconds blocked elsewhere.
+        limits: `start_cpu_s` and `wake_up_cpu_s`, processor seconds until it first blocks and between two such moments;
+            `blocked_s`, real seconds blocked elsewhere.
     """
 
     def __init__(self, link: Link, time: VirtualTime, describer: Describer, limits: dict[str, float]) -> None:
@@ -63,7 +64,7 @@ class Watchdog:
                 self._give_up(f"waited {self._blocked_s:g} s for something outside the ROS graph", "outside")
 
     def _sleeps(self) -> bool:
-        """Return whether the thread that should be running is asleep in the system, rather than waiting for a processor."""
+        """Return whether the thread that should run is asleep in the system, rather than waiting for a processor."""
         thread = self._time.scheduler.running_native_thread()
         try:
             with open(f"/proc/self/task/{thread}/stat", encoding="ascii", errors="replace") as stat:

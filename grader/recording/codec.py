@@ -85,12 +85,12 @@ def trace_from_json(data: Any) -> Trace:
             scenario=_text(data["scenario"]),
             clock=ClockKind(data["clock"]),
             stop_ns=_whole(data["stop_ns"]),
-            observations=tuple(observation_from_json(o) for o in data["observations"]),
+            observations=tuple(observation_from_json(o) for o in _list(data["observations"])),
             clock_reason=_text(data["clock_reason"]),
-            notes=tuple(_text(note) for note in data["notes"]),
+            notes=tuple(map(_text, _list(data["notes"]))),
             harness_problem=_text(data["harness_problem"]),
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, RecursionError) as error:
         raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
 
 
@@ -102,12 +102,12 @@ def observation_from_json(data: list[Any]) -> Observation:
 
 def _message(fields: list[Any]) -> Message:
     t_ns, topic, kind, value, cdr = fields
-    return Message(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), base64.b64decode(cdr))
+    return Message(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), _bytes(cdr))
 
 
 def _delivery(fields: list[Any]) -> Delivery:
     t_ns, topic, kind, value, cdr = fields
-    return Delivery(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), base64.b64decode(cdr))
+    return Delivery(_whole(t_ns), _text(topic), _text(kind), lively(_mapping(value)), _bytes(cdr))
 
 
 def _log(fields: list[Any]) -> LogRecord:
@@ -124,11 +124,11 @@ def _line(fields: list[Any]) -> OutputLine:
 
 def _graph(fields: list[Any]) -> GraphSnapshot:
     t_ns, nodes, ends = fields
-    return GraphSnapshot(_whole(t_ns), tuple(map(_text, nodes)), tuple(_endpoint(e) for e in ends))
+    return GraphSnapshot(_whole(t_ns), tuple(map(_text, _list(nodes))), tuple(_endpoint(e) for e in _list(ends)))
 
 
 def _endpoint(fields: list[Any]) -> Endpoint:
-    kind, topic, interface, node, participant, reliability, durability, depth = fields
+    kind, topic, interface, node, participant, reliability, durability, depth, deadline_ns, liveliness = fields
     return Endpoint(
         _text(kind),
         _text(topic),
@@ -138,13 +138,21 @@ def _endpoint(fields: list[Any]) -> Endpoint:
         _text(reliability),
         _text(durability),
         _whole(depth),
+        _whole(deadline_ns),
+        _text(liveliness),
     )
 
 
 def _fault(fields: list[Any]) -> Fault:
     t_ns, process, kind, text, file, line, frames = fields
     return Fault(
-        _whole(t_ns), _text(process), FaultKind(kind), _text(text), _text(file), _whole(line), tuple(map(_text, frames))
+        _whole(t_ns),
+        _text(process),
+        FaultKind(kind),
+        _text(text),
+        _text(file),
+        _whole(line),
+        tuple(map(_text, _list(frames))),
     )
 
 
@@ -167,6 +175,16 @@ def _whole(value: Any) -> int:
 
 def _text(value: Any) -> str:
     if type(value) is not str:
+        raise TypeError(value)
+    return value
+
+
+def _bytes(value: Any) -> bytes:
+    return base64.b64decode(_text(value), validate=True)
+
+
+def _list(value: Any) -> list[Any]:
+    if type(value) is not list:
         raise TypeError(value)
     return value
 

@@ -1,0 +1,95 @@
+"""Sleeps and clocks of the standard library in virtual time, and what programs look at while they only wait."""
+
+import concurrent.futures
+import functools
+import operator
+import queue
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, SupportsIndex
+
+from .clock import VirtualClock
+from .scheduler import Scheduler
+
+NS_PER_S = 1_000_000_000
+#: Clocks of the system that only count on.
+STEADY = frozenset({time.CLOCK_MONOTONIC, time.CLOCK_MONOTONIC_RAW, time.CLOCK_BOOTTIME})
+
+
+def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
+    """Make sleeping, and every look at a clock of the standard library, virtual."""
+
+    def sleep(seconds: float | SupportsIndex, /) -> None:
+        if not isinstance(seconds, float):
+            seconds = operator.index(seconds)
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        end_ns = clock.now_ns + round(seconds * NS_PER_S)
+        if end_ns <= clock.now_ns:
+            clock.idle_look(20)
+            scheduler.pause(clock.now_ns)
+        while clock.now_ns < end_ns:
+            scheduler.pause(end_ns)
+
+    time.sleep = sleep
+    start_ns = clock.now_ns - 1000 * NS_PER_S  # a steady clock does not start at zero, nor at the epoch
+    time.monotonic_ns = lambda: clock.look() - start_ns
+    time.monotonic = lambda: (clock.look() - start_ns) / NS_PER_S
+    time.perf_counter_ns = lambda: clock.look() - start_ns
+    time.perf_counter = lambda: (clock.look() - start_ns) / NS_PER_S
+    threading._time = time.monotonic  # type: ignore[attr-defined]
+    queue.time = time.monotonic  # type: ignore[attr-defined]
+
+
+def install_wall_time(clock: VirtualClock) -> None:
+    """Make `time.time`, `datetime.now` and their relatives virtual, however they were imported."""
+    import time_machine
+
+    traveller = time_machine.travel(clock.now_ns / NS_PER_S, tick=False).start()
+    kind = type(traveller)
+    traveller.__class__ = type(
+        "VirtualTraveller",
+        (kind,),
+        {"time_ns": lambda self: clock.look(), "time": lambda self: clock.look() / NS_PER_S},
+    )
+    # After time_machine, which takes what it finds here for a function written in C.
+    get, get_ns = time.clock_gettime, time.clock_gettime_ns
+    time.clock_gettime_ns = lambda kind, /: time.monotonic_ns() if kind in STEADY else get_ns(kind)
+    time.clock_gettime = lambda kind, /: time.monotonic() if kind in STEADY else get(kind)
+
+
+def install_looks(clock: VirtualClock) -> None:
+    """Let time pass for programs that do nothing but look whether another thread has done something."""
+    fruitless: dict[tuple[Any, str], object] = {
+        (threading.Event, "is_set"): False,
+        (threading.Thread, "is_alive"): True,
+        (concurrent.futures.Future, "done"): False,
+        (queue.Queue, "empty"): True,
+        (queue.Queue, "full"): True,
+        (queue.Queue, "qsize"): 0,
+    }
+    for (cls, name), nothing in fruitless.items():
+        setattr(cls, name, _looking(getattr(cls, name), nothing, clock))
+    get = queue.Queue.get
+
+    @functools.wraps(get)
+    def looking_get(self: Any, block: bool = True, timeout: float | None = None) -> Any:
+        try:
+            return get(self, block, timeout)
+        except queue.Empty:
+            clock.idle_look()
+            raise
+
+    queue.Queue.get = looking_get  # type: ignore[method-assign]
+
+
+def _looking(original: Callable[[Any], Any], nothing: object, clock: VirtualClock) -> Callable[[Any], Any]:
+    @functools.wraps(original)
+    def looked_at(self: Any) -> Any:
+        found = original(self)
+        if found == nothing:
+            clock.idle_look()
+        return found
+
+    return looked_at

@@ -1,0 +1,213 @@
+"""Clocks and sleeps in virtual time: they agree with each other, drift by nothing and let busy loops go on."""
+
+import pytest
+from staging_programs import play
+
+
+def test_sleeping_is_exact():
+    """A thousand pauses of a twentieth of a second are fifty seconds, to the nanosecond."""
+    assert play("""
+        import time
+        from time import sleep, monotonic
+        start = monotonic()
+        for _ in range(1000):
+            sleep(0.05)
+        say(round(monotonic() - start, 9))
+        time.sleep(0.0000005)
+        time.sleep(True)
+    """) == ["50000 50.0", "51000.0005 end"]
+
+
+def test_every_clock_tells_the_same_time():
+    """Wall clocks and steady ones, in seconds and nanoseconds, advance together."""
+    assert play("""
+        import datetime, time
+        clocks = (time.time, time.monotonic, time.perf_counter, lambda: datetime.datetime.now().timestamp())
+        whole = (time.time_ns, time.monotonic_ns, time.perf_counter_ns)
+        before = [c() for c in clocks], [c() for c in whole]
+        time.sleep(1.5)
+        say([round(c() - b, 6) for c, b in zip(clocks, before[0])])
+        say([c() - b for c, b in zip(whole, before[1])])
+    """) == ["1500 [1.5, 1.5, 1.5, 1.5]", "1500 [1500000000, 1500000000, 1500000000]", "1500 end"]
+
+
+def test_dates_follow():
+    """However they were imported, and with or without a time zone."""
+    assert play("""
+        import datetime, time
+        from datetime import date, datetime as dt, timezone
+        time.sleep(90061)
+        say(dt.now(timezone.utc).isoformat())
+        say(date.fromtimestamp(time.time()) == date.today() == datetime.date.today() == dt.today().date())
+        say(time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime()))
+        say(time.strftime("%j") == dt.now().strftime("%j"))
+        say(time.localtime() == time.localtime(time.time()))
+        say(time.ctime() == time.asctime())
+    """) == [
+        "90061000 2026-01-02T01:01:01+00:00",
+        "90061000 True",
+        "90061000 2026-01-02 01:01:01",
+        "90061000 True",
+        "90061000 True",
+        "90061000 True",
+        "90061000 end",
+    ]
+
+
+@pytest.mark.parametrize(
+    "look",
+    [
+        "time.time() < start + 0.1",
+        "time.time_ns() < (start + 0.1) * 1e9",
+        "time.monotonic() - steady < 0.1",
+        "time.perf_counter_ns() - precise < 100_000_000",
+        "datetime.datetime.now() < begin + datetime.timedelta(seconds=0.1)",
+        "time.clock_gettime(time.CLOCK_MONOTONIC) < raw + 0.1",
+        "time.clock_gettime_ns(time.CLOCK_MONOTONIC) < (raw + 0.1) * 1e9",
+    ],
+)
+def test_a_loop_that_only_looks_at_a_clock_goes_on(look):
+    """It sees the time pass in small steps, and leaves the loop within one of them."""
+    said = play(f"""
+        import datetime, time
+        start, begin, steady, precise = time.time(), datetime.datetime.now(), time.monotonic(), time.perf_counter_ns()
+        raw = time.clock_gettime(time.CLOCK_MONOTONIC)
+        while {look}:
+            pass
+        say("over")
+    """)
+    at_ms, _ = said[0].split()
+    assert 100 <= float(at_ms) <= 101
+
+
+@pytest.mark.parametrize(
+    "look",
+    [
+        "not done.is_set()",
+        "not future.done()",
+        "thread.is_alive()",
+        "not results",
+        "items.empty()",
+        "not items.qsize()",
+        "not got(items)",
+        "lock.locked()",
+        "not lock.acquire(blocking=False)",
+    ],
+)
+def test_a_loop_that_waits_for_another_thread_without_blocking(look):
+    """The other thread gets its turn if the loop sleeps, looks at a clock or asks whether something has happened."""
+    pause = "time.sleep(0)" if look == "not results" else "pass"
+    said = play(f"""
+        import queue, threading, time
+        from concurrent.futures import Future
+        done, future, items, results, lock = threading.Event(), Future(), queue.Queue(), [], threading.Lock()
+        lock.acquire()
+        def got(items):
+            try:
+                return items.get_nowait()
+            except queue.Empty:
+                return None
+        def work():
+            time.sleep(0.1)
+            done.set(); future.set_result(1); items.put(1); results.append(1); lock.release()
+        thread = threading.Thread(target=work)
+        thread.start()
+        while {look}:
+            {pause}
+        say("over")
+    """)
+    at_ms, _ = said[0].split()
+    assert 100 <= float(at_ms) <= 110.5
+
+
+def test_looking_now_and_then_costs_nothing():
+    """A program that sleeps between its looks, however often it looks, does not drift."""
+    assert play("""
+        import datetime, threading, time
+        stop = threading.Event()
+        start = time.monotonic()
+        for number in range(3000):
+            time.time(); time.monotonic(); datetime.datetime.now(); stop.is_set()
+            time.sleep(0.01)
+        say(round(time.monotonic() - start, 9))
+    """) == ["30000 30.0", "30000 end"]
+
+
+def test_sleeping_until_a_deadline_does_not_drift():
+    """The pattern of a paced loop: look at the clock, sleep for the rest."""
+    assert play("""
+        import time
+        following = time.monotonic()
+        for number in range(1, 2001):
+            following += 0.05
+            time.sleep(max(0.0, following - time.monotonic()))
+        say(number)
+    """) == ["100000 2000", "100000 end"]
+
+
+def test_sleep_refuses_what_it_always_refuses():
+    """The same kinds of error, in the same words where students see them often."""
+    assert play("""
+        import time
+        from decimal import Decimal
+        from fractions import Fraction
+        for wrong in (-1, -0.001, "1", None, [], float("nan"), float("inf"), Decimal(1), Fraction(1, 2)):
+            try:
+                time.sleep(wrong)
+                say(f"slept {wrong!r}")
+            except (TypeError, ValueError, OverflowError) as error:
+                words = f": {error}" if isinstance(wrong, (str, int)) else ""
+                say(type(error).__name__ + words)
+        try:
+            time.sleep()
+        except TypeError:
+            say("needs one")
+    """) == [
+        "0 ValueError: sleep length must be non-negative",
+        "0 ValueError",
+        "0 TypeError: 'str' object cannot be interpreted as an integer",
+        "0 TypeError",
+        "0 TypeError",
+        "0 ValueError",
+        "0 OverflowError",
+        "0 TypeError",
+        "0 TypeError",
+        "0 needs one",
+        "0 end",
+    ]
+
+
+def test_sleeping_for_nothing_lets_others_run():
+    """`sleep(0)` gives the turn away and takes no time."""
+    assert play("""
+        import threading, time
+        def work(name):
+            for _ in range(2):
+                say(name)
+                time.sleep(0)
+        threading.Thread(target=work, args=("a",)).start()
+        threading.Thread(target=work, args=("b",)).start()
+    """) == ["0 a", "0 b", "0 a", "0 b", "0 end"]
+
+
+def test_sched_follows():
+    """A scheduler of the standard library that was made with the module's own clock."""
+    assert play("""
+        import sched, time
+        plan = sched.scheduler(time.monotonic, time.sleep)
+        plan.enter(2, 1, say, ("late",))
+        plan.enter(1, 2, say, ("second",))
+        plan.enter(1, 1, say, ("first",))
+        plan.run()
+        sched.scheduler().enter(1, 1, say, ("default",))
+    """) == ["1000 first", "1000 second", "2000 late", "2000 end"]
+
+
+def test_processor_time_is_not_virtual():
+    """What was computed was computed."""
+    assert play("""
+        import time
+        before = time.process_time()
+        time.sleep(100)
+        say(time.process_time() - before < 50)
+    """) == ["100000 True", "100000 end"]
