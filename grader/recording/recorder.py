@@ -70,11 +70,12 @@ class WorkerProcess:
         try:
             self._line.sendall(request.encode())
             answer = json.loads(self._answer())
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise HarnessError(f"worker: expected a trace of {plan.scenario}, found none ({error})") from error
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
-            raise HarnessError(f"worker: {problem.strip().splitlines()[-1:] or ['no trace']}"[:600])
+            said = problem.strip().splitlines()
+            raise HarnessError(f"worker: {said[-1] if said else 'expected a trace, found none'}"[:600])
         return trace_from_json(answer["trace"])
 
     def _answer(self) -> bytes:
@@ -92,10 +93,10 @@ class WorkerProcess:
 
     def close(self) -> None:
         """Hang up; the worker and whatever it started end at once."""
-        self._line.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
+        self._line.close()  # last: a thread that waits for an answer has been woken by the end of the worker
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,17 +157,19 @@ class Recorder:
         problem = ""
         for _ in range(TRIES):
             worker = self._idle.get()
+            usable = None
             try:
                 worker = worker or self._start()
                 trace = worker.run(job.plan)
-                self._idle.put(worker)
+                usable = worker
                 return trace
             except HarnessError as error:
                 problem = error.message
                 self._discard(worker)
-                self._idle.put(None)
                 if self._closed:
                     break
+            finally:
+                self._idle.put(usable)
         clock = ClockKind(job.plan.clock)
         return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
 

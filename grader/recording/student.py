@@ -20,7 +20,8 @@ from grader.recording.isolation.protocol import Command
 
 #: How the host's processes write log records on standard error, so that they can be told from other output.
 LOG_FORMAT = "\x1e{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
-LOG_RECORD = re.compile("\x1e([A-Z]+)\x1f([^\x1f]*)\x1f([^\x1f]*)\x1f([0-9]+)\x1f(.*?)\x1d\n?", re.DOTALL)
+#: No part of a record runs over the start of the next one: a stream of starts without ends is read in linear time.
+LOG_RECORD = re.compile("\x1e([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?")
 #: Output of one stream beyond this is read, but not kept.
 OUTPUT_BYTES = 1 << 20
 #: A report longer than this is not the host's.
@@ -118,7 +119,7 @@ class Student:
         line, _, self._pending = self._pending.partition(b"\n")
         try:
             data = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             return None
         return data if isinstance(data, dict) else None
 
@@ -154,7 +155,7 @@ class Student:
             source.close()
             return False
         room = OUTPUT_BYTES - self._kept[stream]
-        if len(found) > room > 0:
+        if self._kept[stream] <= OUTPUT_BYTES < self._kept[stream] + len(found):
             self.notes.append(f"{self.name}: output on {stream} beyond {OUTPUT_BYTES >> 20} MiB was not kept")
         self._streams[stream] += found[: max(0, room)]
         self._kept[stream] += len(found)
@@ -171,7 +172,7 @@ class Student:
         """Return the complete records and lines written since the last time; `final` adds an unfinished line."""
         found: list[LogRecord | OutputLine] = []
         for stream, buffer in self._streams.items():
-            end = len(buffer) if final else _complete(buffer)
+            end = len(buffer) if final else _complete(buffer, records=stream == "stderr")
             text = bytes(buffer[:end]).decode("utf-8", "backslashreplace")
             del buffer[:end]
             found += self._parsed(t_ns, stream, text)
@@ -226,9 +227,11 @@ class Student:
                 source.close()
 
 
-def _complete(buffer: bytearray) -> int:
-    """Return how much of a buffer consists of whole lines and whole log records."""
+def _complete(buffer: bytearray, *, records: bool) -> int:
+    """Return how much of a buffer consists of whole lines and, on a stream that has them, whole log records."""
     end = buffer.rfind(b"\n") + 1
+    if not records:
+        return end
     opened = buffer.rfind(b"\x1e", 0, end)
     if opened > buffer.rfind(b"\x1d", 0, end):
         return opened
