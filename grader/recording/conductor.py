@@ -50,6 +50,8 @@ UNSETTLED = {
 #: Limits of one scenario; reaching one ends it with a mark.
 MESSAGES = 20_000
 STEPS = 400_000
+#: A process that has more to say than this before it waits or ends does not talk like the host.
+WORDS = 10_000
 
 
 class Conductor:
@@ -144,7 +146,7 @@ class Conductor:
         moments += [self._due[0].t_ns] if self._due else []
         for other in self._students:
             if other is not student and not other.ended:
-                moments += [self._now_ns] if other.arrivals else []
+                moments += [self._now_ns] if other.arrivals or other.nudged else []
                 moments += [other.wake_ns] if other.wake_ns is not None else []
         return max(self._now_ns, min(moments))
 
@@ -156,7 +158,7 @@ class Conductor:
 
     def _hear(self, student: Student) -> None:
         """Wait until a process has nothing left to do at this instant, or has ended."""
-        while True:
+        for _ in range(WORDS):
             report = student.report()
             kind = None if report is None else report.get("kind")
             if report is None or kind not in ("note", "fault", "idle", "exited"):
@@ -178,6 +180,7 @@ class Conductor:
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
             return
+        self._bury(student)
 
     def _account(self, student: Student, report: Mapping[str, Any]) -> None:
         """Take what a process has published, let it reach everybody, and match new endpoints."""
@@ -308,7 +311,8 @@ class Conductor:
             self._bury(student)
             return
         student.nudged = True  # a match is an event that a node may have a callback for
-        for name in answer.get("missing", ()):
+        missing = answer.get("missing")
+        for name in missing[:WORDS] if isinstance(missing, list) else ():
             self._notes.append(f"{student.name}: {str(name)[:200]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
@@ -421,7 +425,7 @@ class Conductor:
 def _counts(data: Any) -> dict[str, int]:
     if not isinstance(data, dict):
         return {}
-    return {str(name): count for name, count in data.items() if isinstance(count, int) and count > 0}
+    return {str(name): min(count, MESSAGES) for name, count in data.items() if isinstance(count, int) and count > 0}
 
 
 def _is_claim(claim: Any) -> bool:
