@@ -105,6 +105,8 @@ class Endpoint:
         reliability: `reliable` or `best_effort`.
         durability: `volatile` or `transient_local`.
         depth: History depth, 0 if unknown.
+        deadline_ns: Deadline offered or asked for, 0 for none.
+        liveliness: `automatic` or `manual_by_topic`.
     """
 
     kind: str
@@ -115,6 +117,8 @@ class Endpoint:
     reliability: str
     durability: str
     depth: int = 0
+    deadline_ns: int = 0
+    liveliness: str = "automatic"
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,8 @@ IMPATIENT_S = 0.05
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: A node that needs more processor seconds than this a virtual second is judged on the real clock.
 BUSY_SHARE = 0.5
+#: Beyond that share of the whole observation, and this much more, there is no need to go on in virtual time.
+HOPELESS_NS = 2 * NS_PER_S
 #: What a host says when its program does not settle, in words.
 UNSETTLED = {
     "threads": "the node's threads wait for each other without blocking",
@@ -137,6 +139,8 @@ class Conductor:
         student.tell({"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals})
         self._hear(student)
         self._steps += 1
+        if self._plan.stop_when_unfit and self._hopeless():
+            self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._stop_early(f"stopped after {STEPS} wake-ups")
 
@@ -323,7 +327,7 @@ class Conductor:
                 1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
             )
         if kind == "subscription":
-            stimulus = self._streams.get(name) == claim["type"]
+            stimulus = self._streams.get(name) == claim["type"] and _takes_ordinary(claim)
             return int(stimulus) + sum(_compatible(c, claim) for c in claims if c["kind"] == "publisher")
         wanted = "service" if kind == "client" else "client"
         return int(kind == "client" and any(c["kind"] == wanted and c["name"] == name for c in claims))
@@ -379,7 +383,7 @@ class Conductor:
         latched = any(c["latched"] for c in asked if c["type"] == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._streams[topic] = interface
-        readers = [c for c in asked if c["type"] == interface]
+        readers = [c for c in asked if c["type"] == interface and _takes_ordinary(c)]
         wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
         for student in self._students:
             if not student.ended and student.claims:
@@ -398,7 +402,7 @@ class Conductor:
         self._observations.append(Delivery(self._now_ns, due.topic, interface, value, cdr))
         self._observer.publish(due.topic, message)
         for student in self._students:
-            if any(c["type"] == interface for c in _readers(student, due.topic)):
+            if any(c["type"] == interface and _takes_ordinary(c) for c in _readers(student, due.topic)):
                 _add(student.arrivals, f"topic {due.topic}", 1)
 
     def _follow_type(self, topic: str) -> None:
@@ -411,10 +415,17 @@ class Conductor:
             self._observer.withdraw(topic)
             self._start_stream(topic, current)
 
+    def _hopeless(self) -> bool:
+        """Return whether it is clear already that virtual time hides how much processor time a node needs."""
+        busiest_ns = max(s.used_ns for s in self._students)
+        return busiest_ns > BUSY_SHARE * self._end_ns + HOPELESS_NS
+
     def _unfit(self) -> str:
         """Say why virtual time does not do these nodes justice, if it does not."""
         if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in self._observations):
             return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
+        if any(isinstance(o, Mark) and o.name == "limit" for o in self._observations):
+            return ""
         virtual_s = max(self._now_ns, NS_PER_S) / NS_PER_S
         busiest_s = max((s.used_ns for s in self._students), default=0) / NS_PER_S
         if busiest_s > BUSY_SHARE * virtual_s:
@@ -432,7 +443,8 @@ def _is_claim(claim: Any) -> bool:
     if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
         return False
     ends = claim["kind"] in ("publisher", "subscription")
-    return not ends or all(isinstance(claim.get(k), bool) for k in ("reliable", "latched"))
+    bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
+    return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
 
 
 def _readers(student: Student, topic: str) -> list[dict[str, Any]]:
@@ -445,7 +457,14 @@ def _compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
         (writer["name"], writer["type"]) == (reader["name"], reader["type"])
         and (writer["reliable"] or not reader["reliable"])
         and (writer["latched"] or not reader["latched"])
+        and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
+        and (writer["manual"] or not reader["manual"])
     )
+
+
+def _takes_ordinary(reader: dict[str, Any]) -> bool:
+    """Return whether a subscription takes what a stimulus offers: no deadline, automatic liveliness."""
+    return reader["deadline_ns"] == 0 and not reader["manual"]
 
 
 def _add(arrivals: dict[str, int], channel: str, count: int) -> None:

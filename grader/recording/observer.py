@@ -17,7 +17,7 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from grader.model.trace import Endpoint, GraphSnapshot
@@ -27,6 +27,8 @@ BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 DEPTH = 5000
 #: Messages larger than this are counted, but neither decoded nor kept.
 MESSAGE_BYTES = 1 << 20
+#: Durations of QoS policies from here on mean for ever.
+INFINITE_NS = 9_000_000_000_000_000_000
 TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
 
 
@@ -89,6 +91,7 @@ class Observer:
         prefix = bytes(info.endpoint_gid[:12])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
         latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        manual = info.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
         best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
         return Endpoint(
             kind=kind,
@@ -98,6 +101,8 @@ class Observer:
             participant=number,
             reliability="best_effort" if best_effort else "reliable",
             durability="transient_local" if latched else "volatile",
+            deadline_ns=_finite_ns(info.qos_profile.deadline),
+            liveliness="manual_by_topic" if manual else "automatic",
         )
 
     def watch(self, graph: GraphSnapshot) -> list[str]:
@@ -200,6 +205,12 @@ def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float 
             return False
         time.sleep(pause_s)
     return True
+
+
+def _finite_ns(duration: Any) -> int:
+    """Return a QoS duration in nanoseconds; 0 for none, which DDS calls infinite."""
+    nanoseconds = int(duration.nanoseconds)
+    return nanoseconds if 0 < nanoseconds < INFINITE_NS else 0
 
 
 def _full_name(name: str, space: str) -> str:

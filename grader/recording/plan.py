@@ -55,6 +55,7 @@ class Plan:
         numbers: Stimuli.
         recordings: Stimuli.
         clock: `virtual` or `wall`.
+        stop_when_unfit: Whether a run on the virtual clock may end as soon as it is clear that it does no justice.
     """
 
     scenario: str
@@ -67,6 +68,7 @@ class Plan:
     numbers: tuple[PlannedNumbers, ...]
     recordings: tuple[PlannedRecording, ...]
     clock: str
+    stop_when_unfit: bool = False
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage

@@ -54,7 +54,8 @@ class Studio:
             clock: `virtual`, `wall` or `auto`.
             progress: Hears which job begins.
         """
-        traces = dict(zip(jobs, self.recorder.record(list(jobs.values()), progress), strict=True))
+        first = [replace(job, plan=replace(job.plan, stop_when_unfit=clock == AUTO)) for job in jobs.values()]
+        traces = dict(zip(jobs, self.recorder.record(first, progress), strict=True))
         for key, trace in traces.items():
             if clock == AUTO and trace.clock_reason and not trace.harness_problem:
                 again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL))

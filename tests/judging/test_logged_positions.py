@@ -116,13 +116,11 @@ def test_a_standing_robot_costs_nothing() -> None:
     assert POSITION.judge(position_logs(plain, standing=True).trace()).credit == 1
 
 
-def test_a_single_log_is_not_enough() -> None:
-    """A position logged once in 16 s is said to be logged once only."""
-    finding = POSITION.judge(position_logs(plain, [6.0]).trace())
-    assert finding.credit == 0
-    assert finding.evidence["cause"] == "few"
-    assert "once only" in finding.reason
-    assert PERIOD.judge(position_logs(plain, [6.0]).trace()).credit == 0
+def test_a_single_right_log_is_wrong_in_period_only() -> None:
+    """A position logged once in 16 s is the position; that it never comes again is the period's business."""
+    trace = position_logs(plain, [6.0]).trace()
+    assert POSITION.judge(trace).credit == 1
+    assert PERIOD.judge(trace).credit == 0
 
 
 def test_what_is_written_before_the_first_message_is_free() -> None:

@@ -68,13 +68,18 @@ class LogsPosition:
         if isinstance(track, Finding):
             return track
         logged = logged_positions(trace, self.process, track)
-        if logged.met:
+        if self._shows(trace, logged):
             return met(self._right(logged), _evidence(logged))
         printed = printed_positions(trace, self.process, track)
-        if printed.met:
+        if self._shows(trace, printed):
             return partly(f"{self._right(printed)}, printed and not logged", _evidence(printed), hint=_LOGGER_HINT)
         chosen = logged if logged.groups or not printed.groups else printed
         return self._explain(trace, track, chosen)
+
+    def _shows(self, trace: Trace, found: Analysis) -> bool:
+        """Return whether the position is shown: how often is the period's question, unless a fault cut it short."""
+        lived = first_fault(trace, self.process) is None
+        return found.met or (lived and bool(found.right) and not found.wrong)
 
     def _right(self, found: Analysis) -> str:
         first = found.right[0]

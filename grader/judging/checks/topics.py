@@ -12,7 +12,7 @@ from grader.judging.values import field, leaves, published
 from grader.judging.wording import counted, moment, number, quote
 from grader.model.exercise import Finding
 from grader.model.quantities import SLACK, seconds, within
-from grader.model.trace import Message, Trace
+from grader.model.trace import Endpoint, Message, Trace
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Subscribes:
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
-        fitting = [e for e in mine if e.durability != "transient_local"]
+        fitting = [e for e in mine if not _demand(e)]
         chosen = (fitting or mine)[0]
         evidence = {
             "topic": self.topic,
@@ -66,9 +66,23 @@ class Subscribes:
         }
         if fitting:
             return met(f"{self.topic}: {quote(chosen.node)} subscribes with type {self.type}", evidence)
-        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for transient_local durability, "
-        reason += "which a volatile publisher does not offer: no message arrives"
+        reason = (
+            f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}: no message arrives"
+        )
         return not_met(reason, evidence, hint="subscribe with the default durability: pass the queue depth 10 as QoS")
+
+
+def _demand(subscription: Endpoint) -> str:
+    """Return what a subscription asks for that an ordinary publisher does not offer; empty if nothing."""
+    if subscription.durability == "transient_local":
+        return "transient_local durability, which a volatile publisher does not offer"
+    if subscription.deadline_ns:
+        return (
+            f"a deadline of {number(seconds(subscription.deadline_ns))} s, which a publisher without one does not offer"
+        )
+    if subscription.liveliness == "manual_by_topic":
+        return "manual_by_topic liveliness, which a publisher with automatic liveliness does not offer"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
