@@ -64,7 +64,7 @@ def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) 
     return [_mistake(one, tree, model) for one in errors if not _follows_from_another(one, errors)]
 
 
-def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:  # noqa: ANN401 - pydantic_core's own dict
+def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:
     """Return whether an error goes away with another: a misspelt key, a list cut short."""
     *parent, name = one["loc"] or ("",)
     if one["type"] == "missing":
@@ -73,7 +73,7 @@ def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:  # noqa: ANN
     return one["type"] == "too_short" and bool(one["input"])
 
 
-def _mistake(one: Any, tree: YamlTree, model: type[BaseModel]) -> Mistake:  # noqa: ANN401 - pydantic_core's own dict
+def _mistake(one: Any, tree: YamlTree, model: type[BaseModel]) -> Mistake:
     path, where = nearest_position(tree.values, one["loc"])
     kind, name = one["type"], str(one["loc"][-1]) if one["loc"] else ""
     if kind == "missing":
@@ -117,7 +117,7 @@ def _shape_in(annotation: object) -> type[BaseModel] | None:
     return shape
 
 
-def _first(annotation: Any, wanted: Callable[[Any], bool]) -> Any:  # noqa: ANN401 - annotations are of any kind
+def _first(annotation: Any, wanted: Callable[[Any], bool]) -> Any:
     """Return the first part of an annotation that is wanted, outside in."""
     if wanted(annotation):
         return annotation

@@ -29,7 +29,7 @@ def schema_text() -> str:
     return json.dumps(rubric_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def _tidy(node: Any, *, names: bool = False) -> Any:  # noqa: ANN401 - any JSON value
+def _tidy(node: Any, *, names: bool = False) -> Any:
     """Drop what speaks of Python only: generated titles, and defaults that a rubric could not write.
 
     Args:
