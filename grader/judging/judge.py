@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from grader.judging.asking import Answer, ask
 from grader.judging.diagnosis.diagnose import diagnose
+from grader.judging.diagnosis.notes import placed
 from grader.judging.silence import on_student_topic
 from grader.judging.verdicts import Bench
 from grader.model.exercise import Exercise
@@ -45,7 +46,7 @@ def judge_exercise(
         clock_reason=next((r for r in reasons if r), ""),
         verdicts=_explained(bench.verdicts(), exercise, traces, submission, sources),
         faults=_faults(recorded),
-        notes=tuple(dict.fromkeys(note for _, t in recorded for note in t.notes)),
+        notes=_notes(recorded, submission, sources),
         graph=_graph(exercise, traces),
     )
 
@@ -58,6 +59,13 @@ def _explained(
     sources: Mapping[str, str] | None,
 ) -> tuple[Verdict, ...]:
     return verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources)
+
+
+def _notes(
+    recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
+) -> tuple[str, ...]:
+    notes = tuple(dict.fromkeys(note for _, t in recorded for note in t.notes))
+    return notes if sources is None else placed(notes, submission, sources)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:

@@ -33,7 +33,10 @@ def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
 
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     """Return the lines that a process printed; tracebacks, interpreter warnings and blank lines are not printing."""
+    faults = [" ".join(f.text.split()) for f in trace.faults(process)]
     lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
+    # the text of an exception may go on over several lines, at the margin like printed ones
+    lines = [o for o in lines if o.stream != "stderr" or not any(" ".join(o.text.split()) in f for f in faults)]
     outs = [o for o in lines if o.stream != "stderr"]
     errs = _without_interpreter_noise([o for o in lines if o.stream == "stderr"])
     kept = {id(o) for o in [*outs, *errs]}

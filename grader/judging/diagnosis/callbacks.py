@@ -148,7 +148,7 @@ def _shut_down_early(case: Case) -> Clue | None:
     if case.faulty is None or not case.said(rf"{texts}|InvalidHandle|context is (not valid|invalid)"):
         return None
     fault, source = case.faulty
-    for call in source.calls("shutdown", "try_shutdown", "destroy_node"):
+    for call in source.calls("shutdown", "try_shutdown", "destroy_node", "destroy_publisher"):
         function = source.function_of(call)
         if function is not None and source.is_method(function) and function.name not in ("__del__", "destroy_node"):
             hint = f"{source.code(call)} in {function.name} ends the node while it runs: take it out"

@@ -160,8 +160,7 @@ def _only_attribute(source: Source, name: ast.Attribute) -> ast.expr | None:
 
 def bindings(source: Source, name: str) -> list[ast.AST]:
     """Return the statements that give a plain name a value, in the order of the text."""
-    stores = (n for n in source.all(ast.Name) if n.id == name and isinstance(n.ctx, ast.Store))
-    return [source.parents[n] for n in stores if n in source.parents]
+    return [source.parents[n] for n in source.stored.get(name, ()) if n in source.parents]
 
 
 def _value(statement: ast.AST | None) -> ast.expr | None:

@@ -6,7 +6,7 @@ import ast
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
-from grader.judging.diagnosis.source import Source, chain
+from grader.judging.diagnosis.source import Source, chain, last_name, subtree
 from grader.judging.diagnosis.wiring import made, target_of
 
 
@@ -20,8 +20,9 @@ def _wrong_field_type(case: Case) -> Clue | None:
         inner = ", ".join(MESSAGE_FIELDS.get(message, ())) or "fields"
         return Clue(f"{target.removesuffix(' = ') or field} is a {message}: set its own {inner} one by one")
     if type_ != "float":
-        other = {"int": "a whole number: int(...)", "str": "text: str(...)", "bool": "True or False"}.get(type_)
-        return Clue(f"the field {field} takes {other}") if other else None
+        other = {"int": "a whole number", "str": "text", "bool": "True or False"}.get(type_)
+        written = case.source.code(value, 40) if value is not None and case.source is not None else "..."
+        return Clue(f"the field {field} takes {other}: write {target}{type_}({written})") if other else None
     if value is None or case.source is None:
         return Clue(f"the field {field} takes a float: write 0.5 or 0.0, or float(...) around a variable")
     return _not_a_float(case.source, value, target)
@@ -132,8 +133,31 @@ def _name_of(source: Source, node: ast.AST) -> str:
 
 
 def _logger_arguments(case: Case) -> Clue | None:
+    if case.said(r"rclpy_logging_rcutils_log\(\): incompatible function arguments"):
+        return Clue("the logger takes text: put the value into an f-string, info(f'{value}')")
     found = case.said(r"RcutilsLogger\.(\w+)\(\) takes 2 positional arguments but \d+ were given")
     return Clue(f"{found[1]} takes one text: put the values into it, {found[1]}(f'... {{value}}')") if found else None
+
+
+def _own_raise(case: Case) -> Clue | None:
+    """The student's own raise ends the node."""
+    if case.faulty is None or not case.said(""):
+        return None
+    fault, source = case.faulty
+    raised = next(source.on_line(fault.line, ast.Raise), None)
+    if raised is None or source.function_at(fault.line) is None:
+        return None
+    return Clue(f"{source.code(raised)} ends the node: log a warning instead, and go on")
+
+
+def _recursion(case: Case) -> Clue | None:
+    found = case.said(r"^RecursionError") and case.faulty
+    function = found[1].function_at(found[0].line) if found else None
+    if not found or function is None or f" in {function.name}" not in "".join(found[0].frames[-3:]):
+        return None
+    named = any(last_name(n) == function.name for n in subtree(function) if isinstance(n, (ast.Name, ast.Attribute)))
+    hint = f"{function.name} uses itself again and again: give what it stands for another name"
+    return Clue(hint, found[1].place(function)) if named else None
 
 
 def _unattended(case: Case) -> Clue | None:
@@ -156,4 +180,6 @@ CRASHES = (
     Cause("wrong_attribute", _wrong_attribute),
     Cause("logger_arguments", _logger_arguments),
     Cause("unattended", _unattended),
+    Cause("endless_recursion", _recursion),
+    Cause("own_raise", _own_raise),
 )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.sensor import RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.callbacks import CALLBACKS
@@ -97,7 +98,10 @@ class _Said:
         trace = traces.get(criterion.scenario)
         if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
             return verdict
-        found = clue_for(self._case(verdict, criterion, trace, sources))
+        try:
+            found = clue_for(self._case(verdict, criterion, trace, sources))
+        except Exception:
+            found = None
         earlier = "" if found is not None else self._follows(criterion.check, verdict)
         if verdict.outcome is Outcome.NOT_MET:
             self.lost[criterion.id] = criterion.check
@@ -120,13 +124,15 @@ class _Said:
         """Return the criterion whose loss explains that two nodes do not work together; empty if none surely does."""
         if not isinstance(check, AnswersTogether):
             return ""
-        parts = (" for ", f"{check.output}: never ", f"{check.output}: nothing ")
-        fixed = "never changes, because" in verdict.reason
-        answered = not fixed and any(part in verdict.reason for part in parts)
+        reason = verdict.reason
+        fixed = "never changes, because" in reason
+        stopped = reason.startswith(f"{check.input}: nothing ")
+        answered = " for " in reason or "answers fit" in reason or reason.startswith(f"{check.output}: n")
         for id_, other in self.lost.items():
             controller = isinstance(other, ThresholdResponse) and other.output == check.output
             sensor = isinstance(other, RandomInRange) and other.topic == check.input
-            if (controller and answered) or (sensor and fixed):
+            pace = isinstance(other, TopicRate) and other.topic == check.input
+            if (controller and answered and not fixed) or (sensor and fixed) or (pace and stopped):
                 return id_
         return ""
 

@@ -11,9 +11,9 @@ from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.fields import given_leaf
-from grader.judging.diagnosis.silence import silent_topic
+from grader.judging.diagnosis.silence import silent_topic, timer_code
 from grader.judging.diagnosis.source import Source, chain, last_name, subtree
-from grader.judging.diagnosis.wiring import made_for, publish_calls, reached, roots
+from grader.judging.diagnosis.wiring import conditions, made, made_for, publish_calls, reached, roots
 from grader.judging.values import published, readings
 from grader.judging.wording import number
 from grader.model.quantities import within
@@ -166,7 +166,9 @@ def _wrong_answer(case: Case) -> Clue | None:
     places = [n for n in _answers(source) if _is_worth(source, n, value)]
     if len(places) != 1:
         return None
-    hint = f"{source.code(places[0])} answers {number(value)}: it must be {wanted}"
+    whole = isinstance(places[0], (ast.Assign, ast.keyword))
+    said = f"{source.code(places[0])} answers {number(value)}" if whole else f"{number(value)} is answered here"
+    hint = f"{said}: it must be {wanted}"
     return Clue(hint, source.place(places[0]), key=f"answer:{number(value)}")
 
 
@@ -234,6 +236,41 @@ def _latched(case: Case) -> Clue | None:
     return None
 
 
+def _slow_timer(case: Case) -> Clue | None:
+    """A timer answers too seldom."""
+    found = _controller(case)
+    if found is None:
+        return None
+    source, check = found
+    calls = publish_calls(source, made_for(source, "publisher", check.output))
+    for item in made(source, "timer"):
+        worth = constant(source, item.period)
+        inside = set(reached(source, roots(source, item.callback)))
+        if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
+            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
+            return Clue(hint, source.place(worth.origin), key="slow_timer")
+    return None
+
+
+def _answered_once(case: Case) -> Clue | None:
+    """A flag lets one answer through."""
+    found = _controller(case)
+    if found is None:
+        return None
+    source, check = found
+    if len(published(case.trace, check.output)) > 2:
+        return None
+    for call in publish_calls(source, made_for(source, "publisher", check.output)):
+        for test in conditions(source, call):
+            names = {chain(n) for n in subtree(test.test) if isinstance(n, ast.Attribute)}
+            function = source.function_of(call)
+            stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
+            if stores and function is not None:
+                hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
+                return Clue(hint, source.place(test), key="answered_once")
+    return None
+
+
 def _in_constructor(source: Source, node: ast.AST) -> bool:
     function = source.function_of(node)
     return function is not None and function.name == "__init__"
@@ -266,5 +303,7 @@ FAN = (
     Cause("other_threshold", _other_threshold),
     Cause("wrong_answer", _wrong_answer),
     Cause("one_branch", _one_branch),
+    Cause("answered_once", _answered_once),
     Cause("latched", _latched),
+    Cause("slow_timer", _slow_timer),
 )

@@ -105,8 +105,10 @@ def _misplaced(case: Case) -> Clue | None:
         if chosen is mine and numbers.get(there[0]) is not None and _exchanged(case, path, there[0], value):
             hint = f"{path} and {there[0]} are exchanged: {wrong.source.code(chosen[0].node)} must get {number(want)}"
             return Clue(hint, wrong.source.place(chosen[0].node), key="exchanged")
+        if chosen is not places:
+            return None
         hint = f"{wrong.source.code(chosen[0].node)} puts {number(want)} into {there[0]}: it belongs in {path}"
-        return Clue(hint, wrong.source.place(chosen[0].node)) if chosen is places else None
+        return Clue(hint, wrong.source.place(chosen[0].node), key=f"astray:{first_line(chosen[0].node)}")
     return None
 
 
@@ -119,6 +121,50 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
     ) or (
         isinstance(case.criterion.check, FieldValues) and _is(case.criterion.check.values.get(other, math.nan), value)
     )
+
+
+def _strayed(case: Case) -> Clue | None:
+    """A field that must be zero holds what the exercise wants in another."""
+    wrong = _wrong(case)
+    if wrong is None:
+        return None
+    numbers = leaves(wrong.message.value)
+    others = {p: v for check in case.siblings if isinstance(check, FieldValues) for p, v in check.values.items()}
+    for path, value in wrong.found.items():
+        homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]
+        places = [g for g in given(wrong.source, path) if g.worth is not None and _is(g.worth.value, value)]
+        if _is(wrong.wanted[path], 0.0) and len(homes) == 1 and len(places) == 1:
+            hint = f"{wrong.source.code(places[0].node)} puts {number(value)} into {path}: it belongs in {homes[0]}"
+            return Clue(hint, wrong.source.place(places[0].node), key=f"astray:{first_line(places[0].node)}")
+    return None
+
+
+def _sometimes(case: Case) -> Clue | None:
+    """The field gets the right number, but not for every message."""
+    wrong = _wrong(case)
+    if wrong is None:
+        return None
+    source = wrong.source
+    for path, want in wrong.wanted.items():
+        places = given(source, path)
+        if (
+            path not in wrong.found
+            or len(places) != 1
+            or places[0].worth is None
+            or not _is(places[0].worth.value, want)
+        ):
+            continue
+        code = source.code(places[0].node)
+        test = next((n for n in source.around(places[0].node) if isinstance(n, ast.If)), None)
+        if test is not None and source.function_of(test) is not None:
+            hint = f"{code} runs only under 'if {source.code(test.test, 40)}': every message needs it"
+            return Clue(hint, source.place(places[0].node), key=f"sometimes:{first_line(test)}")
+        function = source.function_of(places[0].node)
+        sends = [c for c in source.calls("publish") if function is not None and source.function_of(c) is function]
+        if sends and all(first_line(c) < first_line(places[0].node) for c in sends):
+            hint = f"{code} comes after {source.code(sends[0])}: set the fields before the message is sent"
+            return Clue(hint, source.place(places[0].node), key=f"late:{first_line(sends[0])}")
+    return None
 
 
 def _never_given(case: Case) -> Clue | None:
@@ -191,6 +237,8 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
 
 FIELDS = (
     Cause("misplaced_field", _misplaced),
+    Cause("strayed_value", _strayed),
+    Cause("not_every_message", _sometimes),
     Cause("field_never_set", _never_given),
     Cause("wrong_number", _wrong_number),
 )

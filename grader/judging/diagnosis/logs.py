@@ -13,7 +13,7 @@ from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.silence import timer_code
 from grader.judging.diagnosis.source import Source, argument, chain, last_name, text_of
-from grader.judging.diagnosis.wiring import Made, is_log, made, made_for, reached, roots
+from grader.judging.diagnosis.wiring import Made, is_log, made, made_for, python_loggers, reached, roots
 from grader.judging.output import printed_lines, student_records
 from grader.judging.wording import number
 from grader.model.exercise import Location, Outcome
@@ -64,11 +64,13 @@ def _python_logging(case: Case) -> Clue | None:
     if not isinstance(check, UsesLogger) or case.source is None or case.fault is not None:
         return None
     source = case.source
-    own = [c for c in source.all(ast.Call) if chain(c.func).startswith("logging.") and last_name(c.func) in _LEVELS]
-    if not own:
+    names = python_loggers(source)
+    calls = (c for c in source.calls(*_LEVELS) if chain(c.func).rpartition(".")[0] in names)
+    own = next(calls, None)
+    if own is None:
         return None
-    hint = f"{source.code(own[0])} is Python's own logging, which ROS does not see: self.get_logger().info(...)"
-    return Clue(hint, source.place(own[0]))
+    hint = f"{source.code(own, 60)} is Python's own logging, which ROS does not see: self.get_logger().info(...)"
+    return Clue(hint, source.place(own))
 
 
 _LEVELS = ("debug", "info", "warning", "warn", "error", "critical", "exception")
@@ -83,7 +85,7 @@ def _nothing_logged(case: Case) -> bool:
 def _debug_only(case: Case) -> Clue | None:
     if not _nothing_logged(case) or case.source is None or list(case.source.calls("set_level")):
         return None
-    logs = [n for n in case.source.all(ast.Call) if is_log(n)]
+    logs = [n for n in case.source.all(ast.Call) if is_log(case.source, n)]
     if not logs or any(last_name(c.func) != "debug" for c in logs):
         return None
     hint = f"{case.source.code(logs[0], 60)} is not shown: the level is INFO unless it is changed; use info"
@@ -91,7 +93,11 @@ def _debug_only(case: Case) -> Clue | None:
 
 
 def _commented_out(case: Case) -> Clue | None:
-    if not _nothing_logged(case) or case.source is None or any(is_log(n) for n in case.source.all(ast.Call)):
+    if (
+        not _nothing_logged(case)
+        or case.source is None
+        or any(is_log(case.source, n) for n in case.source.all(ast.Call))
+    ):
         return None
     row = next((k for k, line in enumerate(case.source.lines, 1) if _COMMENTED_LOG.match(line[:300])), 0)
     if not row or case.verdict.outcome is Outcome.PARTLY:
@@ -106,10 +112,10 @@ def position_log(case: Case) -> ast.Call | None:
     source = case.source
     lines = Counter(r.line for r in student_records(case.trace, case.process) if r.file == source.file and r.line)
     for row, _ in lines.most_common():
-        call = next((c for c in source.on_line(row, ast.Call) if is_log(c)), None)
+        call = next((c for c in source.on_line(row, ast.Call) if is_log(source, c)), None)
         if call is not None:
             return call
-    logs = [n for n in source.all(ast.Call) if is_log(n)]
+    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
     return logs[0] if len(logs) == 1 else None
 
 
@@ -117,24 +123,37 @@ def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback that sets the pace of the logs."""
     check = case.criterion.check
     average = case.evidence("average_period_s")
-    if not isinstance(check, LogPeriod) or case.source is None or case.fault is not None:
+    call = position_log(case) if isinstance(check, LogPeriod) and case.fault is None else None
+    if not isinstance(check, LogPeriod) or case.source is None or call is None or not isinstance(average, float):
         return None
-    source, call, wanted = case.source, position_log(case), seconds(check.period)
-    if call is None or not isinstance(average, float):
-        return None
-    throttle = argument(call, 99, "throttle_duration_sec")
-    worth = constant(source, throttle)
+    source, wanted_s = case.source, seconds(check.period)
+    worth = constant(source, argument(call, 99, "throttle_duration_sec"))
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
         hint = f"throttle_duration_sec={number(worth.value)} lets a log through every {number(worth.value)} s"
-        return Clue(f"{hint}: write {wanted}", source.place(worth.origin), key="log_pace")
+        return Clue(f"{hint}: write {wanted_s}", source.place(worth.origin), key="log_pace")
     timers = [m for m in made(source, "timer") if call in set(reached(source, roots(source, m.callback)))]
     if timers:
-        return _timer_pace(source, timers, average, wanted) if len(timers) == 1 else None
+        return _timer_pace(source, timers, average, wanted_s) if len(timers) == 1 else None
+    return _message_pace(case, source, call)
+
+
+def _message_pace(case: Case, source: Source, call: ast.Call) -> Clue | None:
+    """The log is written in the callback of the subscription, each time or every so many times."""
     heard = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
-    if heard and throttle is None and "one for every message" in case.verdict.reason:
-        hint = "this logs every message: give it throttle_duration_sec=1.0, or log the newest position from a timer"
-        return Clue(hint, source.place(call), key="log_pace")
-    return None
+    if not heard or argument(call, 99, "throttle_duration_sec") is not None:
+        return None
+    counted_by = next((n for n in source.around(call) if isinstance(n, ast.If) and _counts(n.test)), None)
+    if counted_by is not None:
+        hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of 1.0 s"
+        return Clue(hint, source.place(counted_by), key="log_pace")
+    if "one for every message" not in case.verdict.reason:
+        return None
+    hint = "this logs every message: give it throttle_duration_sec=1.0, or log the newest position from a timer"
+    return Clue(hint, source.place(call), key="log_pace")
+
+
+def _counts(test: ast.expr) -> bool:
+    return any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod) for n in ast.walk(test))
 
 
 def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: float) -> Clue | None:
@@ -147,12 +166,26 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
 
 def _logged_once(case: Case) -> Clue | None:
     check = case.criterion.check
-    call = position_log(case) if isinstance(check, (LogPeriod, LogsPosition)) and case.fault is None else None
-    once = argument(call, 99, "once") if call is not None else None
-    if call is None or case.source is None or not (isinstance(once, ast.Constant) and once.value is True):
+    asks = isinstance(check, (LogPeriod, LogsPosition, LogsReceived)) and case.fault is None
+    call = position_log(case) if asks else None
+    if call is None or case.source is None:
         return None
-    hint = "once=True lets this log through a single time: take it out"
-    return Clue(hint, case.source.place(call), key="once")
+    once = argument(call, 99, "once")
+    if isinstance(once, ast.Constant) and once.value is True:
+        return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
+    few = case.evidence("cause") == "few" or case.evidence("logs") == 1
+    test = next((n for n in case.source.around(call) if isinstance(n, ast.If)), None)
+    if not few or test is None or not _set_inside(test):
+        return None
+    hint = f"under 'if {case.source.code(test.test, 40)}' this logs a single time: log again and again"
+    return Clue(hint, case.source.place(test), key="once")
+
+
+def _set_inside(test: ast.If) -> bool:
+    """Return whether a condition is changed by what stands under it."""
+    asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
+    stored = (t for s in test.body for n in ast.walk(s) if isinstance(n, ast.Assign) for t in n.targets)
+    return any(chain(t) in asked for t in stored)
 
 
 def _received_not_logged(case: Case) -> Clue | None:
@@ -166,15 +199,26 @@ def _received_not_logged(case: Case) -> Clue | None:
     if item is None or not start or not case.evidence("missing"):
         return None
     inside = list(reached(source, start))
-    logs = [n for n in inside if isinstance(n, ast.Call) and is_log(n)]
+    logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
+    if len(logs) == 1:
+        return _wrong_log(source, logs[0], inside)
+    elsewhere = any(is_log(source, n) and _shows(n, _stored(inside)) for n in source.all(ast.Call))
+    if logs or elsewhere or case.verdict.outcome is not Outcome.NOT_MET:
+        return None
     name = last_name(item.callback) or "the callback"
-    if not logs and case.verdict.outcome is Outcome.NOT_MET:
-        if any(is_log(n) and _mentions_stored(n, inside) for n in source.all(ast.Call)):
-            return None
-        return Clue(f"{name} receives the values and logs none of them: log msg.data in it", source.place(start[0]))
-    if len(logs) == 1 and not any(isinstance(n, (ast.Name, ast.Attribute)) for a in logs[0].args for n in _inner(a)):
-        return Clue("this log holds no value: log what was received, msg.data", source.place(logs[0]))
-    return None
+    return Clue(f"{name} receives the values and logs none of them: log msg.data in it", source.place(start[0]))
+
+
+def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | None:
+    """Return that a log shows no value, or only attributes that have nothing to do with the message."""
+    names = [n for a in log.args for n in _inner(a) if isinstance(n, (ast.Name, ast.Attribute))]
+    if not names:
+        return Clue("this log holds no value: log what was received, msg.data", source.place(log))
+    whole = [n for n in names if not isinstance(source.parents.get(n), ast.Attribute)]
+    own = [chain(n) for n in whole if chain(n).startswith("self.")]
+    if len(own) < len(whole) or set(own) & _stored(inside):
+        return None
+    return Clue(f"{source.code(log, 60)} does not show what was received: log msg.data", source.place(log))
 
 
 def _inner(node: ast.AST) -> list[ast.AST]:
@@ -184,17 +228,21 @@ def _inner(node: ast.AST) -> list[ast.AST]:
     return list(ast.walk(node))
 
 
-def _mentions_stored(log: ast.AST, callback: list[ast.AST]) -> bool:
-    """Return whether a log elsewhere shows an attribute that the callback stores."""
-    stored = {chain(n) for n in callback if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-    return any(chain(n) in stored for n in ast.walk(log) if isinstance(n, ast.Attribute))
+def _stored(callback: list[ast.AST]) -> set[str]:
+    """Return the attributes that a callback assigns."""
+    return {chain(n) for n in callback if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+
+
+def _shows(log: ast.AST, attributes: set[str]) -> bool:
+    """Return whether a log shows one of these attributes."""
+    return any(chain(n) in attributes for n in ast.walk(log) if isinstance(n, ast.Attribute))
 
 
 def _error_while_waiting(case: Case) -> Clue | None:
     check = case.criterion.check
     if not isinstance(check, WaitsGracefully) or case.source is None or case.verdict.location is None or case.fault:
         return None
-    logs = (c for c in case.source.on_line(case.verdict.location.line, ast.Call) if is_log(c))
+    logs = (c for c in case.source.on_line(case.verdict.location.line, ast.Call) if is_log(case.source, c))
     call = next(logs, None)
     if call is None or last_name(call.func) not in ("error", "fatal"):
         return None

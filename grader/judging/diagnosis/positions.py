@@ -6,8 +6,9 @@ import ast
 
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.source import Source, chain, first_line, last_name
+from grader.judging.diagnosis.source import Source, argument, chain, first_line, last_name, subtree
 from grader.judging.diagnosis.wiring import made, reached, roots
 from grader.model.exercise import Outcome
 
@@ -118,7 +119,7 @@ def _wrong_axis(case: Case) -> Clue | None:
     if source is None or call is None:
         return None
     missing = "y" if case.evidence("cause") == "only_x" else "x"
-    return Clue(f"{source.code(call, 60)} shows one number: log {_POSITION}.{missing} too", source.place(call))
+    return Clue(f"{source.code(call, 60)} does not show {missing}: log {_POSITION}.{missing} too", source.place(call))
 
 
 def _kept_first(case: Case) -> Clue | None:
@@ -132,6 +133,67 @@ def _kept_first(case: Case) -> Clue | None:
                 hint = f"under 'if {source.code(node.test, 40)}' only the first message is stored: store each one"
                 return Clue(hint, source.place(node))
     return None
+
+
+def _rounded_away(case: Case) -> Clue | None:
+    """`round(x, -1)` leaves tens of metres."""
+    source = _found(case, "constant", "wrong")
+    for call in source.calls("round") if source is not None else ():
+        places = number_at(source, argument(call, 1, "ndigits")) if source is not None else None
+        if source is not None and places is not None and places < 0:
+            hint = f"{source.code(call)} leaves tens of metres: keep a decimal or two"
+            return Clue(hint, source.place(call))
+    return None
+
+
+def _never_stored(case: Case) -> Clue | None:
+    """The callback assigns local variables, and others are logged."""
+    source = _found(case, "constant")
+    if source is None:
+        return None
+    for item in made(source, "subscription"):
+        for function in roots(source, item.callback):
+            names = [n for n in reached(source, [function]) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+            lost = [n for n in names if source.stores(f"self.{n.id}")]
+            if lost:
+                first = min(lost, key=first_line)
+                hint = f"{first.id} is a variable of the callback only: assign to self.{first.id}"
+                return Clue(hint, source.place(first))
+    return None
+
+
+def _scaled(case: Case) -> Clue | None:
+    """The position is multiplied, as for another unit."""
+    source = _found(case, "wrong")
+    call = position_log(case) if source is not None else None
+    if source is None or call is None:
+        return None
+    for node in subtree(call):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Mult, ast.Div)):
+            factor = number_at(source, node.right)
+            if factor in (10, 100, 1000):
+                return Clue(f"{source.code(node)} is not in metres: log the number as it is", source.place(node))
+    return None
+
+
+def _held_up(case: Case) -> Clue | None:
+    """A callback that sleeps works through old messages."""
+    source = _found(case, "stale")
+    for item in made(source, "subscription") if source is not None else ():
+        for node in reached(source, roots(source, item.callback)) if source is not None else ():
+            if source is not None and isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
+                hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
+                return Clue(hint, source.place(node))
+    return None
+
+
+def _log_line(case: Case) -> Clue | None:
+    """Nothing better is known than the line that logs."""
+    source = _found(case, "wrong", "no_pair", "constant", "few", "stale", "sign")
+    call = position_log(case) if source is not None else None
+    if source is None or call is None or not case.verdict.hint:
+        return None
+    return Clue(case.verdict.hint, source.place(call))
 
 
 def _asks_for_none(test: ast.expr) -> bool:
@@ -154,4 +216,9 @@ POSITIONS = (
     Cause("no_sign", _no_sign),
     Cause("wrong_axis", _wrong_axis),
     Cause("kept_first", _kept_first),
+    Cause("rounded_away", _rounded_away),
+    Cause("never_stored", _never_stored),
+    Cause("scaled_position", _scaled),
+    Cause("old_messages", _held_up),
+    Cause("log_line", _log_line),
 )

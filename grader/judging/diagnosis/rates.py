@@ -13,7 +13,7 @@ from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.endings import head_of
 from grader.judging.diagnosis.silence import silent_topic, timer_code
 from grader.judging.diagnosis.source import Loop, Source, argument, chain, first_line, last_name
-from grader.judging.diagnosis.wiring import Made, made, made_for, publish_calls, reached, roots
+from grader.judging.diagnosis.wiring import Made, conditions, made, made_for, publish_calls, reached, roots
 from grader.judging.wording import number
 
 #: How far the rate that the text gives may lie from the measured one.
@@ -131,24 +131,21 @@ def _several(case: Case) -> Clue | None:
     """Each round publishes more than once, or several timers publish."""
     paced = _paced(case)
     timers = paced.timers() if paced is not None else []
-    if paced is None or not timers or math.isnan(paced.found_hz):
+    if paced is None or not timers or math.isnan(paced.found_hz) or "bursts" not in case.verdict.reason:
         return None
-    times = round(paced.found_hz / paced.wanted_hz)
-    if times < 2 or not math.isclose(paced.found_hz, times * paced.wanted_hz, rel_tol=_SAME):
+    source = paced.source
+    if len(timers) > 1:
+        hint = f"{len(timers)} timers publish, in {lines_of(timers[0].call, *(t.call for t in timers[1:]))}"
+        return Clue(f"{hint}: one is enough", source.place(timers[-1].call))
+    inside = [c for c in reached(source, roots(source, timers[0].callback)) if c in paced.calls]
+    if len(inside) > 1:
+        hint = f"publish is called {len(inside)} times a round, in {lines_of(inside[0], *inside[1:])}"
+        return Clue(f"{hint}: once is enough", source.place(max(inside, key=first_line)))
+    loop = next((n for c in inside for n in source.around(c) if isinstance(n, ast.For)), None)
+    if loop is None:
         return None
-    periods = [constant(paced.source, t.period) for t in timers]
-    if not all(p is not None and _same(p.value, paced.period_s) for p in periods):
-        return None
-    if len(timers) == times:
-        hint = (
-            f"{len(timers)} timers publish, in {lines_of(timers[0].call, *(t.call for t in timers[1:]))}: one is enough"
-        )
-        return Clue(hint, paced.source.place(timers[-1].call))
-    inside = [c for c in reached(paced.source, roots(paced.source, timers[0].callback)) if c in paced.calls]
-    if len(timers) == 1 and len(inside) == times:
-        hint = f"publish is called {times} times a round, in {lines_of(inside[0], *inside[1:])}: once is enough"
-        return Clue(hint, paced.source.place(max(inside, key=first_line)))
-    return None
+    hint = f"the loop '{head_of(source, loop)}' publishes several messages at once"
+    return Clue(f"{hint}: one every {number(paced.period_s)} s is asked for", source.place(loop))
 
 
 def _loop_pace(case: Case) -> Clue | None:
@@ -213,17 +210,38 @@ def _heard(source: Source, item: Made) -> list[ast.AST]:
 
 
 def _stopped_itself(case: Case) -> Clue | None:
-    """A callback cancels its timer or destroys the node."""
+    """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
     paced = _paced(case)
     if paced is None or ("stopped" not in case.verdict.reason and paced.count != 1):
         return None
+    source = paced.source
     for timer in paced.timers():
-        for node in reached(paced.source, roots(paced.source, timer.callback)):
-            ends = isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel")
-            if ends and isinstance(node, ast.Call):
-                hint = f"{paced.source.code(node)} ends the publishing: it has to go on until the node is stopped"
-                return Clue(hint, paced.source.place(node))
+        inside = list(reached(source, roots(source, timer.callback)))
+        for node in inside:
+            if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
+                hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
+                return Clue(hint, source.place(node))
+        tests = [n for c in inside if c in paced.calls for n in conditions(source, c)]
+        if len(tests) == 1:
+            hint = (
+                f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"
+            )
+            return Clue(hint, source.place(tests[0]))
     return None
+
+
+def _too_slow(case: Case) -> Clue | None:
+    """The period is right, and still the rate is too low."""
+    paced = _paced(case)
+    timers = paced.timers() if paced is not None else []
+    worth = constant(paced.source, timers[0].period) if paced is not None and len(timers) == 1 else None
+    if paced is None or worth is None or not _same(worth.value, paced.period_s):
+        return None
+    if math.isnan(paced.found_hz) or paced.found_hz > 0.97 * paced.wanted_hz:
+        return None
+    start = roots(paced.source, timers[0].callback)
+    hint = f"{timer_code(paced.source, timers[0])} has the right period, but a callback takes longer than that"
+    return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
 
 
 RATES = (
@@ -231,6 +249,7 @@ RATES = (
     Cause("callback_held_up", _held_up),
     Cause("published_several_times", _several),
     Cause("stopped_itself", _stopped_itself),
+    Cause("too_slow", _too_slow),
     Cause("loop_pace", _loop_pace),
     Cause("published_once", _published_once),
 )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 
 from grader.judging.checks.sensor import RandomInRange
+from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.diagnosis.source import Source, chain, last_name
-from grader.judging.diagnosis.wiring import made, reached, roots
+from grader.judging.diagnosis.wiring import made, made_for, reached, roots
 from grader.judging.values import published, readings
 from grader.judging.wording import number
 
@@ -42,14 +43,18 @@ def _limits(case: Case) -> Clue | None:
     low, high = number(check.low), number(check.high)
     if name in ("gauss", "normalvariate", "normal"):
         right = f"random.uniform({float(check.low)}, {float(check.high)})"
-        return Clue(f"{source.code(calls[0])} has no limits, some values lie far out: {right}", source.place(calls[0]))
+        return Clue(
+            f"{source.code(calls[0])} has no limits, some values lie far out: {right}",
+            source.place(calls[0]),
+            key="draw",
+        )
     limits = [number_at(source, a) for a in calls[0].args]
     if name not in ("uniform", "randint") or None in limits or limits == [check.low, check.high] or len(limits) != 2:
         return None
     right = (
         f"{function}({low}, {high})" if name == "randint" else f"{function}({float(check.low)}, {float(check.high)})"
     )
-    return Clue(f"{source.code(calls[0])} draws outside {low} to {high}: {right}", source.place(calls[0]))
+    return Clue(f"{source.code(calls[0])} draws outside {low} to {high}: {right}", source.place(calls[0]), key="draw")
 
 
 def _drawn_once(case: Case) -> Clue | None:
@@ -63,19 +68,36 @@ def _drawn_once(case: Case) -> Clue | None:
         seeds = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "seed"]
         if seeds:
             hint = f"{source.code(seeds[0])} in the callback starts the same draw each time: take it out"
-            return Clue(hint, source.place(seeds[0]))
+            return Clue(hint, source.place(seeds[0]), key="draw")
         drawn = [c for c in draws(source) if c in inside]
         early = [c for c in draws(source) if c not in inside and _at_start(source, c)]
         if not drawn and len(early) == 1 and len(made(source, "timer")) == 1:
             name = last_name(timer.callback) or "the callback"
             hint = f"{source.code(early[0])} is drawn once, when the node starts: draw it in {name}"
-            return Clue(hint, source.place(early[0]))
+            return Clue(hint, source.place(early[0]), key="draw")
     return None
 
 
 def _at_start(source: Source, call: ast.AST) -> bool:
     function = source.function_of(call)
     return function is None or function.name in ("__init__", "main")
+
+
+def _never_crosses(case: Case) -> Clue | None:
+    """What is drawn lies on one side of the controller's threshold."""
+    check = case.criterion.check
+    if not isinstance(check, AnswersTogether) or "never changes, because" not in case.verdict.reason or case.fault:
+        return None
+    owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
+    calls = draws(owners[0]) if len(owners) == 1 else []
+    if len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint") or len(calls[0].args) != 2:
+        return None
+    limits = [number_at(owners[0], a) for a in calls[0].args]
+    known = [limit for limit in limits if limit is not None]
+    if len(known) < 2 or min(known) <= check.threshold < max(known):
+        return None
+    hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
+    return Clue(f"{hint}: the temperatures go from 20 to 30", owners[0].place(calls[0]), key="draw")
 
 
 def _not_drawn(case: Case) -> Clue | None:
@@ -97,4 +119,5 @@ SENSOR = (
     Cause("draw_limits", _limits),
     Cause("drawn_once", _drawn_once),
     Cause("not_drawn", _not_drawn),
+    Cause("never_crosses", _never_crosses),
 )

@@ -16,11 +16,11 @@ from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.endings import head_of, node_made, spins, variable_of
-from grader.judging.diagnosis.source import Function, Source, argument, chain, last_name
-from grader.judging.diagnosis.wiring import Made, is_log, made, made_for, publish_calls, reached, roots, used
+from grader.judging.diagnosis.source import Function, Source, argument, chain, covers, last_name
+from grader.judging.diagnosis.wiring import MOST_MADE, Made, is_log, made, made_for, publish_calls, reached, roots, used
 from grader.judging.output import student_records
 from grader.judging.silence import student_endpoints
-from grader.judging.values import published
+from grader.judging.values import carries_number, published
 from grader.judging.wording import quote
 from grader.model.exercise import Location, Outcome
 from grader.model.quantities import seconds
@@ -180,9 +180,17 @@ def _needed_calls(case: Case) -> tuple[Source, list[ast.Call]] | None:
         return None
     if topic:
         return source, publish_calls(source, made_for(source, "publisher", topic))
-    if isinstance(case.criterion.check, (UsesLogger, LogsPosition)) and not student_records(case.trace, case.process):
-        return source, [n for n in source.all(ast.Call) if is_log(n)]
+    position = isinstance(case.criterion.check, LogsPosition) and case.evidence("right") == 0
+    if position or (isinstance(case.criterion.check, UsesLogger) and not student_records(case.trace, case.process)):
+        return source, _unseen_logs(case, source)
     return None
+
+
+def _unseen_logs(case: Case, source: Source) -> list[ast.Call]:
+    """Return the calls that log and that no record came from."""
+    seen = {r.line for r in student_records(case.trace, case.process) if r.file == source.file}
+    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
+    return [n for n in logs if not any(covers(n, line) for line in seen)]
 
 
 def _never_publishes(case: Case) -> Clue | None:
@@ -270,7 +278,7 @@ def _never_called(case: Case) -> Clue | None:
     if found is None or not found[1]:
         return None
     source, calls = found
-    functions = [source.function_of(c) for c in calls]
+    functions = list(dict.fromkeys(source.function_of(c) for c in calls))[:MOST_MADE]
     dead = [f for f in functions if f is not None and not used(source, f) and _may_be_unused(source, f)]
     if len(dead) < len(functions) or not dead:
         return None
@@ -312,6 +320,59 @@ def timer_code(source: Source, item: Made) -> str:
     period = source.code(item.period, 40) if item.period is not None else "?"
     callback = source.code(item.callback, 40) if item.callback is not None else "?"
     return f"create_timer({period}, {callback})"
+
+
+def _nested_spin(case: Case) -> Clue | None:
+    """The node is spun where it can never come back: in its constructor, or inside a callback."""
+    stopped = isinstance(case.criterion.check, TopicRate) and case.evidence("window") == 1
+    found = _needed_calls(case)
+    source = found[0] if found is not None else case.source
+    if source is None or case.fault is not None or not (stopped or found is not None):
+        return None
+    for call in source.calls("spin", "spin_until_future_complete"):
+        function = source.function_of(call)
+        if function is None or not source.is_method(function):
+            continue
+        code = source.code(call)
+        if function.name == "__init__":
+            hint = f"{code} in the constructor does not return: what stands after it is never reached"
+            return Clue(hint, source.place(call), key="nested_spin")
+        callbacks = [m for kind in ("timer", "subscription") for m in made(source, kind)]
+        if any(call in set(reached(source, roots(source, m.callback))) for m in callbacks):
+            hint = f"{code} inside a callback waits for something that can only come after the callback has returned"
+            return Clue(hint, source.place(call), key="nested_spin")
+    return None
+
+
+def _stopped_listening(case: Case) -> Clue | None:
+    """The subscription asks for a deadline that nobody promises, or is destroyed before the data come."""
+    if not isinstance(case.criterion.check, LogsPosition) or case.evidence("right") != 0 or case.source is None:
+        return None
+    source = case.source
+    for item in made(source, "subscription"):
+        name = source.code(item.qos) if isinstance(item.qos, (ast.Name, ast.Attribute)) else ""
+        policies = [k for k in source.all(ast.keyword) if k.arg in ("deadline", "liveliness_lease_duration")]
+        near = [k for k in policies if covers(item.call, k.lineno) or name]
+        if len(near) == 1 and case.fault is None:
+            hint = f"with {source.code(near[0], 50)} it hears only publishers that promise the same: leave it out"
+            return Clue(hint, source.place(near[0]))
+    ends = next(source.calls("destroy_subscription"), None)
+    if ends is None or case.fault is not None:
+        return None
+    return Clue(f"after {source.code(ends)} no message can come any more: keep listening", source.place(ends))
+
+
+def _no_number_heard(case: Case) -> Clue | None:
+    """A subscription whose type carries no number."""
+    check = case.criterion.check
+    if not isinstance(check, LogsReceived) or case.source is None or case.fault is not None:
+        return None
+    types = {e.type for e in student_endpoints(case.trace, "subscription") if e.topic == check.topic}
+    item = made_for(case.source, "subscription", check.topic)
+    if item is None or len(types) != 1 or carries_number(next(iter(types))):
+        return None
+    hint = f"{short(next(iter(types)))} carries no number: use a numeric type such as Float32 in both files"
+    return Clue(hint, case.source.place(item.call), key=f"apart:{check.topic}")
 
 
 def _only_when_told(case: Case) -> Clue | None:
@@ -384,6 +445,9 @@ SILENCE = (
     Cause("no_subscription", _no_subscription),
     Cause("never_publishes", _never_publishes),
     Cause("not_spun", _not_spun),
+    Cause("no_number_heard", _no_number_heard),
+    Cause("nested_spin", _nested_spin),
+    Cause("stopped_listening", _stopped_listening),
     Cause("waits_for_service", _waits_for_service),
     Cause("unwoken_rate", _unwoken_rate),
     Cause("held_up", _held_up),

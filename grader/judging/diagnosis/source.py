@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import ast
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from grader.judging.wording import quote
 from grader.model.exercise import Location
 
 #: Files longer than this are not parsed: no node that a person writes for an exercise comes near.
 LONGEST_SOURCE = 100_000
+#: The same for the parts of its syntax tree.
+MOST_NODES = 12_000
 #: Longest quotation of code inside a hint.
 CODE_LENGTH = 70
 
@@ -32,37 +34,40 @@ class Source:
         nodes: Every node of the syntax tree that has a line, in the order of the text; empty if it cannot be parsed.
         tree: The syntax tree, or None if the text cannot be parsed.
         parents: Node -> the node around it.
+        index: The nodes by their class, in the order of the text.
+        called: The calls by the last part of the name that is called, in the order of the text.
+        stored: Where names and attributes are assigned, by dotted name, in the order of the text.
     """
 
     file: str
     lines: Sequence[str] = ()
     nodes: Sequence[ast.AST] = ()
     tree: ast.Module | None = None
-    parents: dict[ast.AST, ast.AST] = field(default_factory=dict)
+    parents: Mapping[ast.AST, ast.AST] = field(default_factory=dict)
+    index: Mapping[type[ast.AST], list[Any]] = field(default_factory=dict)
+    called: Mapping[str, list[ast.Call]] = field(default_factory=dict)
+    stored: Mapping[str, list[ast.AST]] = field(default_factory=dict)
 
     def all(self, kind: type[AnyNode]) -> Iterator[AnyNode]:
         """Yield the nodes of a kind in the order of the text."""
-        for node in self.nodes:
-            if isinstance(node, kind):
-                yield node
+        yield from self.index.get(kind, ())
 
     def loops(self) -> list[Loop]:
         """Return the loops in the order of the text."""
-        return [n for n in self.nodes if isinstance(n, Loop)]
+        return sorted([*self.all(ast.While), *self.all(ast.For)], key=_place)
 
     def names(self) -> list[ast.Name | ast.Attribute]:
         """Return every name, plain or after a dot, in the order of the text."""
-        return [n for n in self.nodes if isinstance(n, (ast.Name, ast.Attribute))]
+        return sorted([*self.all(ast.Name), *self.all(ast.Attribute)], key=_place)
 
     def stores(self, dotted: str) -> list[ast.Attribute]:
         """Return where an attribute such as `self.x` is assigned, in the order of the text."""
-        return [n for n in self.all(ast.Attribute) if isinstance(n.ctx, ast.Store) and chain(n) == dotted]
+        return [n for n in self.stored.get(dotted, ()) if isinstance(n, ast.Attribute)]
 
     def calls(self, *names: str) -> Iterator[ast.Call]:
         """Yield the calls of functions or methods by the last part of their name."""
-        for call in self.all(ast.Call):
-            if last_name(call.func) in names:
-                yield call
+        found = [c for name in dict.fromkeys(names) for c in self.called.get(name, ())]
+        yield from found if len(names) == 1 else sorted(found, key=_place)
 
     def on_line(self, line: int, kind: type[AnyNode]) -> Iterator[AnyNode]:
         """Yield the nodes of a kind that a line is part of, the outermost first."""
@@ -91,7 +96,8 @@ class Source:
 
     def functions(self, name: str | None = None) -> list[Function]:
         """Return the functions and methods of a name, or all."""
-        return [n for n in self.nodes if isinstance(n, Function) and name in (None, n.name)]
+        both: list[Function] = [*self.all(ast.FunctionDef), *self.all(ast.AsyncFunctionDef)]
+        return sorted((f for f in both if name in (None, f.name)), key=_place)
 
     def is_method(self, function: Function) -> bool:
         """Return whether a function stands directly in a class and is not static."""
@@ -121,15 +127,13 @@ class Source:
 
 
 def read(file: str, text: str) -> Source:
-    """Return a file ready to be asked; one that cannot be parsed has lines only."""
+    """Return a file ready to be asked; one that cannot be parsed, or is endless, has lines only."""
     lines = tuple(text[:LONGEST_SOURCE].split("\n"))
     tree = _parsed(text) if len(text) <= LONGEST_SOURCE else None
-    if tree is None:
-        return Source(file, lines)
     parents: dict[ast.AST, ast.AST] = {}
     nodes: list[ast.AST] = []
-    waiting: list[ast.AST] = [tree]
-    while waiting:
+    waiting: list[ast.AST] = [tree] if tree is not None else []
+    while waiting and len(parents) <= MOST_NODES:
         node = waiting.pop()
         if hasattr(node, "lineno"):
             nodes.append(node)
@@ -137,8 +141,30 @@ def read(file: str, text: str) -> Source:
             if not isinstance(child, (ast.expr_context, ast.operator, ast.unaryop, ast.cmpop, ast.boolop)):
                 parents[child] = node
                 waiting.append(child)
-    nodes.sort(key=lambda n: (first_line(n), getattr(n, "col_offset", 0), -last_line(n)))
-    return Source(file, lines, tuple(nodes), tree, parents)
+    if tree is None or waiting:
+        return Source(file, lines)
+    nodes.sort(key=_place)
+    index: dict[type[ast.AST], list[Any]] = {}
+    for node in nodes:
+        index.setdefault(type(node), []).append(node)
+    return Source(file, lines, tuple(nodes), tree, parents, index, *_by_name(nodes))
+
+
+def _by_name(nodes: Sequence[ast.AST]) -> tuple[dict[str, list[ast.Call]], dict[str, list[ast.AST]]]:
+    """Return the calls by the name called, and the places of assignment by the name assigned."""
+    called: dict[str, list[ast.Call]] = {}
+    stored: dict[str, list[ast.AST]] = {}
+    for node in nodes:
+        if isinstance(node, ast.Call):
+            called.setdefault(last_name(node.func), []).append(node)
+        elif isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Store):
+            stored.setdefault(chain(node), []).append(node)
+    return called, stored
+
+
+def _place(node: ast.AST) -> tuple[int, int, int]:
+    """Return what sorts nodes by the text, the outer before the inner."""
+    return first_line(node), getattr(node, "col_offset", 0), -last_line(node)
 
 
 def _parsed(text: str) -> ast.Module | None:

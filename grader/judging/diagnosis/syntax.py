@@ -90,4 +90,10 @@ def _encoding(case: Case) -> Clue | None:
     return None
 
 
-SYNTAX = (Cause("syntax", _syntax), Cause("encoding", _encoding))
+def _null_bytes(case: Case) -> Clue | None:
+    if case.fault is None or "null bytes" not in case.fault.text:
+        return None
+    return Clue("the file holds bytes that are no text: save it as UTF-8 in a text editor")
+
+
+SYNTAX = (Cause("syntax", _syntax), Cause("encoding", _encoding), Cause("null_bytes", _null_bytes))

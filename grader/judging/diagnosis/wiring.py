@@ -5,10 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from grader.judging.diagnosis.constants import bindings
-from grader.judging.diagnosis.source import Function, Source, argument, chain, last_name, subtree, text_of
+from grader.judging.diagnosis.source import Function, Source, argument, chain, first_line, last_name, subtree, text_of
 
+#: More publishers, subscriptions or timers than this are not looked at, of each kind.
+MOST_MADE = 20
 LOGS = ("debug", "info", "warn", "warning", "error", "fatal")
 
 
@@ -38,7 +41,7 @@ class Made:
 def made(source: Source, kind: str) -> list[Made]:
     """Return the publishers, subscriptions or timers of a file, in the order of the text."""
     found = []
-    for call in source.calls(f"create_{kind}"):
+    for call in islice(source.calls(f"create_{kind}"), MOST_MADE):
         if kind == "timer":
             period, callback = argument(call, 0, "timer_period_sec"), argument(call, 1, "callback")
             found.append(Made(kind, call, period=period, callback=callback))
@@ -123,12 +126,19 @@ def reached(source: Source, start: Sequence[ast.AST]) -> Iterator[ast.AST]:
                 waiting.extend(roots(source, node.func))
 
 
-def is_log(node: ast.AST) -> bool:
+def is_log(source: Source, node: ast.AST) -> bool:
     """Return whether a node is a call that logs through an rclpy logger, as far as the text tells."""
     if not isinstance(node, ast.Call) or last_name(node.func) not in LOGS:
         return False
     base = chain(node.func).rpartition(".")[0]
-    return "get_logger()" in base or base.rpartition(".")[2].strip("_").lower() in ("logger", "log")
+    named = base.rpartition(".")[2].strip("_").lower() in ("logger", "log")
+    return "get_logger()" in base or (named and base not in python_loggers(source))
+
+
+def python_loggers(source: Source) -> set[str]:
+    """Return the names that stand for loggers of Python's own logging module."""
+    found = (target_of(source, c) for c in islice(source.calls("getLogger"), MOST_MADE))
+    return {"logging", *found} - {""}
 
 
 def publish_calls(source: Source, publisher: Made | None = None) -> list[ast.Call]:
@@ -146,3 +156,12 @@ def used(source: Source, function: Function) -> bool:
     names = (n for n in source.names() if last_name(n) == function.name and n not in inside)
     listed = any(text_of(n) == function.name for n in source.all(ast.Constant))
     return listed or any(isinstance(n.ctx, ast.Load) for n in names)
+
+
+def conditions(source: Source, call: ast.AST) -> list[ast.If]:
+    """Return what a call depends on: the conditions around it, and those before it that return early."""
+    function = source.function_of(call)
+    around = [n for n in source.around(call) if isinstance(n, ast.If)]
+    returns = (r for r in source.all(ast.Return) if source.function_of(r) is function)
+    early = [n for r in returns if first_line(r) < first_line(call) for n in source.around(r) if isinstance(n, ast.If)]
+    return [*around, *early]

@@ -116,8 +116,10 @@ def _few(analysis: Analysis) -> Cause | None:
 def _variant(groups: Sequence[Group], track: Track) -> Cause | None:
     for variant in _VARIANTS:
         wanted = variant.wanted()
-        if any(_sure(matched(g, track, wanted)) for g in groups if g.pairs):
-            return Cause(variant.name, variant.sentence, variant.hint)
+        sure = next((g for g in groups if g.pairs and _sure(matched(g, track, wanted))), None)
+        if sure is not None:
+            first = next((e for e in sure.entries if e.t_ns > track.times_ns[0] + STALE_NS), sure.entries[0])
+            return Cause(variant.name, f"{variant.sentence}: {_difference(first, track)}", variant.hint)
     return None
 
 

@@ -1,0 +1,48 @@
+"""Adds the line to notes about a main() that nothing calls."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+
+from grader.judging.diagnosis.source import Source, first_line, last_name, read, text_of
+from grader.model.submission import Submission
+
+_UNCALLED = ": nothing calls main()"
+
+
+def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the notes; one that says that nothing calls main() names the line of the guard or of main itself."""
+    if not any(_UNCALLED in note for note in notes):
+        return notes
+    files = {submission.files[name].found or name: text for name, text in sources.items()}
+    return tuple(_placed(note, files) for note in notes)
+
+
+def _placed(note: str, files: Mapping[str, str]) -> str:
+    file = next((f for f in files if note.startswith(f + _UNCALLED)), None)
+    if file is None:
+        return note
+    source = read(file, files[file])
+    guard = _wrong_guard(source)
+    if guard is not None:
+        said = (
+            f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so `python3 {file}` would"
+        )
+        return f"{said} do nothing; write: if __name__ == '__main__':"
+    main = next(iter(source.functions("main")), None)
+    return f"{file}:{first_line(main)}{note[len(file) :]}" if main is not None else note
+
+
+def _wrong_guard(source: Source) -> ast.If | None:
+    """Return the condition at the top of the file that was meant for the usual one."""
+    for node in source.all(ast.If):
+        test = node.test
+        if source.function_of(node) is not None or not isinstance(test, ast.Compare):
+            continue
+        sides = [test.left, *test.comparators]
+        texts = [t for s in sides if (t := text_of(s)) is not None]
+        named = any(last_name(s) == "__name__" for s in sides)
+        if (named and texts != ["__main__"]) or (not named and any("main" in t for t in texts)):
+            return node
+    return None
