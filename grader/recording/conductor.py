@@ -54,6 +54,8 @@ MESSAGES = 20_000
 STEPS = 400_000
 #: A process that has more to say than this before it waits or ends does not talk like the host.
 WORDS = 10_000
+#: Of a trace nobody reads more notes than this, and of a note no longer names.
+NOTES, NAME_CHARACTERS = 50, 200
 
 
 class Conductor:
@@ -101,7 +103,7 @@ class Conductor:
             clock_reason=self._unfit(),
             stop_ns=self._end_ns,
             observations=tuple(self._observations),
-            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes])),
+            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes]))[:NOTES],
         )
 
     def _finished(self) -> bool:
@@ -191,7 +193,8 @@ class Conductor:
         used_ns = report.get("cpu_ns")
         student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
         for channel, count in _counts(report.get("lost")).items():
-            self._notes.append(f"{student.name}: {count} messages on {channel} were overwritten before they were read")
+            where = channel[:NAME_CHARACTERS]
+            self._notes.append(f"{student.name}: {count} messages on {where} were overwritten before they were read")
         sent = _counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._forward(student, sent)
@@ -317,7 +320,7 @@ class Conductor:
         student.nudged = True  # a match is an event that a node may have a callback for
         missing = answer.get("missing")
         for name in missing[:WORDS] if isinstance(missing, list) else ():
-            self._notes.append(f"{student.name}: {str(name)[:200]} was not matched in time")
+            self._notes.append(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]

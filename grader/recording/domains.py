@@ -11,6 +11,8 @@ from grader.model.errors import EnvironmentFault
 
 #: Domains whose ports lie below the range that Linux hands out to others.
 USABLE = range(10, 101)
+#: So many claims are held: those of the scenarios under way, and of a few before them until their ghosts have gone.
+HELD = 8
 
 
 def private_domains() -> Iterator[int]:
@@ -25,10 +27,11 @@ def shared_domains() -> Iterator[int]:
         EnvironmentFault: If none is free.
     """
     while True:
-        reserved = _reserve()
-        yield reserved[0]
-        _RESERVED.append(reserved)
-        del _RESERVED[:-4]
+        _RESERVED.append(_reserve())
+        for _, claim in _RESERVED[:-HELD]:
+            claim.close()
+        del _RESERVED[:-HELD]
+        yield _RESERVED[-1][0]
 
 
 def _reserve() -> tuple[int, socket.socket]:
@@ -46,5 +49,5 @@ def _reserve() -> tuple[int, socket.socket]:
     raise EnvironmentFault("ROS domains: expected a free one, found all in use", "wait for other gradings to end")
 
 
-#: Claims that are still held; the last few scenarios' domains stay reserved until their ghosts have gone.
+#: Claims that are still held, oldest first.
 _RESERVED: list[tuple[int, socket.socket]] = []

@@ -27,6 +27,8 @@ PATIENCE_NS = 20_000 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 #: Limit of one scenario; reaching it ends it with a mark.
 MESSAGES = 20_000
+#: Of a trace nobody reads more notes than this.
+NOTES = 50
 
 
 class WallConductor:
@@ -71,7 +73,7 @@ class WallConductor:
             clock=ClockKind.WALL,
             stop_ns=self._end_ns,
             observations=tuple(self._observations),
-            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes])),
+            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes]))[:NOTES],
             harness_problem=self._slip(),
         )
 
