@@ -152,7 +152,8 @@ class ThresholdResponse:
         mistaken = [v.held.value for v in violations]
         if self.side == "at_or_below" and all(v == self.threshold for v in mistaken):
             return "", f"{limit} itself is not above {limit}: compare with > and not with >="
-        near = self.side == "above" and all(0 < v - self.threshold <= 1 for v in mistaken)
+        low = all(v.got is not None and within(v.got, self.otherwise, _EXACT) for v in violations)
+        near = self.side == "above" and low and all(0 < v - self.threshold <= 1 for v in mistaken)
         if near and any(h.value > self.threshold + 1 for h in inputs):
             return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
         known = any(within(a.value, w, _EXACT) for a in answers for w in (self.above, self.otherwise))

@@ -149,7 +149,8 @@ def _endpoint_arguments(case: Case) -> Clue | None:
 def _timer_arguments(case: Case, source: Source, item: Made) -> Clue | None:
     if not case.said(r"must be a string or a real number, not '(method|function)'|operand type.*'(method|function)'"):
         return None
-    return Clue(f"the period comes first, then the callback: create_timer(0.05, {source.code(item.call.args[0])})")
+    period = source.code(item.call.args[1]) if len(item.call.args) > 1 else "..."
+    return Clue(f"the period comes first, then the callback: create_timer({period}, {source.code(item.call.args[0])})")
 
 
 def _topic_arguments(case: Case, source: Source, item: Made) -> Clue | None:

@@ -134,21 +134,21 @@ def _log_period(case: Case) -> Clue | None:
     timers = [m for m in made(source, "timer") if call in set(reached(source, roots(source, m.callback)))]
     if timers:
         return _timer_pace(source, timers, average, wanted_s) if len(timers) == 1 else None
-    return _message_pace(case, source, call)
+    return _message_pace(case, source, call, wanted_s)
 
 
-def _message_pace(case: Case, source: Source, call: ast.Call) -> Clue | None:
+def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -> Clue | None:
     """The log is written in the callback of the subscription, each time or every so many times."""
     heard = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
     if not heard or argument(call, 99, "throttle_duration_sec") is not None:
         return None
     counted_by = next((n for n in source.around(call) if isinstance(n, ast.If) and _counts(n.test)), None)
     if counted_by is not None:
-        hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of 1.0 s"
+        hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of {wanted_s} s"
         return Clue(hint, source.place(counted_by), key="log_pace")
     if "one for every message" not in case.verdict.reason:
         return None
-    hint = "this logs every message: give it throttle_duration_sec=1.0, or log the newest position from a timer"
+    hint = f"this logs every message: give it throttle_duration_sec={wanted_s}, or log from a timer"
     return Clue(hint, source.place(call), key="log_pace")
 
 

@@ -97,7 +97,9 @@ def _never_crosses(case: Case) -> Clue | None:
     if len(known) < 2 or min(known) <= check.threshold < max(known):
         return None
     hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
-    return Clue(f"{hint}: the temperatures go from 20 to 30", owners[0].place(calls[0]), key="draw")
+    asked = next((c for c in case.siblings if isinstance(c, RandomInRange) and c.topic == check.input), None)
+    hint += f": the values go from {number(asked.low)} to {number(asked.high)}" if asked is not None else ""
+    return Clue(hint, owners[0].place(calls[0]), key="draw")
 
 
 def _not_drawn(case: Case) -> Clue | None:

@@ -1,0 +1,120 @@
+"""Spoilt programs with what was recorded of them: the cause that is named, the line, and the words of the hint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from diagnosis_samples import (
+    RECORDINGS,
+    RIGHT,
+    crashed,
+    exercise_of,
+    line_of,
+    lost,
+    report,
+    rows,
+    spoilt,
+)
+
+from grader.judging.diagnosis.diagnose import CAUSES
+from grader.model.exercise import Outcome
+from grader.model.report import ExerciseReport, Verdict
+from grader.model.trace import Trace
+
+Row = Mapping[str, Any]
+CRASHES = rows("crashes.yaml")
+BEHAVIOURS = rows("behaviours.yaml")
+
+
+def explained(row: Row, traces: Mapping[str, Trace]) -> ExerciseReport:
+    texts = {name: RIGHT[name] for name in exercise_of(row["file"]).files}
+    return report(row["file"], traces, {**texts, row["file"]: spoilt(row["file"], row["change"])})
+
+
+def crash_traces(row: Row) -> dict[str, Trace]:
+    scenarios = exercise_of(row["file"]).scenarios
+    return {s.id: crashed(row["file"], row["fault"]).trace(s.id) for s in scenarios if row["file"] in s.processes}
+
+
+def behaviour_traces(row: Row) -> dict[str, Trace]:
+    ((name, arguments),) = row["recording"].items()
+    scenario, build = RECORDINGS[name]
+    if name.startswith("logging") and not arguments.get("printed"):
+        arguments = {**arguments, "line": line_of(spoilt(row["file"], row["change"]), "get_logger().info(")}
+    return {scenario: build(**arguments).trace(scenario)}
+
+
+def said(row: Row, verdict: Verdict) -> tuple[str, str, str]:
+    """The cause, the code at the place, and the hint."""
+    text = spoilt(row["file"], row["change"]).splitlines()
+    at = ""
+    if verdict.location is not None and verdict.location.file == row["file"] and verdict.location.line:
+        at = text[verdict.location.line - 1].strip()
+    return verdict.evidence["diagnosis"], at, verdict.hint
+
+
+@pytest.mark.parametrize("row", CRASHES, ids=[r["name"] for r in CRASHES])
+def test_a_fault_is_traced_to_its_cause(row: Row) -> None:
+    """At the line that has to change, in the words of the student's own code."""
+    found = lost(explained(row, crash_traces(row)))
+    assert said(row, found[0]) == (row["cause"], row["at"], row["hint"])
+
+
+@pytest.mark.parametrize("row", BEHAVIOURS, ids=[r["name"] for r in BEHAVIOURS])
+def test_wrong_behaviour_is_traced_to_its_cause(row: Row) -> None:
+    """At the line that has to change, for the criterion that lost its points."""
+    found = {v.id: v for v in lost(explained(row, behaviour_traces(row)))}
+    assert row["criterion"] in found
+    assert said(row, found[row["criterion"]]) == (row["cause"], row["at"], row["hint"])
+
+
+@pytest.mark.parametrize("row", [*CRASHES, *BEHAVIOURS], ids=lambda r: r["name"])
+def test_diagnosis_changes_neither_outcomes_nor_points_nor_reasons(row: Row) -> None:
+    """With the sources and without them, the same is earned for the same reason."""
+    traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
+    with_sources, without = explained(row, traces), report(row["file"], traces, None)
+    assert [(v.id, v.outcome, v.score, v.reason) for v in with_sources.verdicts] == [
+        (v.id, v.outcome, v.score, v.reason) for v in without.verdicts
+    ]
+
+
+@pytest.mark.parametrize("row", [*CRASHES, *BEHAVIOURS], ids=lambda r: r["name"])
+def test_a_cause_is_explained_once(row: Row) -> None:
+    """A second criterion with the same cause refers to the first."""
+    traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
+    hints = [v.hint for v in lost(explained(row, traces))]
+    own = [h for h in hints if "the same cause as" not in h]
+    assert len(own) == len(set(own))
+    assert hints[0] in own
+
+
+def test_every_cause_is_in_a_table() -> None:
+    """A cause that nothing shows to work is not there."""
+    shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS)} | {"empty_file"}  # which no change of a program makes
+    assert {cause.id for cause in CAUSES} - shown == set()
+
+
+def test_the_ids_of_causes_are_unique() -> None:
+    """Reports name them."""
+    ids = [cause.id for cause in CAUSES]
+    assert len(ids) == len(set(ids))
+
+
+@pytest.mark.parametrize("file", sorted(RIGHT))
+def test_a_right_program_that_does_right_is_left_alone(file: str) -> None:
+    """No verdict is touched where nothing was lost."""
+    given = {
+        "velocity_publisher.py": ("paced", {"rate": 20}),
+        "odom_subscriber.py": ("logging", {}),
+        "temperature_sensor.py": ("sensing", {}),
+        "fan_controller.py": ("answering", {}),
+    }[file]
+    scenario, build = RECORDINGS[given[0]]
+    traces = {scenario: build(**given[1]).trace(scenario)}
+    texts = {name: RIGHT[name] for name in exercise_of(file).files}
+    judged, plain = report(file, traces, texts), report(file, traces, None)
+    right = [v for v in judged.verdicts if v.outcome is Outcome.MET]
+    assert right
+    assert all(v in plain.verdicts for v in right)
