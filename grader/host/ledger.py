@@ -44,6 +44,8 @@ class Ledger:
         }
         self.changed = False
         self.lost: Counter[str] = Counter()
+        #: How many wait sets wait for a receiver now, by the address of its handle: what comes there is read at once.
+        self.awaited: Counter[int] = Counter()
         self.contexts: list[weakref.ref[Any]] = []
         self._nodes: list[weakref.ref[Any]] = []
 
@@ -114,7 +116,8 @@ class Ledger:
                 expected = self._expected.get(receiver, 0) + min(count, depth)
                 self._expected[receiver] = expected
                 # That something can be read says nothing about the newest where older ones were left unread.
-                if channel.startswith("topic ") and (expected > 1 or depth == 1 or self.kept(receiver)):
+                unread = expected > 1 or depth == 1 or self.kept(receiver)
+                if channel.startswith("topic ") and unread and not self.awaited[receiver.handle.pointer]:
                     self._keep_all(receiver)
         self.await_arrivals(list(self._expected))
 

@@ -183,7 +183,11 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
                         clock.idle_look(50)
                         return
                     wakes = [t for t in (deadline_ns, self._next_timer_ns()) if t is not None]
-                    scheduler.pause(min(wakes, default=None), polls=True)
+                    ledger.awaited.update(self._receivers)
+                    try:
+                        scheduler.pause(min(wakes, default=None), polls=True)
+                    finally:
+                        ledger.awaited.subtract(self._receivers)
                 if len(self._added) < self._room:
                     return  # actions add what they wait for behind our back: the executor builds the set anew
                 # Polling has emptied the set of everything that was not ready.

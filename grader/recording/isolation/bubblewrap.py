@@ -8,6 +8,7 @@ import secrets
 import shutil
 import stat
 import subprocess
+import sysconfig
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -182,7 +183,9 @@ def _secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]
     """Return the folders with rubrics and checks that would be seen through a bound folder."""
     package = Path(grader.__file__).resolve().parent
     bound = tuple(bound)
-    places = {package, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
+    # An editable installation keeps a copy of the rubrics among the packages, away from the code.
+    installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
+    places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
     return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
 
 
