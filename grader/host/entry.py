@@ -22,8 +22,7 @@ def run_file(root: str, file: str, say: Say) -> None:
         say: Takes a sentence that the report has to mention.
     """
     path = os.path.join(root, file)
-    with open(path, "rb") as source:
-        tree = ast.parse(source.read(), path)  # a syntax error is raised before anything has run
+    tree = _parse(path)  # a syntax error is raised before anything has run
     package, folder = _package(path, root)
     warn_of_shadows(os.path.dirname(path), say)
     for directory in dict.fromkeys((os.path.dirname(path), folder)):
@@ -36,6 +35,15 @@ def run_file(root: str, file: str, say: Say) -> None:
     else:
         namespace = _run_as_main(path)
     run_what_nothing_called(namespace, tree, file, say)
+
+
+def _parse(path: str) -> ast.Module:
+    with open(path, "rb") as source:
+        text = source.read()
+    before, null, _ = text.partition(b"\0")
+    if null:  # Python says so as well, but not where
+        raise SyntaxError("source code cannot contain null bytes", (path, before.count(b"\n") + 1, None, None))
+    return ast.parse(text, path)
 
 
 def _run_as_main(path: str) -> dict[str, Any]:

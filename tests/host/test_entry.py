@@ -158,6 +158,14 @@ def test_a_file_that_is_not_python_is_not_run_at_all(run, content, kind):
     assert said.startswith(f"raised {kind}")
 
 
+def test_a_null_byte_is_found_where_it_is(tmp_path):
+    """The report names the line, which Python does not."""
+    (tmp_path / "node.py").write_bytes(b"import os\n\nx = 1 \0\n")
+    assert play_file(tmp_path, "node.py")[0] == (
+        "0 raised SyntaxError: source code cannot contain null bytes (node.py, line 3)"
+    )
+
+
 def test_a_script_sees_what_scripts_see(run):
     """Its own path as the only argument, its own file, itself as `__main__`, no parent package."""
     said = run(

@@ -1,0 +1,216 @@
+"""Whatever is handed in: a report or one clear line within its limits, and nothing left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+SUBMISSIONS = Path(__file__).resolve().parent / "submissions"
+GRADE = str(Path(sys.executable).with_name("grade"))
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def scratch(tmp_path):
+    """A folder that the grader is told to use for what it needs; it is short, as sockets in it have short names."""
+    folder = tmp_path / "scratch"
+    folder.mkdir()
+    return folder
+
+
+def start(scratch, *arguments):
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    command = [GRADE, *map(str, arguments)]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def run(scratch, *arguments):
+    """Return exit code, standard output and standard error; afterwards nothing may be left behind."""
+    before = shared_memory()
+    process = start(scratch, *arguments)
+    out, err = process.communicate(timeout=300)
+    assert_nothing_left(scratch, before)
+    return process.returncode, out, err
+
+
+def assert_nothing_left(scratch, shared_memory_before, files=()):
+    """Check that no process, no file and no segment of shared memory is left."""
+    wait_for(lambda: not processes_of(scratch))
+    wait_for(lambda: sorted(path.name for path in scratch.iterdir()) == sorted(files))
+    assert shared_memory() <= shared_memory_before
+
+
+def shared_memory():
+    """Return the segments that DDS has on this machine."""
+    return {path.name for path in Path("/dev/shm").glob("*fast*")}
+
+
+def processes_of(scratch):
+    """Return the processes that were started with this scratch folder, or whose submission was staged in it."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit() or int(entry.name) == os.getpid():
+            continue
+        told = b"".join(read(entry / name) for name in ("environ", "cmdline", "mountinfo"))
+        if str(scratch).encode() in told:
+            found.append(int(entry.name))
+    return found
+
+
+def read(path):
+    """Return a file of /proc; nothing if its process has gone."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def wait_for(condition, seconds=60):
+    """Wait until a condition holds; fail if it never does."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it never came to that"
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda path: None, "expected a folder or a .py file, found nothing there"),
+        (lambda path: path.mkdir(), "expected at least one .py file, found none"),
+        (lambda path: path.write_text("x"), "expected a folder or a .py file, found another kind of file"),
+        (lambda path: path.symlink_to("/nonexistent"), "expected a folder or a .py file, found nothing there"),
+        (os.mkfifo, "expected a folder or a .py file, found a device, pipe or socket"),
+    ],
+    ids=["nothing", "empty folder", "another file", "dangling link", "pipe"],
+)
+def test_what_is_no_submission_is_one_line(scratch, tmp_path, make, said):
+    """Exit code 2, where and what, and no traceback."""
+    make(tmp_path / "ada")
+    code, out, err = run(scratch, tmp_path / "ada")
+    assert (code, out) == (2, "")
+    assert err.splitlines()[0] == f"error: {tmp_path}/ada: {said}"
+    assert len(err.splitlines()) <= 2
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
+def test_a_file_that_may_not_be_read_is_named(scratch, tmp_path):
+    """It is not copied, and the report or the line says so."""
+    file = tmp_path / "ada" / "velocity_publisher.py"
+    file.parent.mkdir()
+    file.write_text("x = 1\n")
+    file.chmod(0)
+    code, out, err = run(scratch, file.parent, "--exercise", "velocity_publisher")
+    assert code in (1, 2)
+    assert "velocity_publisher.py" in out + err
+    assert "Traceback" not in out + err
+
+
+BAD = {
+    "syntax_error": "syntax_error",
+    "null_bytes": "syntax_error",
+    "raises_in_constructor": "exception",
+    "raises_in_callback": "exception",
+    "exits_at_import": "exited",
+    "loops_in_constructor": "hung",
+    "loops_in_callback": "hung",
+    "segmentation_fault": "killed",
+    "endless_output": None,
+    "ignores_stop": None,
+    "asks_for_input": "exception",
+    "memory_grows": None,
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_code_ends_in_a_report(scratch, name):
+    """What went wrong is in it; the command ends by itself and leaves nothing behind."""
+    exercise = exercise_of(SUBMISSIONS / "broken" / name)
+    code, out, err = run(scratch, SUBMISSIONS / "broken" / name, "--exercise", exercise, "--json")
+    report = json.loads(out)
+    assert code in (0, 1), err
+    assert report["final"] is True
+    kinds = {fault["kind"] for fault in report["exercises"][0]["faults"]}
+    assert BAD[name] is None or BAD[name] in kinds
+    assert all("\n" not in c["reason"] and len(c["reason"]) < 1000 for c in report["exercises"][0]["criteria"])
+    assert "Traceback" not in err
+
+
+def exercise_of(folder):
+    """Return the exercise that a folder answers."""
+    names = {path.name for path in folder.rglob("*.py")}
+    if "velocity_publisher.py" in names:
+        return "velocity_publisher"
+    return "odom_subscriber" if "odom_subscriber.py" in names else "two_node_communication"
+
+
+def test_a_file_that_is_not_python_is_named_with_its_line(scratch, tmp_path):
+    """The first thing its author needs."""
+    file = tmp_path / "ada" / "velocity_publisher.py"
+    file.parent.mkdir()
+    file.write_text("import rclpy\n\ndef main(:\n    pass\n")
+    code, out, _ = run(scratch, file.parent, "--exercise", "velocity_publisher", "--json")
+    (fault,) = json.loads(out)["exercises"][0]["faults"]
+    assert code == 1
+    assert (fault["kind"], fault["file"], fault["line"]) == ("syntax_error", "velocity_publisher.py", 3)
+
+
+#: Prints its own name in a way that finds it again, and never ends.
+ENDLESS = "print('running', flush=True)\nwhile True: pass\n"
+
+
+def endless(tmp_path):
+    submission = tmp_path / "endless"
+    submission.mkdir()
+    (submission / "velocity_publisher.py").write_text(ENDLESS)
+    return submission
+
+
+def test_an_interrupt_in_the_middle_leaves_nothing(scratch, tmp_path):
+    """Ctrl-C: 130, one line, and no process, folder or shared memory; also when it is pressed twice."""
+    before = shared_memory()
+    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
+    wait_for(lambda: students_of(scratch))
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (130, "")
+    assert err == "interrupted: no report was made\n"
+    assert_nothing_left(scratch, before)
+
+
+def test_a_kill_in_the_middle_ends_everything(scratch, tmp_path):
+    """SIGKILL gives no time to tidy up: folders stay, but no process and no shared memory."""
+    before = shared_memory()
+    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
+    wait_for(lambda: students_of(scratch))
+    process.kill()
+    process.communicate(timeout=120)
+    wait_for(lambda: not processes_of(scratch))
+    assert shared_memory() <= before
+    assert all(re.match("grade-", path.name) for path in scratch.iterdir())
+
+
+def test_a_termination_in_the_middle_ends_everything(scratch, tmp_path):
+    """As a build server does it that has waited long enough."""
+    before = shared_memory()
+    process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
+    wait_for(lambda: students_of(scratch))
+    process.terminate()
+    process.communicate(timeout=120)
+    wait_for(lambda: not processes_of(scratch))
+    assert shared_memory() <= before
+
+
+def students_of(scratch):
+    """Return the students' processes among those of a scratch folder."""
+    return [pid for pid in processes_of(scratch) if b"launcher.py" in read(Path(f"/proc/{pid}/cmdline"))]
