@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from grader.judging.diagnosis.diagnose import CAUSES
 from grader.model.exercise import Outcome
 from grader.model.report import ExerciseReport, Verdict
 from grader.model.trace import Trace
+from grader.reading.sources import source_text
 
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
@@ -118,3 +120,68 @@ def test_a_right_program_that_does_right_is_left_alone(file: str) -> None:
     right = [v for v in judged.verdicts if v.outcome is Outcome.MET]
     assert right
     assert all(v in plain.verdicts for v in right)
+
+
+#: Causes that say what a program does wrong, whatever was recorded: a right program must never get them.
+TEXTUAL = {cause.id for cause in CAUSES} - {
+    "log_line",  # where a log is written
+    "log_period",
+    "late_timer",
+    "only_when_told",
+    "printed",
+    "published_several_times",
+    "loop_pace",
+    "stopped_itself",
+    "too_slow",
+    "wrong_axis",
+    "wrong_number",
+    "wrong_topic",
+}
+OTHERWISE = [
+    ("velocity_publisher.py", "paced", {"rate": 10}),
+    ("velocity_publisher.py", "paced", {"rate": 400}),
+    ("velocity_publisher.py", "silent", {}),
+    ("velocity_publisher.py", "once", {}),
+    ("velocity_publisher.py", "bursts", {"count": 2, "period": 0.05}),
+    ("velocity_publisher.py", "stopped", {}),
+    ("velocity_publisher.py", "moving", {"linear": [0, 0.5, 0]}),
+    ("velocity_publisher.py", "moving", {"linear": [0, 0, 0], "angular": [0, 0, 0]}),
+    ("odom_subscriber.py", "hearing", {}),
+    ("odom_subscriber.py", "logging", {"what": "swapped"}),
+    ("odom_subscriber.py", "logging", {"what": "zero"}),
+    ("odom_subscriber.py", "logging", {"what": "unsigned"}),
+    ("odom_subscriber.py", "logging_first", {}),
+    ("odom_subscriber.py", "logging_once", {}),
+    ("temperature_sensor.py", "sensing", {"what": "wide"}),
+    ("temperature_sensor.py", "sensing", {"what": "constant"}),
+    ("temperature_sensor.py", "fanned", {"what": "no number"}),
+    ("temperature_sensor.py", "fanned", {"topic": ""}),
+    ("fan_controller.py", "answering", {"rule": "from_25"}),
+    ("fan_controller.py", "answering", {"rule": "inverted"}),
+    ("fan_controller.py", "answering", {"rule": "one"}),
+    ("fan_controller.py", "answering", {"rule": "only_on"}),
+    ("fan_controller.py", "latching", {}),
+    ("fan_controller.py", "mute", {}),
+]
+
+
+def right_programs(file: str) -> dict[str, str]:
+    """The graded files of that name among the correct submissions."""
+    folders = Path(__file__).parents[1] / "submissions"
+    found = sorted([*folders.glob(f"correct/**/{file}"), *folders.glob(f"threads/**/{file}")])
+    return {p.parent.name: text for p in found if (text := source_text(p)) is not None}
+
+
+@pytest.mark.parametrize(("file", "name", "arguments"), OTHERWISE)
+def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str, Any]) -> None:
+    """Even where a recording says that they did wrong, what is right in the text is not called wrong."""
+    scenario, build = RECORDINGS[name]
+    traces = {scenario: build(**arguments).trace(scenario)}
+    programs = right_programs(file)
+    assert len(programs) >= 10
+    blamed = {}
+    for folder, text in programs.items():
+        texts = {**dict.fromkeys(exercise_of(file).files, ""), file: text}
+        found = {v.evidence["diagnosis"] for v in lost(report(file, traces, texts))} & TEXTUAL
+        blamed |= {folder: found} if found else {}
+    assert blamed == {}

@@ -13,7 +13,7 @@ from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.diagnosis.silence import silent_topic, timer_code
 from grader.judging.diagnosis.source import Source, chain, last_name, subtree
-from grader.judging.diagnosis.wiring import conditions, made, made_for, publish_calls, reached, roots
+from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for, publish_calls, reached, roots
 from grader.judging.values import published, readings
 from grader.judging.wording import number
 from grader.model.quantities import within
@@ -105,10 +105,25 @@ def _inverted(case: Case) -> Clue | None:
     switches = _switches(source, check.threshold)
     if not both or not all(flipped) or len(switches) != 1:
         return None
+    if not _says_inverted(source, switches[0], check):
+        return None
     code = source.code(switches[0].node, 40)
     limit = number(check.threshold)
     hint = f"the branches of {code} are the wrong way round: {number(check.above)} belongs above {limit}"
     return Clue(f"{hint}, {number(check.otherwise)} at or below it", source.place(switches[0].node), key="inverted")
+
+
+def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | AnswersTogether) -> bool:
+    """Return whether the text, too, gives the answer of one side on the other."""
+    choice = next((n for n in source.around(switch.node) if isinstance(n, (ast.If, ast.IfExp))), None)
+    if choice is None:
+        return False
+    body = choice.body if isinstance(choice, ast.If) else [choice.body]
+    numbers = {c.value for part in body for n in subtree(part) if (c := constant(source, n)) is not None}
+    right, wrong = check.above, check.otherwise
+    if isinstance(switch.op, (ast.Lt, ast.LtE)):
+        right, wrong = wrong, right
+    return wrong in numbers and right not in numbers
 
 
 def _rounded(case: Case) -> Clue | None:
@@ -265,7 +280,7 @@ def _answered_once(case: Case) -> Clue | None:
             names = {chain(n) for n in subtree(test.test) if isinstance(n, ast.Attribute)}
             function = source.function_of(call)
             stores = [s for name in names for s in source.stores(name) if source.function_of(s) is function]
-            if stores and function is not None:
+            if stores and function is not None and is_flag(test.test):
                 hint = f"'if {source.code(test.test, 40)}' lets one answer through: answer each temperature"
                 return Clue(hint, source.place(test), key="answered_once")
     return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from grader.judging.checks.topics import FieldValues
@@ -55,8 +55,8 @@ def _is(got: float, want: float) -> bool:
 def given(source: Source, path: str) -> list[_Given]:
     """Return the places that give a field such as `linear.x` a value, assignments and keyword arguments."""
     group, _, leaf = path.partition(".")
-    assigned = [s for s in source.all(ast.Assign) if any(chain(t).endswith(f".{path}") for t in s.targets)]
-    found = [_Given(s, s.value, constant(source, s.value)) for s in assigned]
+    pairs = (p for s in source.all(ast.Assign) for p in _assigned(s))
+    found = [_Given(s, v, constant(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
     for call in source.all(ast.Call):
         around = source.parents.get(call)
         outer = around.arg if isinstance(around, ast.keyword) else ""
@@ -64,6 +64,16 @@ def given(source: Source, path: str) -> list[_Given]:
         own = [k for k in call.keywords if k.arg == leaf and (outer == group or whole)]
         found += [_Given(k, k.value, constant(source, k.value)) for k in own]
     return sorted(found, key=lambda g: first_line(g.node))
+
+
+def _assigned(statement: ast.Assign) -> Iterator[tuple[ast.Assign, ast.expr, ast.expr]]:
+    """Yield statement, target and value of an assignment; those of `a, b = 1, 2` one by one."""
+    for target in statement.targets:
+        value = statement.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+            yield from ((statement, t, v) for t, v in zip(target.elts, value.elts, strict=True))
+        else:
+            yield statement, target, value
 
 
 def given_leaf(source: Source, leaf: str) -> list[ast.AST]:
@@ -156,14 +166,16 @@ def _sometimes(case: Case) -> Clue | None:
             continue
         code = source.code(places[0].node)
         test = next((n for n in source.around(places[0].node) if isinstance(n, ast.If)), None)
-        if test is not None and source.function_of(test) is not None:
+        sends = list(source.calls("publish"))
+        beyond = any(test not in set(source.around(c)) for c in sends)
+        if test is not None and source.function_of(test) is not None and beyond:
             hint = f"{code} runs only under 'if {source.code(test.test, 40)}': every message needs it"
             return Clue(hint, source.place(places[0].node), key=f"sometimes:{first_line(test)}")
         function = source.function_of(places[0].node)
-        sends = [c for c in source.calls("publish") if function is not None and source.function_of(c) is function]
-        if sends and all(first_line(c) < first_line(places[0].node) for c in sends):
-            hint = f"{code} comes after {source.code(sends[0])}: set the fields before the message is sent"
-            return Clue(hint, source.place(places[0].node), key=f"late:{first_line(sends[0])}")
+        here = [c for c in sends if function is not None and source.function_of(c) is function]
+        if here and all(first_line(c) < first_line(places[0].node) for c in here):
+            hint = f"{code} comes after {source.code(here[0])}: set the fields before the message is sent"
+            return Clue(hint, source.place(places[0].node), key=f"late:{first_line(here[0])}")
     return None
 
 

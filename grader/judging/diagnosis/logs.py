@@ -13,7 +13,7 @@ from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.silence import timer_code
 from grader.judging.diagnosis.source import Source, argument, chain, last_name, text_of
-from grader.judging.diagnosis.wiring import Made, is_log, made, made_for, python_loggers, reached, roots
+from grader.judging.diagnosis.wiring import Made, is_flag, is_log, made, made_for, python_loggers, reached, roots
 from grader.judging.output import printed_lines, student_records
 from grader.judging.wording import number
 from grader.model.exercise import Location, Outcome
@@ -183,6 +183,8 @@ def _logged_once(case: Case) -> Clue | None:
 
 def _set_inside(test: ast.If) -> bool:
     """Return whether a condition is changed by what stands under it."""
+    if not is_flag(test.test):
+        return False
     asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
     stored = (t for s in test.body for n in ast.walk(s) if isinstance(n, ast.Assign) for t in n.targets)
     return any(chain(t) in asked for t in stored)

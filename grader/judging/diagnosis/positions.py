@@ -8,8 +8,8 @@ from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.source import Source, argument, chain, first_line, last_name, subtree
-from grader.judging.diagnosis.wiring import made, reached, roots
+from grader.judging.diagnosis.source import Source, argument, chain, first_line, last_name, parameters, subtree
+from grader.judging.diagnosis.wiring import is_flag, made, reached, roots
 from grader.model.exercise import Outcome
 
 _POSITION = "msg.pose.pose.position"
@@ -129,7 +129,7 @@ def _kept_first(case: Case) -> Clue | None:
         return None
     for item in made(source, "subscription"):
         for node in reached(source, roots(source, item.callback)):
-            if isinstance(node, ast.If) and _asks_for_none(node.test) and _stores(node):
+            if isinstance(node, ast.If) and is_flag(node.test) and _stores(source, node):
                 hint = f"under 'if {source.code(node.test, 40)}' only the first message is stored: store each one"
                 return Clue(hint, source.place(node))
     return None
@@ -196,18 +196,14 @@ def _log_line(case: Case) -> Clue | None:
     return Clue(case.verdict.hint, source.place(call))
 
 
-def _asks_for_none(test: ast.expr) -> bool:
-    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        return True
-    none = isinstance(test, ast.Compare) and any(
-        isinstance(c, ast.Constant) and c.value is None for c in test.comparators
-    )
-    return none and isinstance(test, ast.Compare) and isinstance(test.ops[0], (ast.Is, ast.Eq))
-
-
-def _stores(node: ast.If) -> bool:
-    stored = (n for s in node.body for n in ast.walk(s) if isinstance(n, ast.Attribute))
-    return not node.orelse and any(isinstance(n.ctx, ast.Store) for n in stored)
+def _stores(source: Source, node: ast.If) -> bool:
+    """Return whether what is asked for is stored from the message, and nothing is done otherwise."""
+    function = source.function_of(node)
+    message = set(parameters(function)) - {"self"} if function is not None else set()
+    asked = {chain(n) for n in ast.walk(node.test) if isinstance(n, (ast.Attribute, ast.Name))} - {"self", ""}
+    assigned = [n for s in node.body for n in ast.walk(s) if isinstance(n, ast.Assign)]
+    kept = [s for s in assigned if message & {last_name(n) for n in ast.walk(s.value)}]
+    return not node.orelse and any(chain(t) in asked for s in kept for t in s.targets)
 
 
 POSITIONS = (

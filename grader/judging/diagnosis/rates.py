@@ -13,7 +13,17 @@ from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.endings import head_of
 from grader.judging.diagnosis.silence import silent_topic, timer_code
 from grader.judging.diagnosis.source import Loop, Source, argument, chain, first_line, last_name
-from grader.judging.diagnosis.wiring import Made, conditions, made, made_for, publish_calls, reached, roots
+from grader.judging.diagnosis.wiring import (
+    Made,
+    called_only,
+    changes,
+    conditions,
+    made,
+    made_for,
+    publish_calls,
+    reached,
+    roots,
+)
 from grader.judging.wording import number
 
 #: How far the rate that the text gives may lie from the measured one.
@@ -156,7 +166,7 @@ def _loop_pace(case: Case) -> Clue | None:
     source = paced.source
     rates = list(source.calls("create_rate", "Rate"))
     worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
-    if worth is not None and _same(worth.value, paced.found_hz):
+    if worth is not None and _same(worth.value, paced.found_hz) and not _same(worth.value, paced.wanted_hz):
         hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz are asked for"
         return Clue(hint, source.place(worth.origin))
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
@@ -183,6 +193,7 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
 
 def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     waits = {"wait", "wait_for", "get", "join", "sleep", "sleep_until", "sleep_for", "spin_once", "select"}
+    waits |= {"now", "time", "monotonic", "perf_counter", "time_ns", "monotonic_ns"}
     inside = {last_name(n.func) for n in reached(paced.source, [loop]) if isinstance(n, ast.Call)}
     if inside & waits or paced.found_hz < 5 * paced.wanted_hz:
         return None
@@ -197,6 +208,9 @@ def _published_once(case: Case) -> Clue | None:
     if paced is None or paced.count != 1 or paced.timers() or not paced.calls:
         return None
     source = paced.source
+    function = source.function_of(paced.calls[0])
+    if function is not None and not called_only(source, function):
+        return None
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
     timers = list(source.calls("create_timer", "Timer"))
     if loops or timers or any(set(paced.calls) & set(_heard(source, s)) for s in made(source, "subscription")):
@@ -221,7 +235,7 @@ def _stopped_itself(case: Case) -> Clue | None:
             if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
                 hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
                 return Clue(hint, source.place(node))
-        tests = [n for c in inside if c in paced.calls for n in conditions(source, c)]
+        tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
         if len(tests) == 1:
             hint = (
                 f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"

@@ -42,6 +42,8 @@ def _limits(case: Case) -> Clue | None:
     name, function = last_name(calls[0].func), chain(calls[0].func)
     low, high = number(check.low), number(check.high)
     if name in ("gauss", "normalvariate", "normal"):
+        if list(source.calls("min", "max", "clip")):
+            return None
         right = f"random.uniform({float(check.low)}, {float(check.high)})"
         return Clue(
             f"{source.code(calls[0])} has no limits, some values lie far out: {right}",

@@ -261,12 +261,19 @@ def _held_up(case: Case) -> Clue | None:
         early = function is None or function.name in ("__init__", "main")
         if early and worth is not None and worth.value >= _LONG_SLEEP_S:
             return Clue(f"{source.code(call)} holds everything up: the node does nothing meanwhile", source.place(call))
+    return _waits_in_constructor(source)
+
+
+def _waits_in_constructor(source: Source) -> Clue | None:
+    """Return the loop in a constructor that waits for what only a callback of the node can bring."""
+    callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
+    brought = {chain(n) for n in reached(source, callbacks) if isinstance(n, ast.Attribute) and last_name(n)}
     for loop in source.all(ast.While):
         function = source.function_of(loop)
         inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
-        asks = "self." in source.code(loop.test)
-        idle = "sleep" in inside and not inside & {"spin_once", "spin", "publish", "wait_for_service"}
-        if function is not None and function.name == "__init__" and idle and asks:
+        idle = not inside & {"spin_once", "spin", "publish", "wait_for_service"}
+        asked = {chain(n) for n in ast.walk(loop.test) if isinstance(n, ast.Attribute)}
+        if function is not None and function.name == "__init__" and idle and asked & brought:
             hint = f"the loop '{head_of(source, loop)}' waits in the constructor for a callback"
             return Clue(f"{hint} that can only come once the node spins", source.place(loop))
     return None

@@ -165,3 +165,27 @@ def conditions(source: Source, call: ast.AST) -> list[ast.If]:
     returns = (r for r in source.all(ast.Return) if source.function_of(r) is function)
     early = [n for r in returns if first_line(r) < first_line(call) for n in source.around(r) if isinstance(n, ast.If)]
     return [*around, *early]
+
+
+def changes(source: Source, test: ast.expr) -> bool:
+    """Return whether a condition asks for something that the running node changes: an attribute, or a global name."""
+    names = {chain(n) for n in ast.walk(test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
+    stores = (s for name in names for s in source.stored.get(name, ()))
+    return any((f := source.function_of(s)) is not None and f.name not in ("__init__", "main") for s in stores)
+
+
+def is_flag(test: ast.expr) -> bool:
+    """Return whether a condition asks for one name only: `x`, `not x`, `x is None` or `x == False`."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        test = test.operand
+    if isinstance(test, ast.Compare) and len(test.comparators) == 1:
+        other = test.comparators[0]
+        plain = isinstance(other, ast.Constant) and (other.value is None or isinstance(other.value, bool))
+        return plain and isinstance(test.left, (ast.Name, ast.Attribute))
+    return isinstance(test, (ast.Name, ast.Attribute))
+
+
+def called_only(source: Source, function: Function) -> bool:
+    """Return whether a function is called by its name only, and never handed on for somebody else to call."""
+    names = [n for n in source.names() if last_name(n) == function.name and isinstance(n.ctx, ast.Load)]
+    return all(isinstance(c := source.parents.get(n), ast.Call) and c.func is n for n in names)
