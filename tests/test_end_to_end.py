@@ -16,6 +16,7 @@ from grader.session import Request, grade
 ROOT = Path(__file__).resolve().parent.parent
 SUBMISSIONS = ROOT / "tests" / "submissions"
 EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
+GOLDEN = YAML(typ="safe").load((SUBMISSIONS / "golden.yaml").read_text(encoding="utf-8"))
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 pytestmark = pytest.mark.ros
@@ -32,6 +33,20 @@ def outcomes(report):
     return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}, told
 
 
+def what_a_student_reads(report):
+    """Return reason, hint and place of every criterion that lost points by a fault of its own."""
+    return {
+        verdict.id: {
+            "reason": verdict.reason,
+            "hint": verdict.hint,
+            "at": f"{verdict.location.file}:{verdict.location.line}" if verdict.location else "",
+        }
+        for exercise in report.exercises
+        for verdict in exercise.verdicts
+        if verdict.outcome.value in ("not_met", "partly")
+    }
+
+
 def run(*arguments, **options):
     return subprocess.run([GRADE, *map(str, arguments)], check=False, capture_output=True, text=True, **options)
 
@@ -43,6 +58,8 @@ def test_a_submission_gets_what_it_is_worth(folder):
     report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"])), say_nothing)
     found, told = outcomes(report)
     assert found == wanted["expected"], told
+    if folder in GOLDEN:
+        assert what_a_student_reads(report) == GOLDEN[folder]
 
 
 def test_the_reference_solutions_score_full_on_the_virtual_clock():
