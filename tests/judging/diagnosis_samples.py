@@ -250,14 +250,13 @@ def answering_once() -> Recording:
     return mute().number(0.5, "/fan_speed", 0.0)
 
 
-def latching() -> Recording:
-    """A controller that never switches off again."""
-    rec = answering("right")
-    answers = [o for o in rec.items if getattr(o, "topic", "") == "/fan_speed" and hasattr(o, "cdr")]
-    on = next(o.t_ns for o in answers if o.value["data"] == 100.0)
-    rec.items = [o for o in rec.items if o not in answers]
-    for answer in answers:
-        rec.number(answer.t_ns / 1e9, "/fan_speed", 100.0 if answer.t_ns >= on else 0.0)
+def latching(until: float = 0.0) -> Recording:
+    """A controller that switches off below a limit only."""
+    rec, on = mute(), False
+    for delivery in [o for o in rec.items if hasattr(o, "cdr")]:
+        value = delivery.value["data"]
+        on = value > 25 or (on and value >= until)
+        rec.number(delivery.t_ns / 1e9, "/fan_speed", 100.0 if on else 0.0)
     return rec
 
 

@@ -153,12 +153,15 @@ def _other_threshold(case: Case) -> Clue | None:
     source, check = found
     others = [s for s in _switches(source) if 0 < abs(s.limit.value - check.threshold) <= 10 and s.limit.value > 1]
     wrong = _wrong_inputs(case)
-    if _switches(source, check.threshold) or len(others) != 1 or not wrong:
+    if len(others) != 1 or not wrong:
         return None
     lower, upper = sorted((check.threshold, others[0].limit.value))
     if any(not lower - _EXACT <= v <= upper + _EXACT for v in wrong):
         return None
     hint = f"{source.code(others[0].node, 40)} compares with {number(others[0].limit.value)}: the limit is "
+    if _switches(source, check.threshold):
+        hint = f"{source.code(others[0].node, 40)} leaves the old answer between {number(lower)} and {number(upper)}: "
+        hint += "the one limit is "
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 

@@ -16,6 +16,8 @@ from grader.judging.wording import number
 
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
 _DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
+#: How deep an expression around a draw is followed.
+_DEEPEST = 12
 
 
 def _asked(case: Case) -> tuple[Source, RandomInRange] | None:
@@ -33,30 +35,55 @@ def draws(source: Source) -> list[ast.Call]:
 def _limits(case: Case) -> Clue | None:
     """The limits of what is drawn are not those asked for."""
     found = _asked(case)
-    if found is None or case.evidence("outside") is None:
+    calls = draws(found[0]) if found is not None else []
+    if found is None or case.evidence("outside") is None or len(calls) != 1:
         return None
     source, check = found
-    calls = draws(source)
-    if len(calls) != 1:
-        return None
-    name, function = last_name(calls[0].func), chain(calls[0].func)
-    low, high = number(check.low), number(check.high)
-    if name in ("gauss", "normalvariate", "normal"):
-        if list(source.calls("min", "max", "clip")):
-            return None
-        right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    call, low, high = calls[0], number(check.low), number(check.high)
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
         return Clue(
-            f"{source.code(calls[0])} has no limits, some values lie far out: {right}",
-            source.place(calls[0]),
-            key="draw",
+            f"{source.code(call)} has no limits, some values lie far out: {right}", source.place(call), key="draw"
         )
-    limits = [number_at(source, a) for a in calls[0].args]
-    if name not in ("uniform", "randint") or None in limits or limits == [check.low, check.high] or len(limits) != 2:
+    limits = [number_at(source, a) for a in call.args]
+    if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
+        if limits == [check.low, check.high]:
+            return None
+        right = right if last_name(call.func) == "uniform" else f"{chain(call.func)}({low}, {high})"
+        return Clue(f"{source.code(call)} draws outside {low} to {high}: {right}", source.place(call), key="draw")
+    return _scaled_draw(source, check, call)
+
+
+def _scaled_draw(source: Source, check: RandomInRange, call: ast.Call) -> Clue | None:
+    """`random.random() * 10`: a draw from 0 to 1 that is stretched to other limits."""
+    whole: ast.AST = call
+    while isinstance(source.parents.get(whole), ast.BinOp):
+        whole = source.parents[whole]
+    ends = [_with(source, whole, call, drawn) for drawn in (0.0, 1.0)]
+    known = [end for end in ends if end is not None]
+    plain = last_name(call.func) in ("random", "rand", "random_sample") and not call.args
+    if not plain or len(known) < 2 or (check.low <= min(known) and max(known) <= check.high):
         return None
-    right = (
-        f"{function}({low}, {high})" if name == "randint" else f"{function}({float(check.low)}, {float(check.high)})"
-    )
-    return Clue(f"{source.code(calls[0])} draws outside {low} to {high}: {right}", source.place(calls[0]), key="draw")
+    hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    return Clue(f"{hint}: {right}", source.place(whole), key="draw")
+
+
+def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
+    """Return what an expression is worth if a call gives this number."""
+    if node is call:
+        return drawn
+    if not isinstance(node, ast.BinOp) or depth > _DEEPEST:
+        return number_at(source, node)
+    left = _with(source, node.left, call, drawn, depth + 1)
+    right = _with(source, node.right, call, drawn, depth + 1)
+    if left is None or right is None:
+        return None
+    if isinstance(node.op, ast.Add):
+        return left + right
+    if isinstance(node.op, ast.Sub):
+        return left - right
+    return left * right if isinstance(node.op, ast.Mult) else None
 
 
 def _drawn_once(case: Case) -> Clue | None:
