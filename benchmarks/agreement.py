@@ -46,10 +46,14 @@ def busy(loops: int) -> Iterator[None]:
             process.kill()
 
 
+def print_nothing(step: str) -> None:
+    """Hear which step begins, and say nothing."""
+
+
 def judged(folder: str, exercises: tuple[str, ...], clock: str) -> dict[str, Any]:
     """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
     try:
-        report = grade(Request(str(SUBMISSIONS / folder), exercises=exercises, clock=clock), lambda step: None)
+        report = grade(Request(str(SUBMISSIONS / folder), exercises=exercises, clock=clock), print_nothing)
     except GraderError as fault:
         return {"outcomes": {"error": fault.message}, "wall": []}
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
@@ -99,7 +103,7 @@ def main() -> None:
     parser.add_argument("modes", nargs="*", metavar="MODE")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     if unknown := set(arguments.modes) - set(MODES):
         parser.error(f"expected modes of {', '.join(MODES)}, found {', '.join(sorted(unknown))}")
     expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
