@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
 from grader.model.trace import ClockKind, GraphSnapshot
 
@@ -94,7 +95,17 @@ class ExerciseReport:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What a report was made with; `isolation` names the sandbox tier."""
+    """What a report was made with.
+
+    Attributes:
+        grader: Version of the grader.
+        ros_distro: ROS release.
+        rclpy: Version of rclpy.
+        rmw: The middleware.
+        python: Version of Python.
+        isolation: Name of the sandbox tier; `none` without walls.
+        containment: What the tier held back, as the self-test found it; empty without walls.
+    """
 
     grader: str
     ros_distro: str
@@ -102,6 +113,7 @@ class Environment:
     rmw: str
     python: str
     isolation: str
+    containment: tuple[Property, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from fractions import Fraction
 from importlib.resources import files
 from typing import Any
 
+from grader.model.containment import Property, described
 from grader.model.exercise import Location
 from grader.model.quantities import seconds
 from grader.model.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
@@ -39,7 +40,8 @@ def report_to_json(report: Report) -> dict[str, Any]:
             "rclpy": report.environment.rclpy,
             "rmw": report.environment.rmw,
             "python": report.environment.python,
-            "isolation": report.environment.isolation,
+            "isolation": described(report.environment.isolation, report.environment.containment),
+            "containment": [_property(found) for found in report.environment.containment],
         },
         "score": _number(report.score),
         "max_score": _number(report.max_score),
@@ -60,6 +62,10 @@ def report_schema() -> dict[str, Any]:
     text = files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
     schema: dict[str, Any] = json.loads(text)
     return schema
+
+
+def _property(found: Property) -> dict[str, Any]:
+    return {"name": found.name, "holds": found.holds, "mechanism": found.mechanism, "found": found.found}
 
 
 def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from rich.text import Text
 
+from grader.model.containment import NO_WALLS, summarised
 from grader.model.exercise import Outcome
 from grader.model.quantities import seconds
 from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
@@ -191,16 +192,20 @@ def _foot(page: Page, report: Report) -> None:
         f"grader {made_with.grader}, rclpy {made_with.rclpy} ({made_with.ros_distro}), "
         f"{made_with.rmw}, Python {made_with.python}"
     )
-    isolation = made_with.isolation + (" (no walls around the student's code)" if made_with.isolation == "none" else "")
     rows = (
         ("seed", f"{report.seed} (--seed {report.seed} repeats this run)"),
         ("versions", versions),
-        ("isolation", isolation),
+        ("isolation", summarised(made_with.isolation, made_with.containment)),
         ("clock", f"virtual, but the wall clock in exercise {', '.join(walls)}" if walls else "virtual"),
         ("duration", f"{report.duration_s:.1f} s"),
     )
     for name, value in rows:
-        page.put(shown(value), prefix=Text.assemble((f"{name.ljust(9)}  ", "dim")), style="dim")
+        loud = name == "isolation" and made_with.isolation == NO_WALLS
+        page.put(
+            shown(value),
+            prefix=Text.assemble((f"{name.ljust(9)}  ", "dim")),
+            style="bold red" if loud else "dim",
+        )
 
 
 def _place(file: str, line: int) -> str:

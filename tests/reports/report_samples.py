@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 
+from grader.model.containment import PROPERTIES, Property
 from grader.model.exercise import Location, Outcome
 from grader.model.report import Environment, ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind, Endpoint, GraphSnapshot
@@ -14,6 +15,7 @@ ENVIRONMENT = Environment(
     rmw="rmw_fastrtps_cpp",
     python="3.11.9",
     isolation="bubblewrap",
+    containment=tuple(Property(name, holds=True, mechanism="a namespace") for name in PROPERTIES),
 )
 NASTY = "\x1b[2J\x1b]0;owned\x07[bold red]pwned[/] \u202edrowssap\u202c \ud800 a\nb\r\tc\u200b \x9b31m {x!r} \\"
 

@@ -54,7 +54,15 @@ def test_the_keys_have_a_fixed_order():
         "exercises",
     ]
     assert list(whole["submission"]) == ["name", "path", "digest"]
-    assert list(whole["environment"]) == ["grader", "ros_distro", "rclpy", "rmw", "python", "isolation"]
+    assert list(whole["environment"]) == [
+        "grader",
+        "ros_distro",
+        "rclpy",
+        "rmw",
+        "python",
+        "isolation",
+        "containment",
+    ]
     first = whole["exercises"][0]
     assert list(first) == [
         "id",

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import grader
+from grader.model.containment import PROPERTIES, TIERS, Property, TierReport
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import bubblewrap, plain, probe
 from grader.recording.isolation.bubblewrap import Bubblewrap
@@ -49,6 +50,27 @@ def choose_isolation(wanted: str, ros: RosInstallation) -> Isolation:
     if why and wanted != AUTO:
         raise EnvironmentFault(f"isolation: {isolation.name} does not hold on this machine: {why}")
     return Plain(why) if why else isolation
+
+
+def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
+    """Try every tier and return what each is worth here, strongest first; the tier without walls comes last."""
+    reports = [_inspected(name, ros) for name in NAMES if name != plain.NAME]
+    open_ones = tuple(Property(name, holds=False, mechanism="none") for name in PROPERTIES)
+    nothing = TierReport(
+        plain.NAME, TIERS[plain.NAME], usable=False, why="it contains nothing; ask for it by name", properties=open_ones
+    )
+    return (*reports, nothing)
+
+
+def _inspected(name: str, ros: RosInstallation) -> TierReport:
+    try:
+        isolation = Bubblewrap.here()
+    except EnvironmentFault as fault:
+        return TierReport(name, TIERS[name], usable=False, why=fault.message, remedy=fault.hint)
+    if name != isolation.name:
+        return TierReport(name, TIERS[name], usable=False, why=f"it is for another user; this one has {isolation.name}")
+    why = why_not(isolation, ros)
+    return TierReport(name, TIERS[name], usable=not why, why=why)
 
 
 def isolation_from_name(name: str) -> Isolation:
