@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import traceback
 from types import FrameType
 from typing import Any
+
+#: Longest text of a fault.
+TEXT_CHARACTERS = 500
+#: So much of an exception's text is read at all.
+_READ_CHARACTERS = 4_000
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
+_NO_PATH = r"\s'\"():,;<>\[\]"
+#: A file of code by its whole path; what stands in other quotes may be a path or a topic, and stays.
+_CODE_FILE = re.compile(rf"(?<![\w.~/])(?:/[^/{_NO_PATH}]+)+\.(?:pyc?|so(?:\.\d+)*|c|cc|cpp|h|hpp|pyx)\b")
 
 
 class Describer:
@@ -18,13 +28,14 @@ class Describer:
 
     def __init__(self, root: str) -> None:
         self._root = os.path.join(os.path.realpath(root), "")
+        self._folders = (os.path.join(root, ""), self._root)
 
     def exception(self, error: BaseException) -> dict[str, Any]:
         """Return an uncaught exception as a fault."""
         if isinstance(error, SyntaxError) and self._inside(error.filename or ""):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
-        return {"kind": "exception", "text": one_line(error), **self._place(frames)}
+        return {"kind": "exception", "text": self.one_line(error), **self._place(frames)}
 
     def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
         """Return a file that cannot be compiled as a fault."""
@@ -59,11 +70,32 @@ class Describer:
         path = os.path.realpath(file)
         return path[len(self._root) :] if path.startswith(self._root) else os.path.basename(path)
 
+    def one_line(self, error: BaseException) -> str:
+        """Return an exception as its last line in a traceback, without line breaks and not longer than 500 characters.
 
-def one_line(error: BaseException) -> str:
-    """Return an exception as its last line in a traceback, without line breaks and not longer than 500 characters."""
-    try:
-        text = "".join(traceback.format_exception_only(type(error), error)).strip()
-    except Exception:  # the student's own __str__ may raise anything
-        text = type(error).__name__
-    return " ".join(text.split())[:500]
+        It says nothing that differs from run to run or tells of this machine: no addresses of objects, no folders.
+        """
+        try:
+            text = "".join(traceback.format_exception_only(type(error), error))[:_READ_CHARACTERS].strip()
+        except Exception:  # the student's own __str__ may raise anything
+            text = type(error).__name__
+        return self._without_machine(" ".join(text.split()))[:TEXT_CHARACTERS]
+
+    def _without_machine(self, text: str) -> str:
+        """Return a text with the submission's files relative to its folder, and other files by their names alone."""
+        text = _ADDRESS.sub("", text)
+        for folder in self._folders:
+            text = text.replace(folder, "") if len(folder) > 1 else text
+        text = _CODE_FILE.sub(lambda found: os.path.basename(found[0]), text)
+        for folder in _machine_folders():
+            if folder in text:
+                text = re.sub(rf"{re.escape(folder)}(?:/[^{_NO_PATH}]*)?", lambda f: os.path.basename(f[0]), text)
+        return text
+
+
+def _machine_folders() -> list[str]:
+    """Return the folders that Python, ROS and the grader lie in, the longest first."""
+    own = os.path.dirname(os.path.abspath(__file__))
+    folders = {own, sys.prefix, sys.base_prefix, sys.exec_prefix, os.getcwd(), *filter(os.path.isabs, sys.path)}
+    # a folder near the root, such as /usr, may be a student's own word
+    return sorted((f for f in folders if f.count("/") > 1), key=lambda f: (-len(f), f))

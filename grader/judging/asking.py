@@ -74,7 +74,7 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
     if fault.kind is FaultKind.SYNTAX_ERROR:
         consequence = "the file cannot run"
     else:
-        consequence = "the node had no publisher and no subscription by then"
+        consequence = "the node had sent and received nothing by then"
     reason = f"{fault_sentence(fault)}; {consequence}"
     return not_met(reason, finding.evidence, hint=fault_hint(fault), fault=fault)
 

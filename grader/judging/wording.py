@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from grader.model.quantities import seconds
@@ -11,6 +12,8 @@ from grader.model.trace import Fault, FaultKind
 
 #: Longest quotation of a student's text inside a sentence.
 QUOTE_LENGTH = 120
+#: Where an object lies in memory, as Python writes it: another place in every run.
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
 
 
 def moment(t_ns: int) -> str:
@@ -39,8 +42,8 @@ def counted(count: int, noun: str) -> str:
 
 
 def quote(text: str, length: int = QUOTE_LENGTH) -> str:
-    """Return a student's text on one line, cut to `length` characters."""
-    line = " ".join(text[: 4 * length].split())
+    """Return a student's text on one line, cut to `length` characters; addresses of objects, which vary, are left out."""
+    line = _ADDRESS.sub("", " ".join(text[: 4 * length].split()))
     return line if len(line) <= length else line[: length - 1] + "…"
 
 

@@ -237,7 +237,11 @@ def test_a_right_node_gets_everything() -> None:
         ),
         (FaultKind.EXCEPTION, "NameError: name 'Twist' is not defined", "velocity_publisher.py:12: NameError"),
         (FaultKind.HUNG, "the constructor did not return", "no publisher and no subscription by then"),
-        (FaultKind.EXITED, "exited with code 3", "exited after 0.0 s with code 3; the node had no publisher"),
+        (
+            FaultKind.EXITED,
+            "exited with code 3",
+            "exited after 0.0 s with code 3; the node had sent and received nothing by then",
+        ),
     ],
 )
 def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, said: str) -> None:
