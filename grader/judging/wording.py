@@ -42,7 +42,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def quote(text: str, length: int = QUOTE_LENGTH) -> str:
-    """Return a student's text on one line, cut to `length` characters; addresses of objects, which vary, are left out."""
+    """Return a student's text on one line, without addresses of objects, which vary, and cut to `length` characters."""
     line = _ADDRESS.sub("", " ".join(text[: 4 * length].split()))
     return line if len(line) <= length else line[: length - 1] + "…"
 

@@ -236,7 +236,7 @@ def test_a_right_node_gets_everything() -> None:
             "velocity_publisher.py:12: SyntaxError: invalid syntax (Python 3.11); the file cannot run",
         ),
         (FaultKind.EXCEPTION, "NameError: name 'Twist' is not defined", "velocity_publisher.py:12: NameError"),
-        (FaultKind.HUNG, "the constructor did not return", "no publisher and no subscription by then"),
+        (FaultKind.HUNG, "the constructor did not return", "the node had sent and received nothing by then"),
         (
             FaultKind.EXITED,
             "exited with code 3",
