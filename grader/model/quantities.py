@@ -5,6 +5,7 @@ from typing import Annotated
 
 NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000
+KIB, MIB, GIB = 1 << 10, 1 << 20, 1 << 30
 
 #: Slack of every comparison, relative to the magnitudes compared: `abs(1.1 - 1.0) <= 0.1` is False in floating point.
 SLACK = 1e-9
@@ -20,6 +21,19 @@ def nanoseconds(seconds_: float) -> int:
     return round(seconds_ * NS_PER_S)
 
 
+def size(bytes_: int) -> str:
+    """Return a number of bytes for text, in the largest unit that leaves a whole number: `512 MiB`, `1,500 bytes`."""
+    for factor, unit in ((GIB, "GiB"), (MIB, "MiB"), (KIB, "KiB")):
+        if bytes_ >= factor and bytes_ % factor == 0:
+            return f"{bytes_ // factor:,} {unit}"
+    return f"{bytes_:,} bytes"
+
+
+def duration(duration_ns: int) -> str:
+    """Return a duration for text, without a needless fraction: `60 s`, `0.5 s`."""
+    return f"{seconds(duration_ns):g} s"
+
+
 def within(got: float, want: float, tolerance: float) -> bool:
     """Return whether `got` lies in `want ± tolerance`, the edges inside; NaN never does."""
     return abs(got - want) <= tolerance + SLACK * max(1.0, abs(want), abs(tolerance))
@@ -32,6 +46,8 @@ class Unit:
     symbol: str
 
 
+#: A number of bytes; written in rubrics as `512 MiB`.
+Bytes = Annotated[int, Unit("B")]
 #: A duration as whole nanoseconds; written in rubrics as `10 s`, `200 ms` or `2 min`.
 DurationNs = Annotated[int, Unit("s")]
 #: A frequency; written in rubrics as `20 Hz`.

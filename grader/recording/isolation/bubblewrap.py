@@ -135,7 +135,7 @@ class Bubblewrap:
         """
         seconds = limits.processor_s
         entry = [
-            *(str(self.prlimit), f"--as={limits.memory_bytes}", f"--nproc={limits.processes}"),
+            *(str(self.prlimit), f"--as={limits.address_space_bytes}", f"--nproc={limits.processes}"),
             *(f"--nofile={limits.open_files}", f"--fsize={limits.file_bytes}", "--core=0", "--rtprio=0"),
             f"--cpu={seconds}:{seconds + 1}",
         ]

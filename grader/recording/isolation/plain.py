@@ -80,7 +80,7 @@ def _start(folder: str, *, made: bool, limits: Mapping[str, int]) -> tuple[str, 
 
 def _by_resource(limits: Limits) -> dict[str, int]:
     return {
-        "RLIMIT_AS": limits.memory_bytes,
+        "RLIMIT_AS": limits.address_space_bytes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_bytes,
         "RLIMIT_CORE": 0,

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from grader.model.limits import Limits
+
+__all__ = ["Command", "Isolation", "Limits", "PythonRuntime", "StudentProcess"]
+
 
 @dataclass(frozen=True, slots=True)
 class PythonRuntime:
@@ -47,18 +51,6 @@ class StudentProcess:
     arguments: tuple[str, ...]
     environment: Mapping[str, str]
     pass_fds: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What one student process may use."""
-
-    memory_bytes: int = 2 << 30
-    processes: int = 64
-    open_files: int = 256
-    file_bytes: int = 32 << 20
-    scratch_bytes: int = 16 << 20
-    processor_s: int = 300
 
 
 @dataclass(frozen=True, slots=True)
