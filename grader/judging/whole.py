@@ -1,0 +1,38 @@
+"""Judges a whole run: every exercise of it, as grading does at once and rejudging does later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from grader.judging.judge import judge_exercise
+from grader.model.exercise import Exercise
+from grader.model.report import ExerciseReport, Report
+from grader.model.run import Run
+from grader.model.trace import Trace
+
+
+def judge_run(exercises: Sequence[Exercise], run: Run) -> Report:
+    """Return the report of a run; pure, so the same run and the same exercises give the same report.
+
+    Args:
+        exercises: What is asked, in the order of the report.
+        run: What was recorded for them.
+    """
+    return Report(
+        name=run.submission.name,
+        path=run.submission.path,
+        digest=run.submission.digest,
+        environment=run.environment,
+        seed=run.seed,
+        exercises=tuple(_judged(exercise, run) for exercise in exercises),
+        duration_s=run.duration_s,
+        notes=run.notes,
+        reproduce=run.reproduce,
+    )
+
+
+def _judged(exercise: Exercise, run: Run) -> ExerciseReport:
+    own: Mapping[str, Trace] = {
+        scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id
+    }
+    return judge_exercise(exercise, own, run.submission, run.sources)
