@@ -139,7 +139,7 @@ class LogPeriod:
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
             return not_met(track.reason, track.evidence, blocked_by="logs_position")
-        times = [t for t in self._times(trace, track) if track.start_ns <= t < track.stop_ns]
+        times = [t for t in self.log_times(trace, track) if track.start_ns <= t < track.stop_ns]
         if not times:
             reason = f"{self.process}: nothing with a number was logged while {self.topic} was played"
             return not_met(reason, blocked_by="logs_position")
@@ -183,7 +183,8 @@ class LogPeriod:
         gaps = pairwise(ends)
         return next(((a, b) for a, b in gaps if b - a > _LONGEST_GAP * self.period + track.jitter_ns), None)
 
-    def _times(self, trace: Trace, track: Track) -> tuple[int, ...]:
+    def log_times(self, trace: Trace, track: Track) -> tuple[int, ...]:
+        """Return when positions were logged, or what comes nearest to that; whatever the stream's bounds."""
         logged = logged_positions(trace, self.process, track)
         if logged.right:
             return logged.times_ns
