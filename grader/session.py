@@ -5,19 +5,19 @@ from __future__ import annotations
 import difflib
 import platform
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import grader
-from grader.judging.judge import judge_exercise
+from grader.judging.whole import judge_run
 from grader.model.errors import RubricError
 from grader.model.exercise import Exercise
-from grader.model.report import Environment, ExerciseReport, Report
+from grader.model.report import Environment, Report
+from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
-from grader.model.trace import Trace
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
@@ -27,6 +27,7 @@ from grader.recording.isolation.protocol import Isolation
 from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job
 from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
+from grader.reproducing import reproduction
 
 #: ROS releases that the test suite passes on.
 TRIED_ON = ("jazzy", "kilted")
@@ -83,19 +84,17 @@ def grade(request: Request, progress: Progress) -> Report:
         odometry = read_recording(request, exercises)
         seed = seed_of(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
-        traces = studio.record(jobs, request.clock, progress)
-        sources = read_sources(submission)
-        reports = tuple(_judge(exercise, traces, submission, sources) for exercise in exercises)
-    return Report(
-        name=submission.name,
-        path=request.submission,
-        digest=submission.digest,
-        environment=_environment(studio),
-        seed=seed,
-        exercises=reports,
-        duration_s=time.perf_counter() - started,
-        notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio.isolation)),
-    )
+        run = Run(
+            submission=submission,
+            traces=studio.record(jobs, request.clock, progress),
+            sources=read_sources(submission),
+            environment=_environment(studio),
+            seed=seed,
+            duration_s=time.perf_counter() - started,
+            notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio.isolation)),
+            reproduce=reproduction(request, exercises, odometry, seed),
+        )
+        return judge_run(exercises, run)
 
 
 def read_exercises(request: Request) -> list[Exercise]:
@@ -133,16 +132,6 @@ def plan_jobs(
         for scenario in exercise.scenarios
         if all(submission.files[name].found for name in scenario.processes)
     }
-
-
-def _judge(
-    exercise: Exercise,
-    traces: Mapping[tuple[str, str], Trace],
-    submission: Submission,
-    sources: Mapping[str, str],
-) -> ExerciseReport:
-    own = {scenario: trace for (owner, scenario), trace in traces.items() if owner == exercise.id}
-    return judge_exercise(exercise, own, submission, sources)
 
 
 def _wanted(exercises: Sequence[Exercise]) -> list[str]:

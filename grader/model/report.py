@@ -117,6 +117,21 @@ class Environment:
 
 
 @dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What gives a report again, with the versions of its environment and its seed.
+
+    Attributes:
+        command: Its words, before a shell's quoting; empty if the report came from no command.
+        rubrics: Exercise id and digest of its rubric, in the order graded.
+        recording: Digest of the /odom recording that was played; empty if none was.
+    """
+
+    command: tuple[str, ...] = ()
+    rubrics: tuple[tuple[str, str], ...] = ()
+    recording: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """The result of grading one submission.
 
@@ -129,6 +144,9 @@ class Report:
         exercises: In the order graded.
         duration_s: Wall time of the run; the only figure that differs between two runs.
         notes: Sentences about the intake.
+        reproduce: What gives this report again.
+        pending: Ids of the exercises that were still to be graded when the report was made; their criteria are
+            undecided. Empty for a whole report.
     """
 
     name: str
@@ -139,6 +157,8 @@ class Report:
     exercises: tuple[ExerciseReport, ...]
     duration_s: float
     notes: tuple[str, ...] = ()
+    reproduce: Reproduction = Reproduction()
+    pending: tuple[str, ...] = ()
 
     @property
     def score(self) -> Fraction:

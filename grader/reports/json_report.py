@@ -16,6 +16,7 @@ from grader.model.exercise import Location
 from grader.model.quantities import seconds
 from grader.model.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
 from grader.reports.escape import valid_unicode
+from grader.reports.shell import command_line
 
 #: Digits after the point of every score and duration.
 DIGITS = 6
@@ -48,6 +49,12 @@ def report_to_json(report: Report) -> dict[str, Any]:
         "final": report.final,
         "duration_s": _number(report.duration_s),
         "exercises": [_exercise(exercise, report) for exercise in report.exercises],
+        "reproduce": {
+            "command": command_line(report.reproduce.command),
+            "seed": report.seed,
+            "rubrics": dict(report.reproduce.rubrics),
+            "recording": report.reproduce.recording or None,
+        },
     }
 
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 from grader.model.containment import PROPERTIES, Property
 from grader.model.exercise import Location, Outcome
-from grader.model.report import Environment, ExerciseReport, Report, ReportedFault, Verdict
+from grader.model.report import Environment, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.model.trace import ClockKind, Endpoint, GraphSnapshot
 
 VIRTUAL = ClockKind.VIRTUAL
@@ -42,6 +42,11 @@ def report(*exercises: ExerciseReport, **changes: object) -> Report:
         "environment": ENVIRONMENT,
         "seed": 4711,
         "duration_s": 1.8042,
+        "reproduce": Reproduction(
+            command=("grade", str(changes.get("path", "./ada_homework")), "--seed", "4711"),
+            rubrics=tuple((e.id, "sha256:" + f"{n:x}" * 64) for n, e in enumerate(exercises)),
+            recording="sha256:" + "ab" * 32,
+        ),
         **changes,
     }
     return Report(exercises=exercises, **fields)  # type: ignore[arg-type]
@@ -230,6 +235,22 @@ def undecided() -> Report:
     )
 
 
+def partial() -> Report:
+    """Return a report that was made before the second exercise had been graded."""
+    waiting = "not graded yet"
+    return report(
+        velocity(),
+        exercise(
+            "odom_subscriber",
+            "2",
+            "Odometry subscriber",
+            criterion("subscribes_odom", "Subscribes to /odom", 6, Outcome.UNDECIDED, reason=waiting),
+            criterion("logs_position", "Logs the position", 10, Outcome.UNDECIDED, reason=waiting),
+        ),
+        pending=("odom_subscriber",),
+    )
+
+
 def hostile() -> Report:
     """Return a report in which every text that a student can influence is an attack."""
     fault = ReportedFault("exception", NASTY, 3, f"ValueError: {NASTY}", 1, NASTY, (NASTY,) * 2)
@@ -277,5 +298,6 @@ SAMPLES = {
     "middling": middling,
     "crashed": crashed,
     "undecided": undecided,
+    "partial": partial,
     "hostile": hostile,
 }

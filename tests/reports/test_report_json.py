@@ -26,8 +26,19 @@ def test_every_sample_follows_the_shipped_schema(name):
     validator().validate(json.loads(dumps(SAMPLES[name]())))
 
 
+def test_the_report_ends_with_what_gives_it_again():
+    """The command with its seed, and a digest of everything that was read besides the submission."""
+    whole = report_to_json(middling())
+    assert whole["reproduce"] == {
+        "command": "grade ./ada_homework --seed 4711",
+        "seed": 4711,
+        "rubrics": {"velocity_publisher": "sha256:" + "0" * 64, "odom_subscriber": "sha256:" + "1" * 64},
+        "recording": "sha256:" + "ab" * 32,
+    }
+
+
 @pytest.mark.parametrize(
-    "where", [(), ("submission",), ("environment",), ("exercises", 0), ("exercises", 0, "criteria", 1)]
+    "where", [(), ("submission",), ("environment",), ("exercises", 0), ("exercises", 0, "criteria", 1), ("reproduce",)]
 )
 def test_the_schema_allows_nothing_more_and_nothing_less(where):
     """A key too many and a key too few are both refused, at every level but the evidence."""
@@ -52,6 +63,7 @@ def test_the_keys_have_a_fixed_order():
         "final",
         "duration_s",
         "exercises",
+        "reproduce",
     ]
     assert list(whole["submission"]) == ["name", "path", "digest"]
     assert list(whole["environment"]) == [

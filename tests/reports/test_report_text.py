@@ -5,6 +5,8 @@
 
 import os
 import re
+import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,7 @@ from report_samples import (
     exercise,
     hostile,
     middling,
+    partial,
     perfect,
     report,
     two_nodes,
@@ -28,6 +31,7 @@ from report_samples import (
 from rich.cells import cell_len
 
 from grader.model.exercise import Location, Outcome
+from grader.model.report import Reproduction
 from grader.model.trace import GraphSnapshot
 from grader.reports.escape import shown
 from grader.reports.graph import draw_graph
@@ -171,13 +175,44 @@ def test_many_faults_and_notes_are_counted_not_listed():
     assert "and 5 more notes; all are in the JSON report" in text
 
 
-def test_the_foot_says_how_to_repeat_the_run_and_ends_with_the_duration():
-    """The only line that differs between two runs is the last."""
-    lines = render(middling()).splitlines()
-    assert "--seed 4711" in lines[-5]
-    assert lines[-2] == "clock      virtual, but the wall clock in exercise 2"
-    assert lines[-1] == "duration   1.8 s"
+def test_the_report_ends_with_the_command_that_gives_it_again():
+    """Seed, versions, digests and clock stand above it."""
+    lines = render(middling(), 120).splitlines()
+    assert lines[-1] == "reproduce  grade ./ada_homework --seed 4711"
+    assert [line.split()[0] for line in lines[-7:-1]] == [
+        "seed",
+        "versions",
+        "isolation",
+        "clock",
+        "rubrics",
+        "recording",
+    ]
     assert "no walls" in render(undecided())
+
+
+def test_a_long_command_can_be_copied():
+    """It goes on in the next line as a shell wants it to, and no word of it is broken."""
+    words = ("grade", "./ada", *(w for n in range(9) for w in ("--rubric", f"/a folder/{n}.yaml")))
+    sample = replace(middling(), reproduce=Reproduction(command=words))
+    command = render(sample, 60).split("reproduce", 1)[1]
+    assert command.count("\n") > 4
+    done = subprocess.run(["bash", "-c", f"printf '%s\\0' {command}"], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\0")[:-1] == list(words)
+
+
+def test_only_the_head_differs_between_two_runs():
+    """The same verdicts give the same text below; path and duration stand in one line above."""
+    one, other = render(middling()), render(replace(middling(), path="./elsewhere", duration_s=7.0))
+    changed = [a for a, b in zip(one.splitlines(), other.splitlines(), strict=True) if a != b]
+    assert changed == ["graded ./ada_homework in 1.8 s"]
+
+
+def test_a_partial_report_says_so_first():
+    """What is still to be graded is named before any number below is read."""
+    lines = render(partial(), 120).splitlines()
+    assert lines[1] == "This report is partial: it was made before exercise 2 (16 points) had been graded."
+    assert lines[2].startswith("So far: 5 of 7 criteria met")
+    assert "Grade again" not in "".join(lines)
 
 
 def test_points_are_short():

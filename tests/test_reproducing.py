@@ -1,0 +1,69 @@
+"""What gives a report again: the command with every option that matters, and digests."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from grader import cli, session
+from grader.model.scenario import TimedMessage
+from grader.recording.bag import Odometry
+from grader.reproducing import command_words, recording_digest, reproduction
+from grader.session import Request, read_exercises
+
+
+def test_the_seed_is_named_even_if_nobody_asked_for_one():
+    """Without it a changed file would be tried with other values."""
+    assert command_words(Request("./ada"), 7) == ("grade", "./ada", "--seed", "7")
+
+
+def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
+    """The command, given to the command line, asks for the same."""
+    asked = Request(
+        submission="./ada lovelace",
+        exercises=("b", "a"),
+        rubrics=(Path("r 1.yaml"), Path("r2.yaml")),
+        seed=7,
+        odom_bag=Path("bag"),
+        clock="wall",
+        isolation="none",
+    )
+    heard = []
+
+    def hear(request, *_, **__):
+        heard.append(request)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session, "grade", hear)
+    CliRunner().invoke(cli.app, list(command_words(asked, 7))[1:])
+    assert heard == [asked]
+
+
+def test_a_path_is_taken_for_nothing_else():
+    """Neither for an option nor for the name of a command."""
+    assert command_words(Request("-x"), 1)[1] == "./-x"
+    assert command_words(Request("observe"), 1)[1] == "./observe"
+    assert command_words(Request("."), 1)[1] == "."
+    assert command_words(Request("/a/b"), 1)[1] == "/a/b"
+
+
+def test_every_rubric_has_its_digest():
+    """A changed rubric gives another report, and one sees which it was."""
+    exercises = read_exercises(Request("x"))
+    found = reproduction(Request("x"), exercises, None, 7)
+    assert found.rubrics == tuple((e.id, e.digest) for e in exercises)
+    assert found.recording == ""
+
+
+def test_the_digest_of_a_recording_is_that_of_what_is_played():
+    """Any other time, byte or topic gives another one."""
+    message = TimedMessage(5, b"ab", {})
+    recording = Odometry("/odom", (message, replace(message, t_ns=9)))
+    digests = {
+        recording_digest(recording),
+        recording_digest(replace(recording, topic="/o")),
+        recording_digest(replace(recording, messages=recording.messages[:1])),
+        recording_digest(replace(recording, messages=(message, replace(message, t_ns=10)))),
+        recording_digest(replace(recording, messages=(message, replace(message, t_ns=9, cdr=b"ac")))),
+    }
+    assert len(digests) == 5
