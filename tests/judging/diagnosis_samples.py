@@ -8,7 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
-from tracing import FLOAT32, ODOMETRY, TWIST, Recording, driving, position_logs, scripted, twist, velocity
+from tracing import (
+    FLOAT32,
+    ODOMETRY,
+    TWIST,
+    Recording,
+    driving,
+    held_at,
+    position_logs,
+    scripted,
+    twist,
+    velocity,
+)
 
 from grader.judging.judge import judge_exercise
 from grader.model.exercise import Exercise
@@ -250,6 +261,23 @@ def answering_once() -> Recording:
     return mute().number(0.5, "/fan_speed", 0.0)
 
 
+def answering_behind(messages: int, together: bool = False) -> Recording:
+    """A controller whose answers are right for what came some messages before."""
+    rec = mute()
+    if together:
+        rec = cool()
+        rec.items = [o for o in rec.items if hasattr(o, "endpoints")]
+    rng = random.Random(5)
+    seen: list[float] = [rng.uniform(20, 30) if together else float(held_at(0.5 + 0.2 * k) or 0) for k in range(82)]
+    for k, value in enumerate(seen):
+        t_s = (0.2 if together else 0.5) + 0.2 * k
+        if together:
+            rec.number(t_s, "/temperature", value)
+        old = seen[k - messages] if k >= messages else 50 - value if together else seen[0]
+        rec.number(t_s, "/fan_speed", 100.0 if old > 25 else 0.0)
+    return rec
+
+
 def latching(until: float = 0.0) -> Recording:
     """A controller that switches off below a limit only."""
     rec, on = mute(), False
@@ -318,6 +346,8 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "sensing": ("sensor_alone", sensing),
     "fanned": ("sensor_alone", fanned),
     "answering": ("controller_alone", answering),
+    "answering_behind": ("controller_alone", answering_behind),
+    "behind_together": ("together", lambda messages: answering_behind(messages, together=True)),
     "latching": ("controller_alone", latching),
     "mute": ("controller_alone", mute),
     "apart": ("together", apart),

@@ -221,3 +221,29 @@ def test_any_timer_up_to_a_second_is_met(period: float, phase: float) -> None:
     """Whatever its period and phase."""
     assert earned(timed(right, period, phase, lag=0.001)) == (1, 1)
     assert earned(timed(lambda v: 100.0 - right(v), period, phase, lag=0.001)) == (0, 0)
+
+
+@pytest.mark.parametrize("lag", [0.6, 1.0, 3.0, 6.2])
+def test_answers_that_come_late_are_called_late(lag: float) -> None:
+    """They are wrong, but not because of the threshold, and nothing is said of it."""
+    rec = scripted()
+    for k in range(80):
+        value = held_at(0.5 + 0.2 * k - lag)
+        rec.number(0.5 + 0.2 * k, "/fan_speed", right(value if value is not None else FAN_VALUES[0]))
+    for finding in both(rec):
+        assert finding.credit == 0
+        assert f"right for what was published {lag} s before" in finding.reason
+        assert finding.hint == "answer what has just come on /temperature"
+
+
+@pytest.mark.parametrize("rule", [lambda v: 100.0 if v >= 25 else 0.0, lambda v: 100.0 if v > 26 else 0.0])
+def test_a_wrong_limit_is_not_called_late(rule: Rule) -> None:
+    """No lag makes those answers right."""
+    assert not any("before" in finding.reason for finding in both(each(rule)))
+
+
+def test_wrong_answers_away_from_the_threshold_do_not_blame_the_comparison() -> None:
+    """The hint names the whole rule where 23 °C is answered wrongly; > for >= is not the matter."""
+    off = both(each(lambda v: 100.0 if v > 22 else 0.0))[1]
+    assert off.credit == 0
+    assert off.hint == "publish 100 above 25 °C and 0 at or below it"

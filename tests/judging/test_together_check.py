@@ -211,3 +211,24 @@ def test_silence_is_explained() -> None:
     rec, _ = sensor()
     rec.message(1.0, "/fan_speed", {"data": "100"}, "std_msgs/msg/String")
     assert "carries no number" in CHECK.judge(rec.trace()).reason
+
+
+@pytest.mark.parametrize(
+    ("behind", "said"), [(1, "1 message before"), (2, "2 messages before"), (7, "7 messages before")]
+)
+def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> None:
+    """A controller that compares what it stored last time is told so."""
+    rec, sent = sensor()
+    for k, (t, _) in enumerate(sent):
+        rec.number(t, "/fan_speed", right(sent[k - behind][1]) if k >= behind else 100.0 - right(sent[0][1]))
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert f"the answers are right for what came {said}" in finding.reason
+    assert finding.evidence["behind"] == behind
+
+
+def test_wrong_answers_are_not_called_late() -> None:
+    """Inverted logic fits no earlier value."""
+    finding = CHECK.judge(each(lambda v: 100.0 - right(v)).trace())
+    assert finding.credit == 0
+    assert "before" not in finding.reason

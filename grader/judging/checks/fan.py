@@ -9,9 +9,10 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from grader.judging.findings import met, not_met
+from grader.judging.lateness import lag_ns
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
 from grader.judging.values import Held, Reading, held, last_of_instant, published, readings
-from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
+from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, seconds, within
@@ -137,6 +138,12 @@ class ThresholdResponse:
         fault = first_fault(trace)
         if fault is not None and first.got is None:
             return not_met(f"{reason}; {fault_sentence(fault)}", evidence, hint=fault_hint(fault), fault=fault)
+        lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
+        if lag is not None:
+            said = f"; the answers are right for what was published {span(lag)} before"
+            return not_met(
+                reason + said, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
+            )
         said, hint = self._diagnosis(violations, inputs, answers)
         return not_met(reason + said, evidence, hint=hint)
 
@@ -156,8 +163,7 @@ class ThresholdResponse:
         near = self.side == "above" and low and all(0 < v - self.threshold <= 1 for v in mistaken)
         if near and any(h.value > self.threshold + 1 for h in inputs):
             return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
-        known = any(within(a.value, w, _EXACT) for a in answers for w in (self.above, self.otherwise))
-        return "", "" if known else rule
+        return "", rule
 
     def _logic(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> str:
         """Return what the answers follow instead of the threshold; empty if that is not plain."""

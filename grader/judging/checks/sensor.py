@@ -137,7 +137,7 @@ class LogsReceived:
         subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == self.topic]
         if not subscriptions and fault is None:
             return explain_no_subscription(trace, self.topic)
-        if not values:
+        if not values or (subscriptions and not any(carries_number(e.type) for e in subscriptions)):
             return self._no_values(trace, subscriptions)
         records = student_records(trace, self.process)
         unlogged = self._missing(values, records, trace)

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from grader.judging.findings import met, not_met
+from grader.judging.lateness import steps_behind
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
 from grader.judging.values import Reading, last_of_instant, published, readings
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
@@ -44,6 +45,9 @@ class AnswersTogether:
     The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
     lie on both sides of the threshold, both answers must occur. An input that never changes, or that is drawn again and
     again from one side only, shows nothing; one that wanders too slowly to reach the other side is let pass.
+
+    Where answers are few, as from a timer of a second, a limit that is a little off may hide between the inputs:
+    `threshold_response` asks for the limit itself.
 
     Attributes:
         input: Topic of the sensor.
@@ -107,8 +111,18 @@ class AnswersTogether:
             value, unit = recent[-1].value, unit_of(self.input)
             reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
             reason += f"{self.input}, expected {number(self._expected(value))}"
-            return not_met(reason, evidence | {"first_wrong_s": seconds(answer.t_ns)})
+            return self._behind(reason, inputs, answers, evidence | {"first_wrong_s": seconds(answer.t_ns)})
         return self._inconsistent(trace, inputs, answers, evidence)
+
+    def _behind(
+        self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+    ) -> Finding:
+        """Return that an answer is wrong, and how far behind the answers are if that explains them all."""
+        behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), _EXACT))
+        if not behind:
+            return not_met(reason, evidence)
+        reason += f"; the answers are right for what came {counted(behind, 'message')} before"
+        return not_met(reason, evidence | {"behind": behind}, hint=f"answer what has just come on {self.input}")
 
     def _inconsistent(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]

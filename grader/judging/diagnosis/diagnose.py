@@ -16,7 +16,9 @@ from grader.judging.diagnosis.crashes import CRASHES
 from grader.judging.diagnosis.endings import ENDINGS
 from grader.judging.diagnosis.fan import FAN
 from grader.judging.diagnosis.fields import FIELDS
+from grader.judging.diagnosis.files import FILES
 from grader.judging.diagnosis.imports import IMPORTS
+from grader.judging.diagnosis.lateness import LATENESS
 from grader.judging.diagnosis.logs import LOGS
 from grader.judging.diagnosis.positions import POSITIONS
 from grader.judging.diagnosis.rates import RATES
@@ -41,9 +43,11 @@ CAUSES: tuple[Cause, ...] = (
     *SILENCE,
     *RATES,
     *FIELDS,
+    *FILES,
     *LOGS,
     *POSITIONS,
     *SENSOR,
+    *LATENESS,
     *FAN,
 )
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
