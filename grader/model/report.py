@@ -9,6 +9,7 @@ from typing import Any
 
 from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
+from grader.model.figure import Excerpt, Figure
 from grader.model.trace import ClockKind, GraphSnapshot
 
 SCHEMA = "grader/report/v1"
@@ -69,6 +70,9 @@ class ExerciseReport:
         faults: In order of scenario and time.
         notes: Sentences a reader must know.
         graph: The live graph that the exercise is about, if one was recorded with all its processes.
+        figures: Pictures of what the nodes did; reports of plain text and data leave them out.
+        excerpts: The source around the places that verdicts and faults name.
+        expected: Criterion id -> what it asks for, in one phrase.
     """
 
     id: str
@@ -81,6 +85,9 @@ class ExerciseReport:
     faults: tuple[ReportedFault, ...] = ()
     notes: tuple[str, ...] = ()
     graph: GraphSnapshot | None = None
+    figures: tuple[Figure, ...] = ()
+    excerpts: tuple[Excerpt, ...] = ()
+    expected: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def score(self) -> Fraction:
