@@ -38,8 +38,6 @@ GRAPH_PAUSE_S = 0.003
 #: After so many messages that never came, later ones are waited for only briefly.
 PATIENCE = 3
 IMPATIENT_S = 0.05
-#: What rclpy calls a node whose endpoints are known but whose name is not yet.
-UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: A node that needs more processor seconds than this a virtual second is judged on the real clock.
 BUSY_SHARE = 0.5
 #: Beyond that share of the whole observation, and this much more, there is no need to go on in virtual time.
@@ -288,8 +286,7 @@ class Conductor:
         graph = self._observer.graph(self._now_ns)
         seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
         wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
-        named = not any(UNKNOWN_NODE in e.node for e in graph.endpoints)  # names come a little later than endpoints
-        return named and all(seen[key] >= count for key, count in wanted.items())
+        return all(seen[key] >= count for key, count in wanted.items())
 
     def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
         same = [

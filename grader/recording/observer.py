@@ -29,6 +29,8 @@ DEPTH = 5000
 MESSAGE_BYTES = 1 << 20
 #: Durations of QoS policies from here on mean for ever.
 INFINITE_NS = 9_000_000_000_000_000_000
+#: What rclpy calls a node whose endpoints are known but whose name is not yet, or not any more.
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
 
 
@@ -72,9 +74,12 @@ class Observer:
         self._context.shutdown()
 
     def graph(self, t_ns: int) -> GraphSnapshot:
-        """Return the live graph without the grader's own node, everything sorted."""
+        """Return the live graph without the grader's own node, everything sorted.
+
+        An endpoint comes before the name of its node, and goes after it; without that name it is left out.
+        """
         names = ((name, space) for name, space in self.node.get_node_names_and_namespaces() if name != self._name)
-        nodes = sorted({_full_name(name, space) for name, space in names})
+        nodes = sorted({_full_name(name, space) for name, space in names if name != UNKNOWN_NODE})
         ends = []
         for topic, _ in sorted(self.node.get_topic_names_and_types(no_demangle=False)):
             if topic in BACKGROUND:
@@ -83,7 +88,7 @@ class Observer:
             ends += [
                 self._endpoint("subscription", topic, info) for info in self.node.get_subscriptions_info_by_topic(topic)
             ]
-        students = [e for e in ends if e.participant >= 0]
+        students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)))
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
