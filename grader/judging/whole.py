@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from grader.judging.figures.pictures import illustrated
 from grader.judging.judge import judge_exercise
 from grader.model.exercise import Exercise
 from grader.model.report import ExerciseReport, Report
@@ -11,12 +12,13 @@ from grader.model.run import Run
 from grader.model.trace import Trace
 
 
-def judge_run(exercises: Sequence[Exercise], run: Run) -> Report:
+def judge_run(exercises: Sequence[Exercise], run: Run, *, pictures: bool = True) -> Report:
     """Return the report of a run; pure, so the same run and the same exercises give the same report.
 
     Args:
         exercises: What is asked, in the order of the report.
         run: What was recorded for them.
+        pictures: Whether to draw figures as well, which takes about as long as judging and only some formats show.
     """
     return Report(
         name=run.submission.name,
@@ -24,15 +26,16 @@ def judge_run(exercises: Sequence[Exercise], run: Run) -> Report:
         digest=run.submission.digest,
         environment=run.environment,
         seed=run.seed,
-        exercises=tuple(_judged(exercise, run) for exercise in exercises),
+        exercises=tuple(_judged(exercise, run, pictures=pictures) for exercise in exercises),
         duration_s=run.duration_s,
         notes=run.notes,
         reproduce=run.reproduce,
     )
 
 
-def _judged(exercise: Exercise, run: Run) -> ExerciseReport:
+def _judged(exercise: Exercise, run: Run, *, pictures: bool) -> ExerciseReport:
     own: Mapping[str, Trace] = {
         scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id
     }
-    return judge_exercise(exercise, own, run.submission, run.sources)
+    report = judge_exercise(exercise, own, run.submission, run.sources)
+    return illustrated(report, exercise, own, run.submission, run.sources) if pictures else report

@@ -1,0 +1,107 @@
+"""Says in one phrase what each check expects, in the numbers of its rubric."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
+from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.judging.wording import number, span, unit_of
+from grader.model.exercise import Check
+from grader.model.quantities import seconds
+
+
+def expectation(check: Check) -> str:
+    """Return what a check expects, without a full stop; empty for a check that has no phrase yet."""
+    phrase = _PHRASES.get(type(check))
+    return phrase(check) if phrase else ""
+
+
+def _publishes(check: Publishes) -> str:
+    return f"at least one {check.type} message on {check.topic}"
+
+
+def _subscribes(check: Subscribes) -> str:
+    return f"a subscription to {check.topic} with type {check.type} that an ordinary publisher reaches"
+
+
+def _rate(check: TopicRate) -> str:
+    said = f"{check.topic} at {number(check.rate)} ± {number(check.tolerance)} Hz on average over {span(check.window)}"
+    if check.partly_tolerance is not None:
+        said += f"; half the points at {number(check.rate)} ± {number(check.partly_tolerance)} Hz"
+    return said
+
+
+def _fields(check: FieldValues) -> str:
+    wanted = ", ".join(f"{path} = {number(value)}" for path, value in check.values.items())
+    return f"{wanted} in every message on {check.topic}"
+
+
+def _logger(check: UsesLogger) -> str:
+    return f"a record of {check.process} through its logger; printing alone is half of it"
+
+
+def _position(check: LogsPosition) -> str:
+    return f"{check.process} logs the x and y that {check.topic} had at that moment; printing alone is half of it"
+
+
+def _period(check: LogPeriod) -> str:
+    share = number(100 * check.tolerance)
+    return f"one log every {number(seconds(check.period))} s ± {share} % on average while {check.topic} is played"
+
+
+def _waits(check: WaitsGracefully) -> str:
+    silence = number(seconds(check.silence))
+    return f"{check.process} lives through {silence} s without {check.topic}, without an error, and works afterwards"
+
+
+def _range(check: RandomInRange) -> str:
+    span_ = f"{number(check.low)} to {number(check.high)}{unit_of(check.topic)}"
+    return f"every value on {check.topic} within {span_}, and drawn at random"
+
+
+def _received(check: LogsReceived) -> str:
+    return f"{check.process} logs every value that it receives on {check.topic}; printing alone is half of it"
+
+
+def _threshold(check: ThresholdResponse) -> str:
+    limit = f"{number(check.threshold)}{unit_of(check.input)}"
+    side, answer = ("above", check.above) if check.side == "above" else ("at or below", check.otherwise)
+    return f"{number(answer)} on {check.output} for every {check.input} {side} {limit}"
+
+
+def _together(check: AnswersTogether) -> str:
+    limit = f"{number(check.threshold)}{unit_of(check.input)}"
+    answers = f"{number(check.above)} above {limit}, {number(check.otherwise)} otherwise"
+    return f"every {check.input} of the one node answered by the other on {check.output}: {answers}"
+
+
+def _graph(check: BidirectionalGraph) -> str:
+    return f"one node reached by {check.forward}, the other by {check.back}, with the types agreeing"
+
+
+_PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
+    {
+        Publishes: _publishes,
+        Subscribes: _subscribes,
+        TopicRate: _rate,
+        FieldValues: _fields,
+        UsesLogger: _logger,
+        LogsPosition: _position,
+        LogPeriod: _period,
+        WaitsGracefully: _waits,
+        RandomInRange: _range,
+        LogsReceived: _received,
+        ThresholdResponse: _threshold,
+        AnswersTogether: _together,
+        BidirectionalGraph: _graph,
+    }
+)
