@@ -22,8 +22,8 @@ from grader.recording.student import Student
 #: How often the conductor looks, and how long it may be held up at most before the run says nothing.
 LOOK_S = 0.001
 HELD_UP_NS = 150 * NS_PER_MS
-#: A first message is not waited for as long as in virtual time, where waiting costs nothing.
-PATIENCE_NS = 20_000 * NS_PER_MS
+#: How long a publisher stays after its last message, which it would take with it otherwise.
+LINGER_NS = 400 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 #: Limit of one scenario; reaching it ends it with a mark.
 MESSAGES = 20_000
@@ -44,9 +44,10 @@ class WallConductor:
         self._plan = plan
         self._students = students
         self._observer = observer
-        self._end_ns = min(plan.wait_at_most_ns, PATIENCE_NS) if plan.first_message_on else plan.duration_ns
+        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._due = schedule(plan.numbers, plan.recordings)
         self._streams: dict[str, str] = {}
+        self._leaving: list[tuple[int, str]] = []
         self._observations: list[Observation] = []
         self._notes: list[str] = []
         self._graph = GraphSnapshot(0, (), ())
@@ -92,6 +93,8 @@ class WallConductor:
     def _look(self, now_ns: int) -> None:
         while self._due and self._due[0].t_ns <= now_ns:
             self._do(self._due.pop(0), now_ns)
+        while self._leaving and self._leaving[0][0] <= now_ns:
+            self._observer.withdraw(self._leaving.pop(0)[1])
         for student in self._students:
             self._hear(student, now_ns)
         for taken in self._observer.take():
@@ -144,7 +147,7 @@ class WallConductor:
             self._observations.append(Mark(now_ns, "stream_starts", due.topic))
         elif due.action == "disappear":
             self._streams.pop(due.topic, None)
-            self._observer.withdraw(due.topic)
+            self._leaving.append((now_ns + LINGER_NS, due.topic))
             self._observations.append(Mark(now_ns, "stream_stops", due.topic))
         else:
             self._publish(due, now_ns)

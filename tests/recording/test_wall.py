@@ -84,10 +84,13 @@ def test_the_span_begins_with_the_first_message(clock):
     assert len(messages) == 20
 
 
-def test_a_first_message_is_waited_for_less_long_than_virtually(clock):
-    """Here waiting costs real time."""
-    run = Run(quiet, first_message_on="/cmd_vel", wait_at_most_ns=10**12)
-    assert run.trace.stop_ns == module.PATIENCE_NS
+def test_a_first_message_is_waited_for_as_long_as_virtually(clock):
+    """A timer of a long period shows its publisher's rate on either clock."""
+    run = Run(
+        publisher("/cmd_vel", every_ms=50, first_ms=5000), first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS
+    )
+    assert run.trace.stop_ns == run.trace.messages("/cmd_vel")[0].t_ns + 1000 * MS
+    assert Run(quiet, first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS).trace.stop_ns == 60_000 * MS
 
 
 def test_every_process_is_told_to_start(clock):
@@ -168,3 +171,11 @@ def test_the_graph_is_written_down_when_it_changed(clock):
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert len(run.trace.graphs()) == 1
     assert [e.topic for e in run.trace.graphs()[0].endpoints] == ["/cmd_vel"]
+
+
+def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock):
+    """A publisher that goes at once takes with it what is still on its way."""
+    recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, ((200 * MS, b"cdr", {}),))
+    gone = ("/odom", "", False)
+    assert Run(quiet, recordings=(recording,), duration_ns=600 * MS).observer.advertised[-1] != gone
+    assert Run(quiet, recordings=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
