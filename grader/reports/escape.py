@@ -1,12 +1,27 @@
-"""Makes text that a student controls harmless to show: no control codes, no tricks with direction, no endless lines."""
+"""Makes text that a student controls harmless wherever it is shown: one small function for each place.
+
+Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`. Markdown: `markdown`,
+`markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`.
+JSON: `json_value`.
+"""
 
 from __future__ import annotations
 
+import html
+import json
+import math
 import re
+import string
 import unicodedata
+from collections.abc import Mapping
+from enum import Enum
+from fractions import Fraction
+from typing import Any
 
 #: Longest piece of foreign text that a report for people shows, in characters.
 LIMIT = 500
+#: The same for text of several lines.
+LINES_LIMIT = 20_000
 ELLIPSIS = "…"
 
 # Controls, invisible format characters (bidi overrides among them), surrogates, line separators, and code points
@@ -18,6 +33,24 @@ _MOST_MARKS = 3
 _SURROGATE = re.compile("[\ud800-\udfff]")
 # What the grader's own sentences use beyond ASCII, for outputs that cannot say it.
 _PLAIN = str.maketrans({"─": "-", "▶": ">", "±": "+/-", "°": "deg ", "…": "..."})
+_TAB_WIDTH = 4
+
+# Inside Markdown text; as entities they cannot open anything, neither in a paragraph nor in a cell of a table.
+_MARKDOWN_SIGNS = frozenset("\\`*_[]~$<>&|#@")
+_NOTHING_VISIBLE = "&#8203;"
+# What GitHub makes a mention, a reference, a link or a picture of although no sign of Markdown is in it.
+_LINKED = re.compile(r"(?i)(?P<before>(?:https?|ftp|www|GH|:[a-z0-9_+-]{1,40}(?=:)))(?P<sign>[:.-])")
+_LISTED = re.compile(r"(?P<number>[0-9]{0,9})(?P<sign>[-+=.)])")
+_BACKTICKS = re.compile("`+")
+
+# What spreadsheets take for the beginning of a formula; Excel also the wide forms.
+_FORMULA = re.compile(r" *[=+\-@\uff1d\uff0b\uff0d\uff20]")
+# A line that the runner of GitHub Actions would obey: the present form at its beginning, the old one anywhere.
+_COMMAND = re.compile(r"^\s*:(?=:)|#(?=#\[)", re.MULTILINE)
+# In JSON that stands inside HTML: what could end the script element or begin a comment, and what JavaScript disliked.
+_ENDS_SCRIPT = re.compile("[<>&\u2028\u2029]")
+# Integers beyond 64 bits are no measurements, and most JSON readers cannot hold them.
+_MOST_BITS = 64
 
 
 def shown(text: str, *, limit: int = LIMIT) -> str:
@@ -42,6 +75,24 @@ def shown(text: str, *, limit: int = LIMIT) -> str:
     return "".join(pieces)
 
 
+def shown_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text of several lines that is safe on a terminal: as `shown`, but its line breaks stay.
+
+    Args:
+        text: Anything; tabs become spaces up to the next column of four.
+        limit: Most characters returned, at least 1; a longer text ends in an ellipsis.
+    """
+    lines: list[str] = []
+    left = limit
+    for line in text[: limit + 1].replace("\r\n", "\n").split("\n"):
+        lines.append(shown(line.expandtabs(_TAB_WIDTH), limit=limit + 1))
+        left -= len(lines[-1]) + 1
+        if left < -1:
+            break
+    whole = "\n".join(lines)
+    return whole if len(whole) <= limit and len(text) <= limit + 1 else whole[: limit - len(ELLIPSIS)] + ELLIPSIS
+
+
 def valid_unicode(text: str) -> str:
     """Return the text with every lone surrogate replaced by U+FFFD, so that it can be encoded."""
     return _SURROGATE.sub("\ufffd", text)
@@ -53,6 +104,142 @@ def encoded(text: str, encoding: str) -> bytes:
         return text.encode(encoding)
     except UnicodeEncodeError:
         return text.translate(_PLAIN).encode(encoding, errors="replace")
+
+
+def workflow_message(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text as the message of a GitHub workflow command, after the second `::`; line breaks stay."""
+    return shown_lines(text, limit=limit).replace("%", "%25").replace("\n", "%0A")
+
+
+def workflow_property(text: str, *, limit: int = LIMIT) -> str:
+    """Return foreign text as the value of a property of a GitHub workflow command, such as `file` or `title`."""
+    return shown(text, limit=limit).replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
+
+
+def log_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text for the log of a GitHub job: as `shown_lines`, and no line of it is a workflow command.
+
+    Args:
+        text: Whole lines, with all that is to stand before foreign text in them.
+        limit: Most characters of the text that are shown.
+    """
+    return _COMMAND.sub(r"\g<0>\\", shown_lines(text, limit=limit))
+
+
+def markdown(text: str, *, limit: int = LIMIT) -> str:
+    """Return foreign text as Markdown that shows just this text.
+
+    It fits into a paragraph, a heading, a list or a cell of a table, also at its beginning: no markup, HTML, link,
+    picture, formula, mention or reference comes of it. What GitHub links without any markup is broken by an invisible
+    space.
+
+    Args:
+        text: Anything; it becomes one line.
+        limit: Most characters that are visible in the end.
+    """
+    line = shown(text, limit=limit).strip(" ")
+    line = _LINKED.sub(r"\g<before>\0\g<sign>", line)
+    first = _LISTED.match(line)
+    begun = f"{first['number']}&#{ord(first['sign'])};" if first else ""
+    return begun + "".join(map(_entity, line[first.end() :] if first else line))
+
+
+def markdown_code(text: str, *, in_cell: bool = False, limit: int = LIMIT) -> str:
+    """Return foreign text as a code span of Markdown; nothing if it is empty.
+
+    GitHub links nothing in a code span, so this suits names and values best.
+
+    Args:
+        text: Anything; it becomes one line.
+        in_cell: Whether the span stands in a cell of a table, where `|` is written in another way.
+        limit: Most characters of the text that are shown.
+    """
+    line = shown(text, limit=limit)
+    if not line.strip(" "):
+        return ""
+    fence = "`" * _longer_than_runs(line, 1)
+    # One space on either side is not shown; without it, a backtick at the edge would lengthen the fence.
+    padding = " " if line[0] in " `" or line[-1] in " `" else ""
+    span = f"{fence}{padding}{line}{padding}{fence}"
+    return span.replace("|", "\\|") if in_cell else span
+
+
+def markdown_block(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text as a fenced code block of Markdown, to be set between blank lines at the left edge."""
+    lines = shown_lines(text, limit=limit)
+    fence = "`" * _longer_than_runs(lines, 3)
+    return f"{fence}text\n{lines}\n{fence}"
+
+
+def mermaid_label(text: str, *, limit: int = LIMIT) -> str:
+    """Return foreign text for a label between double quotes in a Mermaid diagram."""
+    signs = frozenset(string.punctuation) - frozenset("/_.,-")
+    return "".join(f"#{ord(sign)};" if sign in signs else sign for sign in shown(text, limit=limit))
+
+
+def html_text(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text for the content of an HTML element or for an attribute between quotes; line breaks stay."""
+    return html.escape(shown_lines(text, limit=limit), quote=True)
+
+
+def script_json(value: object) -> str:
+    """Return data as JSON for a script element of an HTML page; nothing in it can end the element."""
+    text = json.dumps(json_value(value), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return _ENDS_SCRIPT.sub(lambda match: f"\\u{ord(match.group()):04x}", text)
+
+
+def xml_text(text: str, *, limit: int = LINES_LIMIT) -> str:
+    """Return foreign text that XML 1.0 can hold, line breaks included; the writer of the XML escapes `<` and `&`."""
+    # All that is illegal in XML (controls, surrogates, U+FFFE and U+FFFF) is in a category that is named, not shown.
+    return shown_lines(text, limit=limit)
+
+
+def csv_cell(text: str, *, limit: int = LIMIT) -> str:
+    """Return foreign text for a cell of a CSV file that no spreadsheet takes for a formula.
+
+    One that would be gets an apostrophe in front. Numbers of our own need no such care; the writer of the CSV quotes.
+    """
+    line = shown(text, limit=limit)
+    return f"'{line}" if _FORMULA.match(line) else line
+
+
+def json_value(value: object) -> Any:
+    """Return a value as JSON can say it.
+
+    Fractions become numbers of six digits, NaN and the infinities their names, integers beyond 64 bits a sentence, lone
+    surrogates U+FFFD, and all else its text.
+    """
+    if isinstance(value, Mapping):
+        return {valid_unicode(str(key)): json_value(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_value(item) for item in value]
+    if isinstance(value, Enum):
+        return json_value(value.value)
+    if value is None or isinstance(value, bool):
+        return value
+    return _json_number(value) if isinstance(value, (int, float, Fraction)) else valid_unicode(str(value))
+
+
+def _json_number(value: float | Fraction) -> int | float | str:
+    if isinstance(value, Fraction):
+        rounded = round(float(value), 6)
+        return int(rounded) if rounded.is_integer() else rounded
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    return value if value.bit_length() <= _MOST_BITS else f"an integer of {value.bit_length()} bits"
+
+
+def _entity(character: str) -> str:
+    if character == "\0":  # our own mark: what is shown holds no control characters
+        return _NOTHING_VISIBLE
+    if character not in _MARKDOWN_SIGNS:
+        return character
+    # After these two a mention or a reference would follow.
+    return f"&#{ord(character)};{_NOTHING_VISIBLE if character in '@#' else ''}"
+
+
+def _longer_than_runs(text: str, least: int) -> int:
+    return max([least, *(len(run) + 1 for run in _BACKTICKS.findall(text))])
 
 
 def _piece(character: str) -> str:
