@@ -76,7 +76,7 @@ def open_studio(isolation: str) -> Iterator[Studio]:
     """
     ros = find_ros()
     tier = choose_isolation(isolation, ros)
-    domains = shared_domains() if tier.name == NO_ISOLATION else private_domains()
+    domains = shared_domains() if tier.shares_network else private_domains()
     workers = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     with tempfile.TemporaryDirectory(prefix="grade-") as name:
         folder = Path(name)

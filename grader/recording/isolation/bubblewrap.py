@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import os
 import platform
-import secrets
 import shutil
-import stat
 import subprocess
-import sysconfig
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import grader
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import seccomp
 from grader.recording.isolation.environment import student_environment
-from grader.recording.isolation.protocol import Command, Limits, PythonRuntime, StudentProcess
+from grader.recording.isolation.exposure import STUDENT_GROUP, make_readable, secrets_within, some_user
+from grader.recording.isolation.protocol import Command, Limits, StudentProcess
 from grader.recording.isolation.view import parents_of, view_of
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
@@ -26,12 +23,6 @@ HOST = Path("/grader_host/host")
 HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmpfs
 SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 INSTALL_HINT = "sudo apt install bubblewrap"
-
-# As root there is no user namespace, and the kernel counts processes by user: students who run at the same time on
-# one machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since
-# containers map no others.
-STUDENT_GROUP = 61234
-STUDENT_USERS = range(61234, 65234)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +68,11 @@ class Bubblewrap:
         return ROOT_NAME if self.as_root else USER_NAME
 
     @property
+    def shares_network(self) -> bool:
+        """Each worker has a network of its own."""
+        return False
+
+    @property
     def submission_seen_at(self) -> str:
         """Where a student's process sees its submission."""
         return str(SUBMISSION)
@@ -106,7 +102,7 @@ class Bubblewrap:
         /proc/1. As root the staged copy is made readable by everyone, since the student is another user.
         """
         if self.as_root:
-            _make_readable(process.submission)
+            make_readable(process.submission)
         filter_fd = _memory_file("filter", seccomp.student_filter())
         options = [
             *self._namespaces(),
@@ -141,9 +137,8 @@ class Bubblewrap:
         ]
         if not self.as_root:
             return entry
-        user = STUDENT_USERS.start + secrets.randbelow(len(STUDENT_USERS))
         privileges = ["--clear-groups", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"]
-        return [*entry, str(self.setpriv), f"--reuid={user}", f"--regid={STUDENT_GROUP}", *privileges]
+        return [*entry, str(self.setpriv), f"--reuid={some_user()}", f"--regid={STUDENT_GROUP}", *privileges]
 
     def _files(self, process: StudentProcess, limits: Limits) -> list[str]:
         view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
@@ -160,7 +155,7 @@ class Bubblewrap:
             options += ["--ro-bind", str(path), str(path)]
         for where, target in view.links:
             options += ["--symlink", target, str(where)]
-        for folder in _secrets_within(view.bound, process.runtime):
+        for folder in secrets_within(view.bound, process.runtime):
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
         options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
         options += ["--ro-bind", str(process.host_folder), str(HOST)]
@@ -177,24 +172,6 @@ def _program(name: str, hint: str) -> Path:
 
 def _settings(environment: Mapping[str, str]) -> Iterable[str]:
     return (word for name, value in environment.items() for word in ("--setenv", name, value))
-
-
-def _secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
-    """Return the folders with rubrics and checks that would be seen through a bound folder."""
-    package = Path(grader.__file__).resolve().parent
-    bound = tuple(bound)
-    # An editable installation keeps a copy of the rubrics among the packages, away from the code.
-    installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
-    places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
-    return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
-
-
-def _make_readable(folder: Path) -> None:
-    for path in (folder, *folder.rglob("*")):
-        mode = path.lstat().st_mode
-        wanted = 0o555 if stat.S_ISDIR(mode) else 0o444
-        if (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) and mode & wanted != wanted:
-            path.chmod(stat.S_IMODE(mode) | wanted)
 
 
 def _memory_file(name: str, content: bytes) -> int:

@@ -12,8 +12,10 @@ from pathlib import Path
 import grader
 from grader.model.containment import PROPERTIES, TIERS, Property, TierReport
 from grader.model.errors import EnvironmentFault
-from grader.recording.isolation import bubblewrap, plain, probe
+from grader.recording.isolation import bubblewrap, flat, landlock, plain, probe
 from grader.recording.isolation.bubblewrap import Bubblewrap
+from grader.recording.isolation.flat import FlatBubblewrap
+from grader.recording.isolation.landlock import Landlock
 from grader.recording.isolation.plain import Plain
 from grader.recording.isolation.protocol import Command, Isolation, Limits, StudentProcess
 from grader.recording.ros_installation import RosInstallation
@@ -79,11 +81,13 @@ def isolation_from_name(name: str) -> Isolation:
     Raises:
         EnvironmentFault: There is no such tier.
     """
-    if name == plain.NAME:
-        return Plain()
-    if name in NAMES:
-        return Bubblewrap.here()
-    raise EnvironmentFault(f"isolation: expected one of {', '.join(NAMES)}, found {name}")
+    if name not in TIERS:
+        raise EnvironmentFault(f"isolation: expected one of {', '.join(TIERS)}, found {name}")
+    if name == landlock.NAME:
+        return Landlock.here()
+    if name == flat.NAME:
+        return FlatBubblewrap.here()
+    return Plain() if name == plain.NAME else Bubblewrap.here()
 
 
 def why_not(isolation: Isolation, ros: RosInstallation) -> str:

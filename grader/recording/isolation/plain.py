@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import secrets
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import grader
 from grader.model.errors import HarnessError
-from grader.recording.isolation.environment import dds_profile, distro_of, student_environment
+from grader.recording.isolation.environment import student_environment
 from grader.recording.isolation.protocol import Command, Limits, StudentProcess
+from grader.recording.isolation.starting import HOST, by_resource, loopback_only, start_command
 
 NAME = "none"
-START = Path(__file__).with_name("plain_start.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +35,11 @@ class Plain:
         return NAME
 
     @property
+    def shares_network(self) -> bool:
+        """The caller's network is used: domains have to be reserved."""
+        return True
+
+    @property
     def submission_seen_at(self) -> str:
         """Empty: the submission is seen where it lies."""
         return ""
@@ -45,12 +47,11 @@ class Plain:
     @property
     def host_seen_at(self) -> str:
         """Where the `host` package lies."""
-        return str(Path(grader.__file__).resolve().parent / "host")
+        return str(HOST)
 
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
         """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
-        start = _start("/", made=False, limits={})
-        return Command((*start, *argv), {**environment, **_loopback_only(environment)}, tuple(pass_fds))
+        return Command((*start_command("/"), *argv), {**environment, **loopback_only(environment)}, tuple(pass_fds))
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process.
@@ -61,28 +62,8 @@ class Plain:
         if "ROS_DOMAIN_ID" not in process.environment:
             raise HarnessError("isolation none: expected ROS_DOMAIN_ID for a student's process, found none")
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
-        start = _start(str(folder), made=True, limits=_by_resource(limits))
+        start = start_command(str(folder), made=True, limits=by_resource(limits))
         environment = student_environment(process, folder / "home")
-        environment |= _loopback_only(environment)
+        environment |= loopback_only(environment)
         argv = (*start, str(process.runtime.executable), *process.arguments)
         return Command(argv, environment, tuple(process.pass_fds))
-
-
-def _loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
-    """Keep Fast DDS to the loopback address, on both sides: there is no network of its own here."""
-    return dds_profile(Path(__file__).parent, "loopback", distro_of(environment))
-
-
-def _start(folder: str, *, made: bool, limits: Mapping[str, int]) -> tuple[str, ...]:
-    request = json.dumps({"folder": folder, "made": made, "limits": dict(limits)})
-    return (sys.executable, "-I", "-S", str(START), request)
-
-
-def _by_resource(limits: Limits) -> dict[str, int]:
-    return {
-        "RLIMIT_AS": limits.address_space_bytes,
-        "RLIMIT_NOFILE": limits.open_files,
-        "RLIMIT_FSIZE": limits.file_bytes,
-        "RLIMIT_CORE": 0,
-        "RLIMIT_CPU": limits.processor_s,
-    }

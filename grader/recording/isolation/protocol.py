@@ -82,6 +82,11 @@ class Isolation(Protocol):
         ...
 
     @property
+    def shares_network(self) -> bool:
+        """Whether the worker's network is the caller's, where other graders and nodes may be."""
+        ...
+
+    @property
     def submission_seen_at(self) -> str:
         """Absolute folder at which a student process sees its submission; empty if it sees it where it lies."""
         ...

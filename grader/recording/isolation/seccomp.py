@@ -1,4 +1,4 @@
-"""A seccomp filter for student processes, as the bytes that `bwrap --seccomp` loads.
+"""A seccomp filter for student processes, as the bytes that the kernel loads.
 
 Namespaces hide files, processes and the network; what is left is the kernel itself. The filter refuses the calls that
 reach around a namespace (AF_VSOCK, user keyrings), that attack the kernel's widest surfaces (io_uring, bpf, perf,
@@ -12,6 +12,7 @@ import errno
 import platform
 import socket
 import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 LOAD = 0x20  # BPF_LD | BPF_W | BPF_ABS
@@ -42,6 +43,10 @@ class Numbers:
 
     x86_64: int | None
     aarch64: int | None
+
+    def on(self, machine: str) -> int | None:
+        """Return the number on an architecture."""
+        return self.x86_64 if machine == "x86_64" else self.aarch64
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +135,8 @@ NUMBERS = {
     "msgget": Numbers(68, 186),
     "semget": Numbers(64, 190),
     "memfd_secret": Numbers(447, 447),
+    "memfd_create": Numbers(319, 279),
+    "mq_open": Numbers(240, 180),
     # the machine
     "kexec_load": Numbers(246, 104),
     "kexec_file_load": Numbers(320, 294),
@@ -146,7 +153,7 @@ NUMBERS = {
     "syslog": Numbers(103, 116),
     "vhangup": Numbers(153, 58),
 }
-ABSENT = ("clone3", "io_uring_setup", "io_uring_enter", "io_uring_register")
+ABSENT = ("clone3", "memfd_create", "io_uring_setup", "io_uring_enter", "io_uring_register")
 
 
 def supports(machine: str) -> bool:
@@ -155,7 +162,7 @@ def supports(machine: str) -> bool:
 
 
 def student_filter(machine: str | None = None) -> bytes:
-    """Return the filter for student processes, an array of `struct sock_filter`.
+    """Return the filter for student processes in namespaces of their own, an array of `struct sock_filter`.
 
     Args:
         machine: Architecture as `platform.machine()` names it; the running one if None.
@@ -163,7 +170,11 @@ def student_filter(machine: str | None = None) -> bytes:
     Raises:
         KeyError: No filter is known for the architecture; ask `supports` first.
     """
-    machine = machine or platform.machine()
+    return assembled(NUMBERS, ARGUMENT_RULES, machine or platform.machine())
+
+
+def assembled(table: Mapping[str, Numbers], rules: Sequence[ArgumentRule], machine: str) -> bytes:
+    """Return a filter that refuses every call of a table, or only some of its arguments where there is a rule."""
     program = [
         _instruction(LOAD, ARCHITECTURE_AT),
         _instruction(JUMP_IF_EQUAL, AUDIT_ARCHITECTURES[machine], if_true=1),
@@ -173,32 +184,36 @@ def student_filter(machine: str | None = None) -> bytes:
     if machine == "x86_64":
         # The x32 interface has the same architecture word and other numbers: it would walk around every rule.
         program += [_instruction(JUMP_IF_ANY_BIT, X32_BIT, if_false=1), _fail(errno.ENOSYS)]
-    by_argument = {rule.call for rule in ARGUMENT_RULES}
-    for call, numbers in NUMBERS.items():
-        number = numbers.x86_64 if machine == "x86_64" else numbers.aarch64
+    by_argument = {rule.call for rule in rules}
+    for call, numbers in table.items():
+        number = numbers.on(machine)
         if number is None or call in by_argument:
             continue
         error = errno.ENOSYS if call in ABSENT else errno.EPERM
         program += [_instruction(JUMP_IF_EQUAL, number, if_false=1), _fail(error)]
-    for rule in ARGUMENT_RULES:
-        numbers = NUMBERS[rule.call]
-        program += _argument_rule(rule, numbers.x86_64 if machine == "x86_64" else numbers.aarch64)
+    for rule in rules:
+        program += _argument_rule(rule, table[rule.call].on(machine))
     program.append(_instruction(RETURN, ALLOW))
     return b"".join(program)
 
 
 def _argument_rule(rule: ArgumentRule, number: int | None) -> list[bytes]:
+    """Return the instructions of one rule: it refuses, or leaves the number of the call for the next rule."""
     if number is None:
         return []
-    # Both architectures are little-endian, so the low half of the 64-bit argument comes first.
-    body = [_instruction(LOAD, ARGUMENTS_AT + 8 * rule.argument)]
+    refusals: list[bytes] = []
     for value in rule.never:
-        body += [_instruction(JUMP_IF_EQUAL, value, if_false=1), _fail(rule.error)]
+        refusals += [_instruction(JUMP_IF_EQUAL, value, if_false=1), _fail(rule.error)]
     if rule.never_bits:
-        body += [_instruction(JUMP_IF_ANY_BIT, rule.never_bits, if_false=1), _fail(rule.error)]
-    for value in rule.only:
-        body += [_instruction(JUMP_IF_EQUAL, value, if_false=1), _instruction(RETURN, ALLOW)]
-    body.append(_fail(rule.error) if rule.only else _instruction(RETURN, ALLOW))
+        refusals += [_instruction(JUMP_IF_ANY_BIT, rule.never_bits, if_false=1), _fail(rule.error)]
+    if rule.only:
+        left = range(len(rule.only), 0, -1)
+        refusals += [
+            _instruction(JUMP_IF_EQUAL, value, if_true=jump) for value, jump in zip(rule.only, left, strict=True)
+        ]
+        refusals.append(_fail(rule.error))
+    # Both architectures are little-endian, so the low half of the 64-bit argument comes first.
+    body = [_instruction(LOAD, ARGUMENTS_AT + 8 * rule.argument), *refusals, _instruction(LOAD, NUMBER_AT)]
     return [_instruction(JUMP_IF_EQUAL, number, if_false=len(body)), *body]
 
 

@@ -1,0 +1,70 @@
+"""The tier `landlock`: no namespaces, for containers that allow none; Landlock, a filter, limits and another user.
+
+The network is the caller's: what leaves it is contained only where there is no interface but `lo`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.model.errors import HarnessError
+from grader.model.limits import Limits
+from grader.recording.isolation.protocol import Command, StudentProcess
+from grader.recording.isolation.starting import (
+    HOST,
+    Ground,
+    loopback_only,
+    require_walls,
+    start_command,
+    walled_command,
+)
+
+NAME = "landlock"
+
+
+@dataclass(frozen=True, slots=True)
+class Landlock:
+    """The walls that Landlock, seccomp and resource limits give in the namespaces that there are."""
+
+    @classmethod
+    def here(cls) -> Landlock:
+        """Return the isolation for this machine; raises EnvironmentFault if its kernel or processor has none."""
+        require_walls()
+        return cls()
+
+    @property
+    def name(self) -> str:
+        """Short name that reports show."""
+        return NAME
+
+    @property
+    def shares_network(self) -> bool:
+        """The caller's network is used: domains have to be reserved."""
+        return True
+
+    @property
+    def submission_seen_at(self) -> str:
+        """Empty: the submission is seen where it lies."""
+        return ""
+
+    @property
+    def host_seen_at(self) -> str:
+        """Where the `host` package lies."""
+        return str(HOST)
+
+    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+        """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
+        return Command((*start_command("/"), *argv), {**environment, **loopback_only(environment)}, tuple(pass_fds))
+
+    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
+        """Return the command that starts a student's process.
+
+        Raises:
+            HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
+        """
+        if "ROS_DOMAIN_ID" not in process.environment:
+            raise HarnessError("isolation landlock: expected ROS_DOMAIN_ID for a student's process, found none")
+        return walled_command(process, limits, Ground(Path(tempfile.gettempdir()), loopback=True))
