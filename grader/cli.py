@@ -17,8 +17,9 @@ import click
 import grader
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.model.report import Report
-from grader.reports.delivery import FORMATS, Output, deliver, prepared
+from grader.reports.delivery import Output, deliver, prepared
 from grader.reports.escape import encoded, shown
+from grader.reports.formats import FORMATS
 
 if TYPE_CHECKING:
     from grader.session import Progress

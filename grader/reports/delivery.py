@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -14,18 +15,11 @@ from grader.model.errors import GraderError
 from grader.model.report import Report
 from grader.reports.destination import check_writable, write_whole
 from grader.reports.escape import encoded
+from grader.reports.formats import FORMATS, WRITTEN_EARLY, Layout, check_surroundings
 
 _FILE_WIDTH = 100
 # Longer lines are hard to read, however wide the terminal is.
 _WIDEST = 120
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """How a text is laid out; formats for programs do not care."""
-
-    width: int
-    colour: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,31 +30,17 @@ class Output:
     path: Path | None = None
 
 
-def _json(report: Report, layout: Layout) -> str:
-    from grader.reports.json_report import dumps  # noqa: PLC0415  only after a run, not for --help
-
-    del layout
-    return dumps(report)
-
-
-def _text(report: Report, layout: Layout) -> str:
-    from grader.reports.text import render_text  # noqa: PLC0415  rich costs more than all the rest of the start
-
-    return render_text(report, width=layout.width, colour=layout.colour)
-
-
-#: Every format that a report can be delivered in.
-FORMATS: dict[str, Callable[[Report, Layout], str]] = {"json": _json, "text": _text}
-
-
 def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
     """Return all that is to be delivered, files first, after making sure that it can be.
 
     If nothing goes to standard output, the text does.
 
     Raises:
-        GraderError: A file cannot be written, or two reports would go to one place.
+        GraderError: A file cannot be written, two reports would go to one place, or a format lacks what only its
+            platform can tell.
     """
+    for output in outputs:
+        check_surroundings(output.format)
     printed = [output for output in outputs if output.path is None]
     if len(printed) > 1:
         raise GraderError("standard output: expected one report, found more", "write the others to files")
@@ -80,6 +60,16 @@ def deliver(report: Report, outputs: Sequence[Output]) -> None:
     problems = [problem for output in outputs if (problem := _delivered(report, output))]
     if problems:
         raise problems[0]
+
+
+def deliver_early(report: Report, outputs: Sequence[Output]) -> None:
+    """Write a partial report to the files whose platform may end this run at any time.
+
+    One that cannot be written is passed over: the whole report will say why.
+    """
+    files = [output for output in outputs if output.path is not None and output.format in WRITTEN_EARLY]
+    with suppress(GraderError):
+        deliver(report, files)
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:
@@ -116,7 +106,8 @@ def _write(report: Report, output: Output) -> None:
         write_whole(output.path, render(report, Layout(_FILE_WIDTH, colour=False)).encode("utf-8"))
     elif sys.stdout is not None:
         layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
-        _print(encoded(render(report, layout), "utf-8" if output.format == "json" else sys.stdout.encoding))
+        # A poor encoding is that of a terminal; programs read UTF-8.
+        _print(encoded(render(report, layout), sys.stdout.encoding if output.format == "text" else "utf-8"))
 
 
 def _coloured(stream: TextIO) -> bool:

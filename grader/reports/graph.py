@@ -11,8 +11,10 @@ from grader.reports.escape import shown
 
 #: Topics that every node has.
 _EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
-_NOBODY = "(nobody)"
-_MOST_EDGES = 40
+#: Stands for a side of a topic where no node is.
+NOBODY = "(nobody)"
+#: More edges than this are counted, not drawn.
+MOST_EDGES = 40
 _NAME_LIMIT = 100
 
 Edge = tuple[str, str, str, str]
@@ -24,12 +26,22 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     A topic that only one side knows leads from or to `(nobody)`; a topic whose two sides disagree on the type is
     marked, for no message goes through it.
     """
-    edges = list(dict.fromkeys(_edges(graph)))
-    lines = [line for edge in edges[:_MOST_EDGES] for line in _drawn(edge, width)]
-    if len(edges) > _MOST_EDGES:
-        lines.append(f"and {len(edges) - _MOST_EDGES} more")
-    joined = {name for source, _, target, _ in edges for name in (source, target)}
-    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in graph.nodes if node not in joined]
+    edges = graph_edges(graph)
+    lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
+    if len(edges) > MOST_EDGES:
+        lines.append(f"and {len(edges) - MOST_EDGES} more")
+    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely_nodes(graph)]
+
+
+def graph_edges(graph: GraphSnapshot) -> list[Edge]:
+    """Return every edge once: source node, topic, target node, and what keeps messages from going through it."""
+    return list(dict.fromkeys(_edges(graph)))
+
+
+def lonely_nodes(graph: GraphSnapshot) -> list[str]:
+    """Return the nodes that no edge joins."""
+    joined = {name for source, _, target, _ in graph_edges(graph) for name in (source, target)}
+    return [node for node in graph.nodes if node not in joined]
 
 
 def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
@@ -41,11 +53,11 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
         for taker in takers:
             yield publisher.node, publisher.topic, taker.node, _quarrel(publisher, taker)
         if not takers:
-            yield publisher.node, publisher.topic, _NOBODY, ""
+            yield publisher.node, publisher.topic, NOBODY, ""
     served = {p.topic for p in publishers}
     for subscription in subscriptions:
         if subscription.topic not in served:
-            yield _NOBODY, subscription.topic, subscription.node, ""
+            yield NOBODY, subscription.topic, subscription.node, ""
 
 
 def _hidden(topic: str) -> bool:

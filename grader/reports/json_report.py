@@ -60,7 +60,12 @@ def report_to_json(report: Report) -> dict[str, Any]:
 
 def dumps(report: Report) -> str:
     """Return a report as indented JSON text that ends in a line break, can be encoded, and is safe on a terminal."""
-    text = json.dumps(report_to_json(report), indent=2, ensure_ascii=False, allow_nan=False)
+    return json_text(report_to_json(report))
+
+
+def json_text(values: Mapping[str, Any]) -> str:
+    """Return plain JSON values as `dumps` does a report; formats of other programs are written with it too."""
+    text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
     return _OBEYED_BY_TERMINALS.sub(lambda match: json.dumps(match.group())[1:-1], text) + "\n"
 
 

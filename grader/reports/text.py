@@ -14,7 +14,7 @@ from grader.reports import wording
 from grader.reports.escape import shown
 from grader.reports.graph import draw_graph
 from grader.reports.page import Page
-from grader.reports.wording import NAME_LIMIT, OUTCOME_WORDS, points
+from grader.reports.wording import MOST_FAULTS, MOST_NOTES, OUTCOME_WORDS, points
 
 _STYLES = {
     Outcome.MET: "green",
@@ -24,8 +24,6 @@ _STYLES = {
     Outcome.UNDECIDED: "bold magenta",
 }
 _WORD_WIDTH = max(len(word) for word in OUTCOME_WORDS.values())
-_MOST_FAULTS = 10
-_MOST_NOTES = 20
 _DETAIL = " " * 6
 # What ends a line of a command that goes on in the next one.
 _GOES_ON = " \\"
@@ -62,18 +60,15 @@ def _head(page: Page, report: Report) -> None:
 
 
 def _exercise(page: Page, exercise: ExerciseReport) -> None:
-    optional = "" if exercise.required else ", optional"
-    title = f"Exercise {shown(exercise.number, limit=NAME_LIMIT)}: {shown(exercise.title, limit=NAME_LIMIT)}"
-    score = f"{points(exercise.score)} of {points(exercise.max_score)} points"
     full = exercise.score == exercise.max_score
-    page.put(f"{title} ({score}{optional})", style="bold green" if full else "bold")
+    page.put(wording.exercise_line(exercise), style="bold green" if full else "bold")
     shares = [f"{points(verdict.score)}/{points(verdict.max_score)}" for verdict in exercise.verdicts]
     column = max((len(share) for share in shares), default=0)
     for verdict, share in zip(exercise.verdicts, shares, strict=True):
         _verdict(page, verdict, share.rjust(column))
-    for fault in exercise.faults[:_MOST_FAULTS]:
+    for fault in exercise.faults[:MOST_FAULTS]:
         _fault(page, fault)
-    _more(page, len(exercise.faults) - _MOST_FAULTS, "faults")
+    _more(page, len(exercise.faults) - MOST_FAULTS, "faults")
     _graph(page, exercise)
     if exercise.clock is ClockKind.WALL:
         page.put(f"judged on the wall clock: {shown(exercise.clock_reason)}", prefix="  note: ")
@@ -125,9 +120,9 @@ def _graph(page: Page, exercise: ExerciseReport) -> None:
 
 
 def _notes(page: Page, notes: Sequence[str], *, indent: str) -> None:
-    for note in notes[:_MOST_NOTES]:
+    for note in notes[:MOST_NOTES]:
         page.put(shown(note), prefix=f"{indent}note: ")
-    _more(page, len(notes) - _MOST_NOTES, "notes", indent=indent)
+    _more(page, len(notes) - MOST_NOTES, "notes", indent=indent)
 
 
 def _more(page: Page, count: int, what: str, *, indent: str = "  ") -> None:

@@ -9,11 +9,14 @@ from fractions import Fraction
 from grader.model.containment import NO_WALLS, summarised
 from grader.model.exercise import Outcome
 from grader.model.quantities import seconds
-from grader.model.report import Report, ReportedFault, Verdict
+from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind
 from grader.reports.escape import shown
 from grader.reports.shell import quoted
 
+#: More faults or notes than this are counted, not shown.
+MOST_FAULTS = 10
+MOST_NOTES = 20
 #: Longest name of a submission, a scenario or a node that is shown.
 NAME_LIMIT = 100
 # No path is longer; a word that was cut would make another command.
@@ -53,6 +56,13 @@ def score_line(report: Report) -> str:
     return f"{points(report.score)} of {points(report.max_score)} points"
 
 
+def exercise_line(exercise: ExerciseReport) -> str:
+    """Return number, title and score of an exercise; safe to show as a line of text."""
+    number, title = (shown(text, limit=NAME_LIMIT) for text in (exercise.number, exercise.title))
+    score = f"{points(exercise.score)} of {points(exercise.max_score)} points"
+    return f"Exercise {number}: {title} ({score}{'' if exercise.required else ', optional'})"
+
+
 def warnings(report: Report) -> list[str]:
     """Return what must be read with the score: that the report is partial or not final, or had no walls."""
     said = [_partial(report)] if report.pending else []
@@ -75,6 +85,52 @@ def summary(report: Report) -> str:
 def reason(verdict: Verdict) -> str:
     """Return a verdict's reason; of a blocked one only what it needs. Not yet safe to show."""
     return verdict.reason.removeprefix("not judged: ") if verdict.outcome is Outcome.BLOCKED else verdict.reason
+
+
+def explanation(verdict: Verdict) -> list[str]:
+    """Return why a verdict is what it is, what to do and where; each safe to show as a line of text."""
+    said = [shown(reason(verdict))]
+    if verdict.hint:
+        said.append(f"hint: {shown(verdict.hint)}")
+    if verdict.location is not None:
+        where = place(verdict.location.file, verdict.location.line)
+        said += [f"at {where}"] if where not in said[0] else []
+    return said
+
+
+def opening(report: Report) -> list[str]:
+    """Return what a reader must know before the criteria; each safe to show as a line of text."""
+    blocked = any(v.outcome is Outcome.BLOCKED for e in report.exercises for v in e.verdicts)
+    return [
+        headline(report),
+        *warnings(report),
+        summary(report),
+        *(["Blocked criteria are judged once what they need is met."] if blocked else []),
+        *_capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes"),
+    ]
+
+
+def remarks(exercise: ExerciseReport) -> list[str]:
+    """Return what an exercise's criteria do not say: faults, clock and notes; each safe to show as a line of text."""
+    faults = [f"fault: {happened(fault)}: {shown(fault.text)}" for fault in exercise.faults]
+    notes = [f"note: {shown(note)}" for note in exercise.notes]
+    clock_note = f"note: judged on the wall clock: {shown(exercise.clock_reason)}"
+    return [
+        *_capped(faults, MOST_FAULTS, "faults"),
+        *([clock_note] if exercise.clock is ClockKind.WALL else []),
+        *_capped(notes, MOST_NOTES, "notes"),
+    ]
+
+
+def ending(report: Report) -> list[str]:
+    """Return what gives the report again, the command last; each safe to show as a line of text."""
+    rows = [f"{name}: {value}" for name, value in reproduction(report)]
+    return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
+
+
+def _capped(lines: list[str], most: int, what: str) -> list[str]:
+    left_out = len(lines) - most
+    return [*lines[:most], f"and {left_out} more {what}; all are in the JSON report"] if left_out > 0 else lines
 
 
 def place(file: str, line: int) -> str:

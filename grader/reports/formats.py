@@ -1,0 +1,114 @@
+"""The formats that a report can be delivered in; each is imported when it is first used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from grader.model.report import Report
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a text is laid out; formats for programs do not care."""
+
+    width: int
+    colour: bool
+
+
+def _json(report: Report, layout: Layout) -> str:
+    from grader.reports.json_report import dumps  # noqa: PLC0415  only after a run, not for --help
+
+    del layout
+    return dumps(report)
+
+
+def _text(report: Report, layout: Layout) -> str:
+    from grader.reports.text import render_text  # noqa: PLC0415  rich costs more than all the rest of the start
+
+    return render_text(report, width=layout.width, colour=layout.colour)
+
+
+def _markdown(report: Report, layout: Layout) -> str:
+    from grader.reports.markdown import render_markdown  # noqa: PLC0415  as above
+
+    del layout
+    return render_markdown(report)
+
+
+def _junit(report: Report, layout: Layout) -> str:
+    from grader.reports.junit import render_junit  # noqa: PLC0415  as above
+
+    del layout
+    return render_junit(report, folder=_folder(report))
+
+
+def _github(report: Report, layout: Layout) -> str:
+    from grader.reports.github import render_github  # noqa: PLC0415  as above
+
+    del layout
+    return render_github(report, folder=_folder(report))
+
+
+def _gradescope(report: Report, layout: Layout) -> str:
+    from grader.reports.gradescope import render_gradescope  # noqa: PLC0415  as above
+
+    del layout
+    return render_gradescope(report)
+
+
+def _prairielearn(report: Report, layout: Layout) -> str:
+    from grader.reports.prairielearn import render_prairielearn  # noqa: PLC0415  as above
+
+    del layout
+    return render_prairielearn(report)
+
+
+def _classroom50(report: Report, layout: Layout) -> str:
+    from grader.reports.classroom50 import render_classroom50  # noqa: PLC0415  as above
+    from grader.reports.surroundings import handed_in  # noqa: PLC0415  as above
+
+    del layout
+    return render_classroom50(report, handed_in(os.environ))
+
+
+def _classroom(report: Report, layout: Layout) -> str:
+    from grader.reports.classroom import render_classroom  # noqa: PLC0415  as above
+
+    del layout
+    return render_classroom(report)
+
+
+def _folder(report: Report) -> str | None:
+    from grader.reports.surroundings import repository_folder  # noqa: PLC0415  as above
+
+    return repository_folder(report.path, os.environ)
+
+
+def check_surroundings(format_: str) -> None:
+    """Make sure that the environment tells what a format needs and a report does not know.
+
+    Raises:
+        GraderError: It does not.
+    """
+    if format_ == "classroom50":
+        from grader.reports.surroundings import handed_in  # noqa: PLC0415  as above
+
+        handed_in(os.environ)
+
+
+#: Every format that a report can be delivered in.
+FORMATS: dict[str, Callable[[Report, Layout], str]] = {
+    "json": _json,
+    "text": _text,
+    "markdown": _markdown,
+    "junit": _junit,
+    "github": _github,
+    "gradescope": _gradescope,
+    "prairielearn": _prairielearn,
+    "classroom50": _classroom50,
+    "classroom": _classroom,
+}
+#: Formats whose platform ends a run that takes too long, and then takes what is there.
+WRITTEN_EARLY = frozenset({"gradescope"})
