@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.model.limits import Limits
 from grader.model.quantities import NS_PER_S
 
 
@@ -97,12 +98,14 @@ class Scenario:
         processes: File names of the student processes that run in it, in start order.
         span: How long it is observed.
         stimuli: What the grader publishes.
+        limits: How much the processes may use, and how much is recorded.
     """
 
     id: str
     processes: tuple[str, ...]
     span: Span
     stimuli: tuple[Stimulus, ...] = ()
+    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
 
 
 @dataclass(frozen=True, slots=True)

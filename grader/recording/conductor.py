@@ -11,23 +11,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import (
-    ClockKind,
-    Delivery,
-    Fault,
-    FaultKind,
-    GraphSnapshot,
-    Mark,
-    Message,
-    Observation,
-    Offer,
-    Trace,
-)
+from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, Mark, Offer, Trace
 from grader.recording.ending import ending_fault, reported_fault
-from grader.recording.observer import Observer, wait_until
+from grader.recording.observer import Observer, Taken, wait_until
 from grader.recording.plan import Plan
 from grader.recording.stimuli import Due, number_message, numeric_field, schedule
 from grader.recording.student import Student
+from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
 
 #: Where the hosts' virtual time starts: 2026-01-01 00:00:00 UTC, as `grader/host/clock.py` has it.
 EPOCH_NS = 1_767_225_600_000_000_000
@@ -47,13 +37,14 @@ UNSETTLED = {
     "threads": "the node's threads wait for each other without blocking",
     "outside": "the node waits for something that is neither ROS nor time",
 }
-#: Limits of one scenario; reaching one ends it with a mark.
-MESSAGES = 20_000
+#: Processor time that a process may have used beyond what it says, as a share of virtual time and besides: looking at
+#: the clock again and again is not charged, but costs something.
+HIDDEN_SHARE, HIDDEN_NS = 1.0, 5 * NS_PER_S
+#: Wake-ups of one scenario; more end it.
 STEPS = 400_000
-#: A process that has more to say than this before it waits or ends does not talk like the host.
-WORDS = 10_000
-#: Of a trace nobody reads more notes than this, and of a note no longer names.
-NOTES, NAME_CHARACTERS = 50, 200
+#: A process that has more to say than this before it waits or ends does not talk like the host, nor does one that says
+#: that it sent more messages at once, or that it has more endpoints.
+WORDS, COUNT, CLAIMS = 10_000, 1_000_000, 1_000
 
 
 class Conductor:
@@ -74,17 +65,15 @@ class Conductor:
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._due = schedule(plan.numbers, plan.recordings)
         self._streams: dict[str, str] = {}
-        self._observations: list[Observation] = []
-        self._notes: list[str] = []
-        self._graph = GraphSnapshot(0, (), ())
-        self._taken: Counter[tuple[str, str]] = Counter()
+        self._tape = Tape(plan.limits)
         self._requesters: dict[str, list[Student]] = {}
         self._losses = 0
-        self._messages = 0
         self._steps = 0
 
     def run(self) -> Trace:
         """Run the plan to its end and return the trace."""
+        for student in self._students:
+            student.ready_ns = student.measured_ns
         self._play(phase="before")
         for student in self._students:
             self._step(student)
@@ -100,8 +89,8 @@ class Conductor:
             clock=ClockKind.VIRTUAL,
             clock_reason=self._unfit(),
             stop_ns=self._end_ns,
-            observations=tuple(self._observations),
-            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes]))[:NOTES],
+            observations=tuple(self._tape.observations),
+            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
         )
 
     def _finished(self) -> bool:
@@ -142,7 +131,12 @@ class Conductor:
         if self._plan.stop_when_unfit and self._hopeless():
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
-            self._stop_early(f"stopped after {STEPS} wake-ups")
+            self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
+        self._end_if_full()
+
+    def _end_if_full(self) -> None:
+        if self._tape.full:
+            self._end_ns = min(self._end_ns, self._now_ns)
 
     def _quiet_until(self, student: Student) -> int:
         """Return the next moment at which anything but one process wants to do something."""
@@ -170,16 +164,16 @@ class Conductor:
                 return
             self._catch_up(report)
             if kind == "note":
-                student.notes.append(str(report.get("text", ""))[:500])
+                student.note(str(report.get("text", "")))
                 continue
             self._write_output(student, final=kind == "exited")
             if kind == "fault":
-                self._observations.append(reported_fault(student.name, self._now_ns, report))
+                self._tape.add(reported_fault(student.name, self._now_ns, report, self._plan.limits))
                 continue
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
-                self._end(student, ending_fault(student.name, self._now_ns, report))
+                self._end(student, ending_fault(student.name, self._now_ns, report, self._plan.limits))
                 return
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
@@ -192,12 +186,15 @@ class Conductor:
         student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
         for channel, count in _counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
-            self._notes.append(f"{student.name}: {count} messages on {where} were overwritten before they were read")
+            self._tape.note(f"{student.name}: {count:,} messages on {where} were overwritten before they were read")
         sent = _counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._forward(student, sent)
-        if isinstance(report.get("endpoints"), list) and report["kind"] == "idle":
-            student.claims = [c for c in report["endpoints"] if _is_claim(c)]
+        endpoints = report.get("endpoints")
+        if isinstance(endpoints, list) and report["kind"] == "idle":
+            if len(endpoints) > CLAIMS:
+                self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
+            student.claims = [c for c in endpoints[:CLAIMS] if _is_claim(c)]
             self._note_offers(student)
             self._match()
 
@@ -205,43 +202,32 @@ class Conductor:
         """Write down the services, clients and parameters that a process has not told of before."""
         for claim in student.claims:
             offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
-            if claim["kind"] in ("service", "client", "parameter") and offer not in student.offers:
+            told = offer in student.offers or len(student.offers) >= OFFERS
+            if claim["kind"] in ("service", "client", "parameter") and not told:
                 student.offers.add(offer)
-                self._observations.append(Offer(self._now_ns, student.name, *offer))
+                self._tape.add(Offer(self._now_ns, student.name, *offer))
 
     def _collect(self, sent: Mapping[str, int]) -> None:
         """Wait until everything published has been taken here, and write it down."""
         expected = Counter({topic: n for topic, n in sent.items() if self._readable(topic)})
-        found = []
-        if expected:
-            patience = SETTLE_S if self._losses < PATIENCE else IMPATIENT_S
+        if not expected:
+            return
 
-            def complete() -> bool:
-                for message in self._observer.take():
-                    found.append(message)
-                    expected[message.topic] -= 1
-                return all(count <= 0 for count in expected.values())
+        def complete() -> bool:
+            for message in self._observer.take():
+                self._record(message)
+                expected[message.topic] -= 1
+            return bool(self._tape.full) or all(count <= 0 for count in expected.values())
 
-            if not wait_until(complete, patience):
-                self._losses += 1
-                for topic in sorted(t for t, n in expected.items() if n > 0):
-                    self._notes.append(f"some messages on {topic} did not arrive")
-        for message in found:
-            self._record(Message(self._now_ns, message.topic, message.type, message.value, message.cdr))
+        if not wait_until(complete, SETTLE_S if self._losses < PATIENCE else IMPATIENT_S):
+            self._losses += 1
+            for topic in sorted(t for t, n in expected.items() if n > 0):
+                self._tape.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
-    def _record(self, message: Message) -> None:
-        self._observations.append(message)
-        self._messages += 1
-        if message.topic == self._plan.first_message_on and not self._taken[(message.topic, "")]:
+    def _record(self, message: Taken) -> None:
+        if message.topic == self._plan.first_message_on and not self._tape.seen(message.topic):
             self._end_ns = self._now_ns + self._plan.duration_ns
-        self._taken[(message.topic, "")] += 1
-        if self._messages >= MESSAGES:
-            self._stop_early(f"stopped after {MESSAGES} messages")
-
-    def _stop_early(self, why: str) -> None:
-        if not any(isinstance(o, Mark) and o.name == "limit" for o in self._observations):
-            self._observations.append(Mark(self._now_ns, "limit", why))
-            self._end_ns = self._now_ns
+        self._tape.message(self._now_ns, message)
 
     def _readable(self, topic: str) -> bool:
         return self._observer.reads(topic)
@@ -272,10 +258,10 @@ class Conductor:
         claims = [c for s in self._students if not s.ended for c in s.claims]
         ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
         if not wait_until(lambda: self._sees(ends), SETTLE_S, pause_s=GRAPH_PAUSE_S):
-            self._notes.append("an endpoint that a node created was not seen in the graph")
+            self._tape.note("an endpoint that a node created was not seen in the graph")
         self._look_at_graph()
-        unknown = self._observer.watch(self._graph)
-        self._notes += [f"the type of {name} is not known on this machine" for name in unknown]
+        unknown = self._observer.watch(self._tape.graph)
+        self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in ends if c["kind"] == "publisher"]
         wait_until(lambda: all(self._watched(c, writers) for c in writers), SETTLE_S)
         for student in self._students:
@@ -317,7 +303,7 @@ class Conductor:
         student.nudged = True  # a match is an event that a node may have a callback for
         missing = answer.get("missing")
         for name in missing[:WORDS] if isinstance(missing, list) else ():
-            self._notes.append(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
+            self._tape.note(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]
@@ -333,13 +319,10 @@ class Conductor:
         return int(kind == "client" and any(c["kind"] == wanted and c["name"] == name for c in claims))
 
     def _look_at_graph(self) -> None:
-        graph = self._observer.graph(self._now_ns)
-        if (graph.nodes, graph.endpoints) != (self._graph.nodes, self._graph.endpoints):
-            self._graph = graph
-            self._observations.append(graph)
+        self._tape.look(self._observer.graph(self._now_ns), self._observer.participants())
 
     def _write_output(self, student: Student, *, final: bool) -> None:
-        self._observations += student.output(self._now_ns, final=final)
+        self._tape.add(*student.output(self._now_ns, final=final))
 
     def _bury(self, student: Student) -> None:
         """Note the end of a process that ended without a word, and what it wrote before."""
@@ -349,7 +332,7 @@ class Conductor:
         self._end(student, death)
 
     def _end(self, student: Student, *faults: Fault) -> None:
-        self._observations += faults
+        self._tape.add(*faults)
         student.ended = True
         student.wake_ns = None
         student.claims = []
@@ -367,14 +350,14 @@ class Conductor:
         elif due.action == "disappear":
             self._streams.pop(due.topic, None)
             self._observer.withdraw(due.topic)
-            self._observations.append(Mark(self._now_ns, "stream_stops", due.topic))
+            self._tape.add(Mark(self._now_ns, "stream_stops", due.topic))
         else:
             self._publish(due)
 
     def _appear(self, due: Due) -> None:
         """Create a stimulus's publisher, of the type and durability that the students' subscriptions ask for."""
         self._start_stream(due.topic, due.payload)
-        self._observations.append(Mark(self._now_ns, "stream_starts", due.topic))
+        self._tape.add(Mark(self._now_ns, "stream_starts", due.topic))
 
     def _start_stream(self, topic: str, default: str) -> None:
         asked = [c for s in self._students for c in _readers(s, topic)]
@@ -399,7 +382,7 @@ class Conductor:
         else:
             message, value = number_message(interface, due.payload)
             cdr = b""
-        self._observations.append(Delivery(self._now_ns, due.topic, interface, value, cdr))
+        self._tape.add(Delivery(self._now_ns, due.topic, interface, value, cdr))
         self._observer.publish(due.topic, message)
         for student in self._students:
             if any(c["type"] == interface and _takes_ordinary(c) for c in _readers(student, due.topic)):
@@ -422,13 +405,15 @@ class Conductor:
 
     def _unfit(self) -> str:
         """Say why virtual time does not do these nodes justice, if it does not."""
-        if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in self._observations):
+        seen = self._tape.observations
+        if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
             return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
-        if any(isinstance(o, Mark) and o.name == "limit" for o in self._observations):
+        if self._tape.full:
             return ""
-        virtual_s = max(self._now_ns, NS_PER_S) / NS_PER_S
-        busiest_s = max((s.used_ns for s in self._students), default=0) / NS_PER_S
-        if busiest_s > BUSY_SHARE * virtual_s:
+        virtual_ns = max(self._now_ns, NS_PER_S)
+        busiest_ns = max((s.used_ns for s in self._students), default=0)
+        hidden_ns = max((s.measured_ns - s.ready_ns - s.used_ns for s in self._students), default=0)
+        if busiest_ns > BUSY_SHARE * virtual_ns or hidden_ns > HIDDEN_SHARE * virtual_ns + HIDDEN_NS:
             return "the node needs so much processor time that virtual time would hide it"
         return ""
 
@@ -436,7 +421,7 @@ class Conductor:
 def _counts(data: Any) -> dict[str, int]:
     if not isinstance(data, dict):
         return {}
-    return {str(name): min(count, MESSAGES) for name, count in data.items() if isinstance(count, int) and count > 0}
+    return {str(name): min(count, COUNT) for name, count in data.items() if isinstance(count, int) and count > 0}
 
 
 def _is_claim(claim: Any) -> bool:

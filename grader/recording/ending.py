@@ -5,29 +5,70 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from grader.model.limits import Limits
+from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind
 
 KINDS = {kind.value: kind for kind in FaultKind}
 TEXT_CHARACTERS, PLACE_CHARACTERS, FRAMES = 500, 300, 20
+#: What C++ writes before it ends a process that found no memory.
+NO_MEMORY = b"std::bad_alloc"
+#: A process that had this share of the threads it may have, and then failed, wanted more.
+NEARLY_ALL = 0.9
 
 
-def reported_fault(process: str, t_ns: int, data: Mapping[str, Any]) -> Fault:
-    """Return the fault that a report describes."""
+def reported_fault(process: str, t_ns: int, data: Mapping[str, Any], limits: Limits) -> Fault:
+    """Return the fault that a report describes; an error that a limit is behind names the limit."""
+    text = str(data.get("text", ""))[:TEXT_CHARACTERS]
+    behind = next((words for error, words in _errors(limits).items() if error in text), "")
     frames, line = data.get("frames"), data.get("line")
     return Fault(
         t_ns=t_ns,
         process=process,
         kind=KINDS.get(str(data.get("kind")), FaultKind.EXCEPTION),
-        text=str(data.get("text", ""))[:TEXT_CHARACTERS],
+        text=f"{text} (the limit is {behind})" if behind else text,
         file=str(data.get("file", ""))[:PLACE_CHARACTERS],
         line=line if type(line) is int and line > 0 else 0,
         frames=tuple(str(f)[:PLACE_CHARACTERS] for f in frames[:FRAMES]) if isinstance(frames, list) else (),
     )
 
 
-def ending_fault(process: str, t_ns: int, report: Mapping[str, Any]) -> Fault:
+def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Limits) -> Fault:
     """Return the fault of a process that says how it ended."""
     if isinstance(report.get("fault"), dict):
-        return reported_fault(process, t_ns, report["fault"])
+        return reported_fault(process, t_ns, report["fault"], limits)
     code = report.get("code")
     return Fault(t_ns, process, FaultKind.EXITED, f"exited with code {code if type(code) is int else '?'}")
+
+
+def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limits) -> str:
+    """Return which limit a process was ended at that a signal ended, in words; empty if none explains it.
+
+    Args:
+        signal: Name of the signal.
+        last_words: The end of what it wrote on standard error; it serves the wording only.
+        most_threads: The most threads it had.
+        limits: What it might use.
+    """
+    if signal == "SIGXCPU":
+        return f"stopped at {limits.processor_words()}"
+    if signal == "SIGXFSZ":
+        return f"stopped at {size(limits.file_bytes)} in one file"
+    if signal == "SIGABRT" and NO_MEMORY in last_words:
+        return f"ended by {signal}: it found no more memory (the limit is {limits.memory_words()})"
+    if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:
+        return f"ended by {signal} (the limit is {limits.processes_words()})"
+    return ""
+
+
+def _errors(limits: Limits) -> Mapping[str, str]:
+    """Return the words for each error by which Python tells of a limit."""
+    return {
+        "MemoryError": limits.memory_words(),
+        "Cannot allocate memory": limits.memory_words(),
+        "can't start new thread": limits.processes_words(),
+        "[Errno 11] Resource temporarily unavailable": limits.processes_words(),
+        "[Errno 24] Too many open files": f"{limits.open_files:,} open files",
+        "[Errno 27] File too large": f"{size(limits.file_bytes)} in one file",
+        "[Errno 28] No space left on device": f"{size(limits.scratch_bytes)} in one folder",
+    }

@@ -17,16 +17,21 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
+from grader.model.limits import Limits
+from grader.model.quantities import MIB, size
 from grader.model.trace import Endpoint, GraphSnapshot
 
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Deep enough for everything that can be published between two looks.
 DEPTH = 5000
-#: Messages larger than this are counted, but neither decoded nor kept.
-MESSAGE_BYTES = 1 << 20
+#: What is taken at once at most; the rest is taken the next time.
+AT_ONCE, AT_ONCE_BYTES = 1000, 4 * MIB
+#: Topics whose trouble is told at the end, and how much of a name.
+TOLD, NAME_CHARACTERS = 20, 200
 #: Durations of QoS policies from here on mean for ever.
 INFINITE_NS = 9_000_000_000_000_000_000
 #: What rclpy calls a node whose endpoints are known but whose name is not yet, or not any more.
@@ -49,9 +54,11 @@ class Observer:
 
     Args:
         domain: ROS domain to join.
+        limits: How large a message may be whose content is read.
     """
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, limits: Limits) -> None:
+        self._limits = limits
         self._context = Context()
         self._context.init(domain_id=domain)
         self._name = f"_observer_{secrets.token_hex(8)}"  # a student's node can't guess it
@@ -62,11 +69,14 @@ class Observer:
             enable_rosout=False,
             start_parameter_services=False,
             enable_logger_service=False,
+            # The node would serve descriptions of types to everybody; students' nodes are served nothing.
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         self._readers: dict[tuple[str, str, bool], Any] = {}
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
-        self.unreadable: Counter[str] = Counter()
+        self._broken: Counter[str] = Counter()
+        self._large: Counter[str] = Counter()
 
     def close(self) -> None:
         """Leave the graph."""
@@ -90,6 +100,10 @@ class Observer:
             ]
         students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)))
+
+    def participants(self) -> int:
+        """Return how many participants with endpoints of their own have appeared, without the grader's."""
+        return len(self._participants)
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
         own = info.node_name == self._name
@@ -140,23 +154,37 @@ class Observer:
         return 0 if reader is None else int(reader.get_publisher_count())
 
     def take(self) -> list[Taken]:
-        """Return every message that has arrived since the last time, topic by topic."""
-        taken = []
+        """Return the messages that have arrived since the last time, topic by topic; of a flood only the first ones."""
+        taken: list[Taken] = []
+        room = AT_ONCE_BYTES
         for (topic, interface, _), reader in sorted(self._readers.items()):
             with reader.handle:
-                while (found := reader.handle.take_message(reader.msg_type, True)) is not None:  # noqa: FBT003
+                for _ in range(AT_ONCE):
+                    if room <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
+                        break
+                    room -= len(found[0])
                     taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
         return taken
 
     def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:
-        if len(cdr) > MESSAGE_BYTES:
-            self.unreadable[topic] += 1
+        if len(cdr) > self._limits.message_bytes:
+            self._large[topic] += 1
             return Taken(topic, interface, b"", {})
         try:
             return Taken(topic, interface, cdr, plain_fields(deserialize_message(cdr, message)))
-        except Exception:
-            self.unreadable[topic] += 1
+        except Exception:  # whatever bytes a student's node sends
+            self._broken[topic] += 1
             return Taken(topic, interface, cdr, {})
+
+    def notes(self) -> list[str]:
+        """Return what readers must know of messages whose content was not read."""
+        large = f"larger than {size(self._limits.message_bytes)}, and their content was not looked at"
+        broken = "not what their type says, and could not be read"
+        return [
+            f"{topic[:NAME_CHARACTERS]}: {count:,} messages were {what}"
+            for counts, what in ((self._large, large), (self._broken, broken))
+            for topic, count in sorted(counts.items())[:TOLD]
+        ]
 
     def advertise(self, topic: str, interface: str, *, latched: bool) -> None:
         """Create the publisher of a stimulus: reliable, and latched where a subscription asks for it."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.model.limits import Limits
 from grader.model.scenario import Between, JustAbove, JustBelow, NumberSpec, NumberStream, OdometryStream, Scenario
 from grader.model.submission import Submission
 from grader.recording.bag import Odometry, window
@@ -55,6 +56,7 @@ class Plan:
         numbers: Stimuli.
         recordings: Stimuli.
         clock: `virtual` or `wall`.
+        limits: How much the processes may use, and how much is taken down.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as it is clear that it does no justice.
     """
 
@@ -68,6 +70,7 @@ class Plan:
     numbers: tuple[PlannedNumbers, ...]
     recordings: tuple[PlannedRecording, ...]
     clock: str
+    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
     stop_when_unfit: bool = False
 
 
@@ -102,6 +105,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         numbers=numbers,
         recordings=recordings,
         clock=clock,
+        limits=scenario.limits,
     )
 
 
@@ -155,8 +159,9 @@ def _recording(stream: OdometryStream, odometry: Odometry, seed: int) -> Planned
 def plan_to_json(plan: Plan) -> dict[str, Any]:
     """Return a plan as plain JSON values."""
     data: dict[str, Any] = {
-        name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings")
+        name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings", "limits")
     }
+    data["limits"] = {name: getattr(plan.limits, name) for name in Limits.__slots__}
     data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
     data["recordings"] = [
         {
@@ -175,6 +180,7 @@ def plan_from_json(data: Mapping[str, Any]) -> Plan:
     """Return the plan that `plan_to_json` was given; the supervisor's word is trusted."""
     fields = dict(data)
     fields["processes"] = tuple((str(name), str(file)) for name, file in data["processes"])
+    fields["limits"] = Limits(**data["limits"])
     fields["numbers"] = tuple(
         PlannedNumbers(**{**n, "numbers": tuple((float(value), int(side)) for value, side in n["numbers"])})
         for n in data["numbers"]

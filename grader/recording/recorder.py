@@ -21,16 +21,18 @@ from pathlib import Path
 from typing import Any
 
 from grader.model.errors import HarnessError
+from grader.model.limits import Limits
+from grader.model.quantities import NS_PER_S
 from grader.model.trace import ClockKind, Trace
 from grader.recording.codec import trace_from_json
 from grader.recording.isolation.environment import quick_discovery, runtime_environment
 from grader.recording.isolation.protocol import Isolation, PythonRuntime
 from grader.recording.plan import Plan, plan_to_json
 
-#: Real seconds that one scenario may take before its worker is taken for lost.
-SCENARIO_S = 300.0
-#: An answer larger than this is not a trace.
-ANSWER_BYTES = 256 << 20
+#: A worker that has not answered after twice the real time of a scenario and this many seconds is taken for lost.
+MARGIN_S = 60.0
+#: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
+ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
 
 
@@ -69,7 +71,7 @@ class WorkerProcess:
         request = json.dumps({"plan": plan_to_json(plan), "domain": next(self._domains)}) + "\n"
         try:
             self._line.sendall(request.encode())
-            answer = json.loads(self._answer())
+            answer = json.loads(self._answer(plan.limits))
         except (OSError, ValueError, RecursionError) as error:
             raise HarnessError(f"worker: expected a trace of {plan.scenario}, found none ({error})") from error
         if not isinstance(answer, dict) or "trace" not in answer:
@@ -78,8 +80,9 @@ class WorkerProcess:
             raise HarnessError(f"worker: {said[-1] if said else 'expected a trace, found none'}"[:600])
         return trace_from_json(answer["trace"])
 
-    def _answer(self) -> bytes:
-        deadline = time.monotonic() + SCENARIO_S
+    def _answer(self, limits: Limits) -> bytes:
+        deadline = time.monotonic() + 2 * limits.wall_ns / NS_PER_S + MARGIN_S
+        most = max(ANSWER_BYTES, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
         received = bytearray()
         while not received.endswith(b"\n"):
             self._line.settimeout(max(0.001, deadline - time.monotonic()))
@@ -87,7 +90,7 @@ class WorkerProcess:
             if not found:
                 raise OSError("it ended")
             received += found
-            if len(received) > ANSWER_BYTES:
+            if len(received) > most:
                 raise OSError("it answered without end")
         return bytes(received)
 

@@ -11,21 +11,28 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from grader.model.limits import Limits
+from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine
+from grader.recording.ending import limit_behind
 from grader.recording.isolation.protocol import Command
 
 #: How the host's processes write log records on standard error, so that they can be told from other output.
 LOG_FORMAT = "\x1e{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
 #: No part of a record runs over the start of the next one: a stream of starts without ends is read in linear time.
 LOG_RECORD = re.compile("\x1e([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?")
-#: Output of one stream beyond this is read, but not kept.
-OUTPUT_BYTES = 1 << 20
 #: A report longer than this is not the host's.
 REPORT_BYTES = 4 << 20
+#: More reports than this at once are not the host's; so much is read of its line and of each stream without a pause.
+REPORTS_AT_ONCE, READS_AT_ONCE = 1000, 256
+#: Notes that are kept, and how long one is at most.
+NOTES, NOTE_CHARACTERS = 100, 500
+#: The end of what a process wrote on standard error, kept to tell what ended it.
+LAST_BYTES = 2000
 #: A text longer than this is cut.
 TEXT_CHARACTERS = 4000
 #: Real seconds that a process gets to end by itself after the stop signal.
@@ -48,7 +55,13 @@ class Student:
         offers: What it has told of services, clients and parameters.
         nudged: Whether it should look again at this instant, because its endpoints were matched.
         ended: Whether it has ended.
+        limits: What it may use.
         used_ns: Processor time it has used, as it says.
+        measured_ns: Processor time it and its children have used since they were started, as the system says.
+        ready_ns: `measured_ns` when its program began.
+        most_bytes: Most memory that it and its children filled at once.
+        most_threads: Most threads that it and its children had at once.
+        stopped: Which limit it reached, in words; empty while it reached none.
         unsettled: Why its program does not settle, as it says; empty if it does.
     """
 
@@ -56,6 +69,7 @@ class Student:
     root: str
     process: subprocess.Popen[bytes]
     line: socket.socket
+    limits: Limits = field(default_factory=Limits)
     wake_ns: int | None = None
     claims: list[dict[str, Any]] = field(default_factory=list)
     arrivals: dict[str, int] = field(default_factory=dict)
@@ -64,28 +78,37 @@ class Student:
     nudged: bool = False
     ended: bool = False
     used_ns: int = 0
+    measured_ns: int = 0
+    ready_ns: int = 0
+    most_bytes: int = 0
+    most_threads: int = 0
+    stopped: str = ""
     unsettled: str = ""
     notes: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
+    _lines_kept: int = 0
+    _last: bytes = b""
     _selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
 
     @classmethod
-    def start(cls, name: str, root: str, command: Command, line: socket.socket) -> Student:
+    def start(cls, name: str, root: str, command: Command, line: socket.socket, limits: Limits) -> Student:
         """Start the process; `line` is the worker's end."""
-        process = subprocess.Popen(
-            command.argv,
-            env=dict(command.environment),
-            pass_fds=command.pass_fds,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
-        for descriptor in command.opened_fds:
-            os.close(descriptor)
-        student = cls(name, root, process, line)
+        try:
+            process = subprocess.Popen(
+                command.argv,
+                env=dict(command.environment),
+                pass_fds=command.pass_fds,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,
+            )
+        finally:
+            for descriptor in command.opened_fds:
+                os.close(descriptor)
+        student = cls(name, root, process, line, limits)
         for stream, source in (("stdout", process.stdout), ("stderr", process.stderr)):
             if source is not None:
                 os.set_blocking(source.fileno(), False)
@@ -99,6 +122,11 @@ class Student:
             self.line.sendall(json.dumps(answer).encode() + b"\n")
         except OSError:
             return
+
+    def note(self, text: str) -> None:
+        """Take down what it says that a reader must know; it may say no end of such things."""
+        if len(self.notes) < NOTES:
+            self.notes.append(text[:NOTE_CHARACTERS])
 
     def report(self) -> dict[str, Any] | None:
         """Wait for the next report, reading its output meanwhile; None if the process has ended or never reports."""
@@ -126,8 +154,12 @@ class Student:
     def reports(self) -> list[dict[str, Any] | None]:
         """Return the reports that are there, without waiting; a last None if the process has ended."""
         gone = False
-        while any(key.data == "line" for key, _ in self._selector.select(timeout=0)) and not gone:
-            gone = not self._receive()
+        for _ in range(READS_AT_ONCE):
+            if gone or not any(key.data == "line" for key, _ in self._selector.select(timeout=0)):
+                break
+            gone = not self._receive() or len(self._pending) > REPORT_BYTES
+        if self._pending.count(b"\n") > REPORTS_AT_ONCE:
+            return [None]
         found: list[dict[str, Any] | None] = []
         while b"\n" in self._pending:
             found.append(self._parsed_report())
@@ -154,18 +186,20 @@ class Student:
             self._selector.unregister(source)
             source.close()
             return False
-        room = OUTPUT_BYTES - self._kept[stream]
-        if self._kept[stream] <= OUTPUT_BYTES < self._kept[stream] + len(found):
-            self.notes.append(f"{self.name}: output on {stream} beyond {OUTPUT_BYTES >> 20} MiB was not kept")
-        self._streams[stream] += found[: max(0, room)]
+        most = self.limits.output_bytes
+        if self._kept[stream] <= most < self._kept[stream] + len(found):
+            self.notes.append(f"{self.name}: more than {size(most)} on {stream}: the rest was not looked at")
+        self._streams[stream] += found[: max(0, most - self._kept[stream])]
         self._kept[stream] += len(found)
+        if stream == "stderr":
+            self._last = (self._last + found)[-LAST_BYTES:]
         return True
 
     def drain(self) -> None:
         """Read everything that has been written so far."""
         for stream in ("stdout", "stderr"):
-            while self._read(stream):
-                if self._kept[stream] > 64 * OUTPUT_BYTES:
+            for _ in range(READS_AT_ONCE):
+                if not self._read(stream):
                     break
 
     def output(self, t_ns: int, *, final: bool = False) -> list[LogRecord | OutputLine]:
@@ -175,8 +209,16 @@ class Student:
             end = len(buffer) if final else _complete(buffer, records=stream == "stderr")
             text = bytes(buffer[:end]).decode("utf-8", "backslashreplace")
             del buffer[:end]
-            found += self._parsed(t_ns, stream, text)
-        return found
+            found += self._parsed(t_ns, stream, text) if self._lines_kept <= self.limits.lines else []
+        return self._within_limit(found)
+
+    def _within_limit(self, found: list[LogRecord | OutputLine]) -> list[LogRecord | OutputLine]:
+        most = self.limits.lines
+        if self._lines_kept <= most < self._lines_kept + len(found):
+            self.notes.append(f"{self.name}: more than {most:,} lines and log records: the rest was not looked at")
+        kept = found[: max(0, most - self._lines_kept)]
+        self._lines_kept += len(found)
+        return kept
 
     def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
         found: list[LogRecord | OutputLine] = []
@@ -198,22 +240,47 @@ class Student:
         ]
 
     def death(self, t_ns: int) -> Fault:
-        """Return the fault of a process that ended without a word."""
-        self.kill()
+        """Return the fault of a process that ended without a word, or is ended because it no longer talks."""
+        ended = self._ends()
+        self._end_now()
         code = self.process.wait()
-        if code < 0 or code > 128:
-            number = -code if code < 0 else code - 128
-            try:
-                name = signal.Signals(number).name
-            except ValueError:
-                name = f"signal {number}"
-            return Fault(t_ns, self.name, FaultKind.KILLED, f"ended by {name}")
-        return Fault(t_ns, self.name, FaultKind.EXITED, f"exited with code {code}")
+        if self.stopped:
+            return Fault(t_ns, self.name, FaultKind.KILLED, self.stopped)
+        if not ended:
+            return Fault(t_ns, self.name, FaultKind.KILLED, "stopped: it no longer answered the grader")
+        if 0 <= code <= 128:
+            return Fault(t_ns, self.name, FaultKind.EXITED, f"exited with code {code}")
+        name = _signal_name(-code if code < 0 else code - 128)
+        behind = limit_behind(name, self._last, self.most_threads, self.limits)
+        return Fault(t_ns, self.name, FaultKind.KILLED, behind or f"ended by {name}")
+
+    def stop(self, why: str, family: Collection[int] = ()) -> None:
+        """End the process at a limit, and what it started; may be called from another thread.
+
+        Args:
+            why: Which limit, in words.
+            family: What it started that is still known as such.
+        """
+        self.stopped = self.stopped or why
+        if self.process.returncode is None:
+            for pid in family:
+                with contextlib.suppress(OSError):
+                    os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(OSError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+
+    def _ends(self) -> bool:
+        """Return whether the process ends by itself, which it gets a moment for."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.wait(GRACE_S)
+        return self.process.returncode is not None
 
     def kill(self) -> None:
         """End the process, if it has not ended, and everything it started."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(GRACE_S)
+        self._ends()
+        self._end_now()
+
+    def _end_now(self) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
@@ -225,6 +292,13 @@ class Student:
         for source in (self.process.stdout, self.process.stderr):
             if source is not None:
                 source.close()
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _complete(buffer: bytearray, *, records: bool) -> int:

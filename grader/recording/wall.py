@@ -12,12 +12,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, Delivery, GraphSnapshot, Mark, Message, Observation, Trace
+from grader.model.trace import ClockKind, Delivery, Mark, Trace
 from grader.recording.ending import ending_fault, reported_fault
-from grader.recording.observer import Observer
+from grader.recording.observer import Observer, Taken
 from grader.recording.plan import Plan
 from grader.recording.stimuli import Due, number_message, numeric_field, schedule
 from grader.recording.student import Student
+from grader.recording.tape import Tape
 
 #: How often the conductor looks, and how long it may be held up at most before the run says nothing.
 LOOK_S = 0.001
@@ -25,10 +26,6 @@ HELD_UP_NS = 150 * NS_PER_MS
 #: How long a publisher stays after its last message, which it would take with it otherwise.
 LINGER_NS = 400 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
-#: Limit of one scenario; reaching it ends it with a mark.
-MESSAGES = 20_000
-#: Of a trace nobody reads more notes than this.
-NOTES = 50
 
 
 class WallConductor:
@@ -48,13 +45,9 @@ class WallConductor:
         self._due = schedule(plan.numbers, plan.recordings)
         self._streams: dict[str, str] = {}
         self._leaving: list[tuple[int, str]] = []
-        self._observations: list[Observation] = []
-        self._notes: list[str] = []
-        self._graph = GraphSnapshot(0, (), ())
+        self._tape = Tape(plan.limits)
         self._next_graph_ns = 0
         self._started = 0
-        self._first_seen = False
-        self._messages = 0
         self.held_up_ns = 0
 
     def run(self) -> Trace:
@@ -73,8 +66,8 @@ class WallConductor:
             scenario=self._plan.scenario,
             clock=ClockKind.WALL,
             stop_ns=self._end_ns,
-            observations=tuple(self._observations),
-            notes=tuple(dict.fromkeys(self._notes + [note for s in self._students for note in s.notes]))[:NOTES],
+            observations=tuple(self._tape.observations),
+            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             harness_problem=self._slip(),
         )
 
@@ -98,7 +91,7 @@ class WallConductor:
         for student in self._students:
             self._hear(student, now_ns)
         for taken in self._observer.take():
-            self._record(Message(now_ns, taken.topic, taken.type, taken.value, taken.cdr))
+            self._record(now_ns, taken)
         if now_ns >= self._next_graph_ns:
             self._look_at_graph(now_ns)
             self._next_graph_ns = now_ns + GRAPH_EVERY_NS
@@ -108,47 +101,45 @@ class WallConductor:
         reports = [] if student.ended else student.reports()
         for report in reports:
             if report is None:
-                self._observations += student.output(now_ns, final=True)
-                self._observations.append(student.death(now_ns))
+                self._tape.add(*student.output(now_ns, final=True), student.death(now_ns))
                 student.ended = True
             elif report.get("kind") == "note":
-                student.notes.append(str(report.get("text", ""))[:500])
+                student.note(str(report.get("text", "")))
             elif report.get("kind") == "fault":
-                self._observations.append(reported_fault(student.name, now_ns, report))
+                self._tape.add(reported_fault(student.name, now_ns, report, self._plan.limits))
             elif report.get("kind") == "exited":
-                self._observations += student.output(now_ns, final=True)
-                self._observations.append(ending_fault(student.name, now_ns, report))
+                self._tape.add(*student.output(now_ns, final=True))
+                self._tape.add(ending_fault(student.name, now_ns, report, self._plan.limits))
                 student.ended = True
-        self._observations += student.output(now_ns)
+        self._tape.add(*student.output(now_ns))
 
-    def _record(self, message: Message) -> None:
-        self._observations.append(message)
-        self._messages += 1
-        if message.topic == self._plan.first_message_on and not self._first_seen:
-            self._first_seen = True
-            self._end_ns = message.t_ns + self._plan.duration_ns
-        if self._messages == MESSAGES:
-            self._observations.append(Mark(message.t_ns, "limit", f"stopped after {MESSAGES} messages"))
-            self._end_ns = message.t_ns
+    def _record(self, now_ns: int, taken: Taken) -> None:
+        if taken.topic == self._plan.first_message_on and not self._tape.seen(taken.topic):
+            self._end_ns = now_ns + self._plan.duration_ns
+        self._tape.message(now_ns, taken)
+        self._end_if_full(now_ns)
+
+    def _end_if_full(self, now_ns: int) -> None:
+        if self._tape.full:
+            self._end_ns = min(self._end_ns, now_ns)
 
     def _look_at_graph(self, now_ns: int) -> None:
-        graph = self._observer.graph(now_ns)
-        if (graph.nodes, graph.endpoints) == (self._graph.nodes, self._graph.endpoints):
+        changed = self._tape.look(self._observer.graph(now_ns), self._observer.participants())
+        self._end_if_full(now_ns)
+        if not changed:
             return
-        self._graph = graph
-        self._observations.append(graph)
-        self._observer.watch(graph)
+        self._observer.watch(self._tape.graph)
         for topic in list(self._streams):
             self._follow_type(topic)
 
     def _do(self, due: Due, now_ns: int) -> None:
         if due.action == "appear":
             self._advertise(due.topic, due.payload)
-            self._observations.append(Mark(now_ns, "stream_starts", due.topic))
+            self._tape.add(Mark(now_ns, "stream_starts", due.topic))
         elif due.action == "disappear":
             self._streams.pop(due.topic, None)
             self._leaving.append((now_ns + LINGER_NS, due.topic))
-            self._observations.append(Mark(now_ns, "stream_stops", due.topic))
+            self._tape.add(Mark(now_ns, "stream_stops", due.topic))
         else:
             self._publish(due, now_ns)
 
@@ -160,11 +151,11 @@ class WallConductor:
             message, value = due.payload
         else:
             message, value = number_message(interface, due.payload)
-        self._observations.append(Delivery(now_ns, due.topic, interface, value))
+        self._tape.add(Delivery(now_ns, due.topic, interface, value))
         self._observer.publish(due.topic, message)
 
     def _advertise(self, topic: str, default: str) -> None:
-        asked = [e for e in self._graph.endpoints if e.kind == "subscription" and e.topic == topic]
+        asked = [e for e in self._tape.graph.endpoints if e.kind == "subscription" and e.topic == topic]
         usable = [e for e in asked if e.type == default or numeric_field(e.type) is not None]
         interface = usable[0].type if usable and default != "nav_msgs/msg/Odometry" else default
         latched = any(e.durability == "transient_local" for e in asked if e.type == interface)
@@ -173,7 +164,7 @@ class WallConductor:
 
     def _follow_type(self, topic: str) -> None:
         current = self._streams[topic]
-        asked = [e.type for e in self._graph.endpoints if e.kind == "subscription" and e.topic == topic]
+        asked = [e.type for e in self._tape.graph.endpoints if e.kind == "subscription" and e.topic == topic]
         if current == "nav_msgs/msg/Odometry" or not asked or current in asked:
             return
         if any(numeric_field(interface) is not None for interface in asked):

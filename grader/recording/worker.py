@@ -10,15 +10,18 @@ import json
 import os
 import socket
 import sys
+import time
 import traceback
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from grader.model.trace import Trace
 from grader.recording.codec import trace_to_json
+from grader.recording.guard import Guard
 from grader.recording.isolation.choose import isolation_from_name
 from grader.recording.isolation.environment import quick_discovery
-from grader.recording.isolation.protocol import Isolation, Limits, PythonRuntime, StudentProcess
+from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess
 from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
 
@@ -46,31 +49,32 @@ class Worker:
     def run(self, plan: Plan, domain: int) -> dict[str, Any]:
         """Run one plan and return its trace as JSON values."""
         tries = WALL_TRIES if plan.clock == "wall" else 1
+        deadline_ns = time.monotonic_ns() + plan.limits.wall_ns
         trace = self._record(plan, domain)
         for _ in range(tries - 1):
-            if not trace.harness_problem:
+            if not trace.harness_problem or time.monotonic_ns() > deadline_ns:
                 break
             trace = self._record(plan, domain)
         return trace_to_json(trace)
 
     def _record(self, plan: Plan, domain: int) -> Trace:
-        students = [self._start(plan, name, file, domain) for name, file in plan.processes]
-        # rclpy takes long to import: the students' processes start meanwhile.
-        from grader.recording.conductor import Conductor  # noqa: PLC0415
-        from grader.recording.observer import Observer  # noqa: PLC0415
-        from grader.recording.wall import WallConductor  # noqa: PLC0415
+        students: list[Student] = []
+        with ExitStack() as stack:
+            stack.callback(stop, students)
+            for name, file in plan.processes:
+                students.append(self._start(plan, name, file, domain))
+            # rclpy takes long to import: the students' processes start meanwhile.
+            from grader.recording.conductor import Conductor  # noqa: PLC0415
+            from grader.recording.observer import Observer  # noqa: PLC0415
+            from grader.recording.wall import WallConductor  # noqa: PLC0415
 
-        observer = Observer(domain)
-        try:
+            observer = Observer(domain, plan.limits)
+            stack.callback(observer.close)
+            guard = stack.enter_context(Guard(students, plan.limits))
             for student in students:
-                ready = student.report()
-                if ready is None or ready.get("kind") != "ready":
-                    raise RuntimeError(f"a student's process did not start: {_last_words(student)}")
+                _await_ready(student)
             conductor = WallConductor if plan.clock == "wall" else Conductor
-            return conductor(plan, students, observer).run()
-        finally:
-            stop(students)
-            observer.close()
+            return guard.reviewed(conductor(plan, students, observer).run())
 
     def _start(self, plan: Plan, name: str, file: str, domain: int) -> Student:
         ours, theirs = socket.socketpair()
@@ -101,12 +105,22 @@ class Worker:
                 },
                 pass_fds=(theirs.fileno(),),
             ),
-            Limits(),
+            plan.limits,
         )
         try:
-            return Student.start(name, root, command, ours)
+            return Student.start(name, root, command, ours, plan.limits)
+        except OSError:
+            ours.close()
+            raise
         finally:
             theirs.close()
+
+
+def _await_ready(student: Student) -> None:
+    """Wait until a process is about to run its file; until then nothing of the student's has run."""
+    ready = student.report()
+    if ready is None or ready.get("kind") != "ready":
+        raise RuntimeError(f"a student's process did not start: {student.stopped or _last_words(student)}")
 
 
 def _last_words(student: Student) -> str:

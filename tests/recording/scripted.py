@@ -102,6 +102,7 @@ class ScriptedStudent:
         self.nudged = False
         self.ended = False
         self.used_ns = 0
+        self.measured_ns = self.ready_ns = 0
         self.unsettled = ""
         self.notes: list[str] = []
         self.heard: list[dict[str, Any]] = []
@@ -152,6 +153,10 @@ class ScriptedStudent:
         written, self._written = self._written, []
         return [OutputLine(t_ns, self.name, "stdout", text) for text in written]
 
+    def note(self, text: str) -> None:
+        """Take a note."""
+        self.notes.append(text)
+
     def drain(self) -> None:
         """Read what has been written: it has been."""
 
@@ -178,6 +183,14 @@ class ScriptedObserver:
             if c["kind"] in ("publisher", "subscription")
         ]
         return GraphSnapshot(t_ns, tuple(f"/{name[:-3]}" for name in self._world.claims), tuple(ends))
+
+    def participants(self) -> int:
+        """Return how many processes have endpoints."""
+        return len(self._world.claims)
+
+    def notes(self) -> list[str]:
+        """Return what is to be said of messages: nothing."""
+        return []
 
     def watch(self, graph: GraphSnapshot) -> list[str]:
         """Watch every publisher."""

@@ -24,8 +24,10 @@ from scripted import (
 )
 
 from grader.host import clock as host_clock
+from grader.model.limits import Limits
 from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
 from grader.recording import conductor as module
+from grader.recording import tape
 from grader.recording.conductor import Conductor
 from grader.recording.plan import PlannedRecording
 
@@ -234,13 +236,14 @@ def test_a_first_message_is_not_waited_for_for_ever():
     assert Run(sleeper(), first_message_on="/cmd_vel").trace.stop_ns == 5000 * MS
 
 
-def test_too_many_messages_end_the_run_with_a_mark(monkeypatch):
-    """A flood is evidence enough."""
-    monkeypatch.setattr(module, "MESSAGES", 5)
-    run = Run(publisher("/cmd_vel", 1))
-    assert run.seen()[-1] == "4 limit stopped after 5 messages"
+def test_too_many_messages_end_the_run_with_a_mark():
+    """A flood is evidence enough; the mark and the note say on which topic."""
+    run = Run(publisher("/cmd_vel", 1), limits=Limits(messages=5))
+    said = "more than 5 messages on /cmd_vel: the rest was not looked at"
+    assert run.seen()[-1] == f"5 limit {said}"
+    assert run.trace.notes == (said,)
     assert len(run.trace.messages()) == 5
-    assert run.trace.stop_ns == 4 * MS
+    assert run.trace.stop_ns == 5 * MS
 
 
 def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch):
@@ -251,7 +254,7 @@ def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch):
         while True:
             yield idle(0)
 
-    assert Run(restless).seen() == ["0 limit stopped after 50 wake-ups"]
+    assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was not looked at"]
 
 
 def test_a_process_that_talks_without_waiting_is_ended(monkeypatch):
@@ -435,7 +438,7 @@ def test_notes_are_few_and_short():
     """A report is not filled by a process that makes up names."""
     lost = {f"topic /{'x' * 5000}{n}": 1 for n in range(500)}
     notes = Run(saying(idle(100), idle(lost=lost))).trace.notes
-    assert 1 <= len(notes) <= module.NOTES
+    assert 1 <= len(notes) <= tape.NOTES
     assert all(len(note) < 500 for note in notes)
 
 

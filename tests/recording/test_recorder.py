@@ -7,11 +7,13 @@ import json
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader.model.errors import EnvironmentFault
+from grader.model.limits import Limits
 from grader.model.trace import ClockKind
 from grader.recording import recorder as module
 from grader.recording.isolation.protocol import Command, PythonRuntime
@@ -201,9 +203,10 @@ def test_a_problem_without_words_still_has_some(make, behaviour):
 
 def test_a_worker_that_hangs_is_given_up(make, monkeypatch):
     """It is ended, whatever it does."""
-    monkeypatch.setattr(module, "SCENARIO_S", 0.05)
+    monkeypatch.setattr(module, "MARGIN_S", 0.05)
     recorder, stage = make("hangs")
-    (trace,) = recorder.record(jobs("alone"), nothing)
+    hurried = replace(plan(), limits=Limits(wall_ns=0))
+    (trace,) = recorder.record([Job("exercise 1: alone", hurried)], nothing)
     assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
     assert not any(map(alive, stage.pids()))
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.model.limits import Limits
 from grader.model.trace import FaultKind, LogRecord, OutputLine
 from grader.recording import student as module
 from grader.recording.isolation.protocol import Command
@@ -177,7 +178,7 @@ def start():
     def start_one(code: str) -> Student:
         ours, theirs = socket.socketpair()
         argv = (sys.executable, "-I", "-S", "-u", "-c", BEGIN + code, str(theirs.fileno()))
-        student = Student.start("a.py", ROOT, Command(argv, dict(os.environ), (theirs.fileno(),)), ours)
+        student = Student.start("a.py", ROOT, Command(argv, dict(os.environ), (theirs.fileno(),)), ours, Limits())
         theirs.close()
         started.append(student)
         return student
@@ -299,13 +300,14 @@ def alive(pid: int) -> bool:
 @pytest.mark.parametrize("more", [0, 1, 65536, 300_001])
 def test_output_beyond_the_cap_is_read_but_not_kept(start, stream, more):
     """The process goes on, the trace stays small, and one note says so; exactly the cap is not beyond it."""
-    length = module.OUTPUT_BYTES + more
+    most = Limits().output_bytes
+    length = most + more
     student = start(f"sys.{stream}.write('x' * {length}); sys.{stream}.flush(); report(kind='idle')")
     assert student.report() == {"kind": "idle"}
     student.drain()
     assert student._kept[stream] == length
-    assert len(student._streams[stream]) == module.OUTPUT_BYTES
-    assert student.notes == ([f"a.py: output on {stream} beyond 1 MiB was not kept"] if more else [])
+    assert len(student._streams[stream]) == most
+    assert student.notes == ([f"a.py: more than 4 MiB on {stream}: the rest was not looked at"] if more else [])
 
 
 def test_endless_output_does_not_keep_the_report_away(start):
@@ -320,7 +322,7 @@ def test_endless_output_does_not_keep_the_report_away(start):
     for _ in range(20):
         assert student.report() == {"kind": "idle"}
         student.tell({})
-    assert len(student._streams["stdout"]) <= module.OUTPUT_BYTES
+    assert len(student._streams["stdout"]) <= Limits().output_bytes
 
 
 def test_reports_that_are_there_are_taken_without_waiting(start):

@@ -8,6 +8,7 @@ pytest.importorskip("rclpy")
 
 from scripted import FLOAT, INT, MS, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
 
+from grader.model.limits import Limits
 from grader.model.trace import ClockKind, FaultKind
 from grader.recording import wall as module
 from grader.recording.plan import PlannedRecording
@@ -133,13 +134,13 @@ def test_a_recording_appears_plays_and_disappears(clock):
     ]
 
 
-def test_too_many_messages_end_the_run_with_a_mark(clock, monkeypatch):
+def test_too_many_messages_end_the_run_with_a_mark(clock):
     """A flood is evidence enough."""
-    monkeypatch.setattr(module, "MESSAGES", 5)
-    trace = Run(publisher("/cmd_vel", every_ms=1)).trace
+    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=5)).trace
     assert len(trace.messages()) == 5
-    assert [mark.detail for mark in trace.marks("limit")] == ["stopped after 5 messages"]
-    assert trace.stop_ns == trace.messages()[-1].t_ns
+    (mark,) = trace.marks("limit")
+    assert mark.detail == "more than 5 messages on /cmd_vel: the rest was not looked at"
+    assert trace.stop_ns == mark.t_ns
 
 
 def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
