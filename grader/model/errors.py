@@ -4,6 +4,7 @@
       ├─ RubricError       the author of the rubric
       ├─ SubmissionError   the student, or whoever named the path
       ├─ RecordingError    whoever named the /odom recording
+      ├─ EvidenceError     whoever named the evidence
       ├─ EnvironmentFault  whoever set up this machine (ROS, sandbox)
       └─ HarnessError      us or the machine, during a run
 
@@ -35,6 +36,10 @@ class SubmissionError(GraderError):
 
 class RecordingError(GraderError):
     """An /odom recording cannot be used; whoever named it must act."""
+
+
+class EvidenceError(GraderError):
+    """Kept evidence cannot be used; whoever named it must act."""
 
 
 class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here

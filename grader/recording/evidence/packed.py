@@ -1,0 +1,229 @@
+"""Traces packed for judging: the JSON of the codec, with marks where the bytes of messages stand in the recording.
+
+Reading has a quick way, typed decoding, and an exact one, the codec. The quick way gives the same trace or gives up.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from grader.model.errors import EvidenceError, HarnessError
+from grader.model.trace import (
+    ClockKind,
+    Delivery,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Mark,
+    Message,
+    Observation,
+    Offer,
+    OutputLine,
+    Trace,
+)
+from grader.recording.codec import FORMAT, lively, trace_from_json, trace_to_json
+
+#: Stands for bytes that are a message of the recording itself.
+THERE = "*"
+#: Place of the bytes in a packed message.
+_CDR = 5
+_ODD_NUMBER = b'{"float":'
+
+
+class _Row(msgspec.Struct, array_like=True, forbid_unknown_fields=True, tag_field="is"):
+    """One observation as it is written: its kind, then its fields in their order."""
+
+
+class _Message(_Row, tag="message"):
+    t_ns: int
+    topic: str
+    type: str
+    value: dict[str, Any]
+    cdr: str
+
+
+class _Delivery(_Message, tag="delivery"):
+    pass
+
+
+class _Log(_Row, tag="log"):
+    t_ns: int
+    process: str
+    severity: str
+    logger: str
+    text: str
+    file: str
+    line: int
+
+
+class _Line(_Row, tag="line"):
+    t_ns: int
+    process: str
+    stream: str
+    text: str
+
+
+class _End(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    kind: str
+    topic: str
+    type: str
+    node: str
+    participant: int
+    reliability: str
+    durability: str
+    depth: int
+    deadline_ns: int
+    liveliness: str
+
+
+class _Graph(_Row, tag="graph"):
+    t_ns: int
+    nodes: list[str]
+    endpoints: list[_End]
+
+
+class _Fault(_Row, tag="fault"):
+    t_ns: int
+    process: str
+    kind: FaultKind
+    text: str
+    file: str
+    line: int
+    frames: tuple[str, ...]
+
+
+class _Offer(_Row, tag="offer"):
+    t_ns: int
+    process: str
+    kind: str
+    name: str
+    detail: str
+
+
+class _Mark(_Row, tag="mark"):
+    t_ns: int
+    name: str
+    detail: str
+
+
+class _Packed(msgspec.Struct, forbid_unknown_fields=True):
+    """A whole trace as it is written."""
+
+    format: str
+    scenario: str
+    clock: ClockKind
+    clock_reason: str
+    stop_ns: int
+    notes: tuple[str, ...]
+    harness_problem: str
+    observations: list[_Message | _Delivery | _Log | _Line | _Graph | _Fault | _Offer | _Mark]
+
+
+_DECODER = msgspec.json.Decoder(_Packed)
+_fields = msgspec.structs.astuple
+
+
+def _graph(row: _Graph) -> GraphSnapshot:
+    return GraphSnapshot(row.t_ns, tuple(row.nodes), tuple(Endpoint(*_fields(end)) for end in row.endpoints))
+
+
+def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
+    return lambda row: kind(row.t_ns, row.topic, row.type, row.value)
+
+
+_MAKERS: Mapping[type[_Row], Callable[[Any], Observation]] = {
+    _Message: _without_bytes(Message),
+    _Delivery: _without_bytes(Delivery),
+    _Log: lambda row: LogRecord(*_fields(row)),
+    _Line: lambda row: OutputLine(*_fields(row)),
+    _Graph: _graph,
+    _Fault: lambda row: Fault(*_fields(row)),
+    _Offer: lambda row: Offer(*_fields(row)),
+    _Mark: lambda row: Mark(*_fields(row)),
+}
+
+
+def pack(trace: Trace, there: Sequence[bool]) -> bytes:
+    """Return a trace as JSON; the same trace gives the same bytes.
+
+    Args:
+        trace: What was observed.
+        there: For each observation, whether the recording has its bytes as a message of their own.
+    """
+    data = trace_to_json(trace)
+    for row, left_out in zip(data["observations"], there, strict=True):
+        if left_out:
+            row[_CDR] = THERE
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).encode()
+
+
+def unpack(data: bytes) -> Trace:
+    """Return what `pack` was given, without the bytes of messages, which judging does not read.
+
+    Raises:
+        EvidenceError: This is no packed trace.
+    """
+    try:
+        packed = _DECODER.decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return unpack_exactly(data, None)  # texts that no encoding holds, or damage: the codec tells which
+    if packed.format != FORMAT:
+        raise EvidenceError(f"trace: expected format {FORMAT}, found {packed.format[:40]}")
+    observations: Iterator[Observation] = (_MAKERS[type(row)](row) for row in packed.observations)
+    if _ODD_NUMBER in data:
+        observations = map(_revived, observations)
+    return Trace(
+        packed.scenario,
+        packed.clock,
+        packed.stop_ns,
+        tuple(observations),
+        packed.clock_reason,
+        packed.notes,
+        packed.harness_problem,
+    )
+
+
+def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
+    """Return what `pack` was given.
+
+    Args:
+        data: A packed trace.
+        cdrs: The bytes of the recording's messages, one for each observation; None leaves all messages without.
+
+    Raises:
+        EvidenceError: This is no packed trace, or not that of the recording.
+    """
+    try:
+        rows = json.loads(data)
+        for index, row in enumerate(rows["observations"]):
+            if row[0] in ("message", "delivery"):
+                row[_CDR] = _base64(row[_CDR], cdrs, index)
+        return trace_from_json(rows)
+    except HarnessError as error:
+        raise EvidenceError(error.message) from error
+    except (KeyError, TypeError, ValueError, IndexError, RecursionError) as error:
+        raise EvidenceError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
+
+
+def _base64(packed: str, cdrs: Sequence[bytes] | None, index: int) -> str:
+    if cdrs is None:
+        return ""
+    return base64.b64encode(cdrs[index]).decode() if packed == THERE else packed
+
+
+def _revived(observation: Observation) -> Observation:
+    """Return an observation whose NaN and infinities are numbers again."""
+    if not isinstance(observation, (Message, Delivery)):
+        return observation
+    try:
+        return replace(observation, value=lively(observation.value))
+    except KeyError as error:
+        raise EvidenceError("trace: expected a number, found another word") from error

@@ -1,0 +1,126 @@
+"""What a recording shows to tools that read rosbag2: every observation of a trace as a message on a topic."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from grader.model.quantities import NS_PER_S
+from grader.model.trace import Delivery, Fault, GraphSnapshot, LogRecord, Mark, Message, Observation, Offer, OutputLine
+from grader.recording.codec import observation_to_json, plain
+from grader.recording.evidence.interfaces import Unknown, check_readable, encode
+
+STRING = "std_msgs/msg/String"
+LOG = "rcl_interfaces/msg/Log"
+ROSOUT = "/rosout"
+#: Observations that are no ROS messages, as JSON on topics of the grader's own.
+OUTPUT, GRAPH, FAULTS, OFFERS, MARKS = (f"/grader/{name}" for name in ("output", "graph", "faults", "offers", "marks"))
+#: Messages whose bytes nobody can decode, or of a type that has no definition here.
+UNDECODED = "/grader/undecoded"
+#: What is known of the whole recording, once at its beginning.
+RUN = "/grader/run"
+_LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
+_TOPICS = {OutputLine: OUTPUT, GraphSnapshot: GRAPH, Fault: FAULTS, Offer: OFFERS, Mark: MARKS}
+_MOST_NS = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One message of a recording.
+
+    Attributes:
+        t_ns: Virtual receive time, from 0.
+        topic: Where it was seen, or a topic of the grader's own.
+        type: Its type.
+        publisher: `student` or `grader`.
+        cdr: Its bytes.
+        exact: Whether `cdr` is what went over the wire, as the trace has it.
+    """
+
+    t_ns: int
+    topic: str
+    type: str
+    publisher: str
+    cdr: bytes
+    exact: bool = False
+
+
+def shown(observations: tuple[Observation, ...]) -> Iterator[Shown]:
+    """Yield one message for each observation, in order."""
+    for observation in observations:
+        if isinstance(observation, (Message, Delivery)):
+            yield _message(observation)
+        elif isinstance(observation, LogRecord):
+            yield _log(observation)
+        else:
+            yield said(observation.t_ns, _TOPICS[type(observation)], _fields(observation))
+
+
+def said(t_ns: int, topic: str, value: Any) -> Shown:
+    """Return a JSON value as a message on a topic of the grader's own."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return Shown(_clamped(t_ns), topic, STRING, "grader", encode(STRING, {"data": text}))
+
+
+def _message(message: Message | Delivery) -> Shown:
+    publisher = "student" if isinstance(message, Message) else "grader"
+    t_ns = _clamped(message.t_ns)
+    try:
+        _check_name(message.topic)
+        if message.cdr:
+            check_readable(message.type, message.cdr)
+            return Shown(t_ns, message.topic, message.type, publisher, message.cdr, exact=True)
+        if not message.value:
+            raise Unknown(message.type)  # its content was not kept; zeros would pass for it
+        return Shown(t_ns, message.topic, message.type, publisher, encode(message.type, message.value))
+    except Unknown:
+        value = {
+            "publisher": publisher,
+            "topic": message.topic,
+            "type": message.type,
+            "value": plain(message.value),
+            "cdr": base64.b64encode(message.cdr).decode(),
+        }
+        return said(t_ns, UNDECODED, value)
+
+
+def _check_name(topic: str) -> None:
+    """Raise Unknown for a topic that no ROS tool could have, or that would pass for one of the grader's own."""
+    plain_name = topic.isascii() and topic.isprintable() and topic.startswith("/") and len(topic) < 256
+    if not plain_name or topic == ROSOUT or topic.startswith("/grader/"):
+        raise Unknown(topic)
+
+
+def _log(record: LogRecord) -> Shown:
+    t_ns = _clamped(record.t_ns)
+    value = {
+        "stamp": {"sec": min(t_ns // NS_PER_S, 2**31 - 1), "nanosec": t_ns % NS_PER_S},
+        "level": _LEVELS.get(record.severity, 0),
+        "name": _text(record.logger),
+        "msg": _text(record.text),
+        "file": _text(record.file or record.process),
+        "line": min(max(0, record.line), 2**32 - 1),
+    }
+    return Shown(t_ns, ROSOUT, LOG, "student", encode(LOG, value))
+
+
+def _fields(observation: Observation) -> dict[str, Any]:
+    """Return an observation by the names of its fields, without its time."""
+    _, _, *values = observation_to_json(observation)
+    fields = dict(zip(type(observation).__slots__[1:], values, strict=True))
+    if isinstance(observation, GraphSnapshot):
+        ends = observation.endpoints
+        fields["endpoints"] = [{name: getattr(e, name) for name in type(e).__slots__} for e in ends]
+    return fields
+
+
+def _text(text: str) -> str:
+    """Return text that every reader of CDR strings takes: no lone surrogate, no NUL."""
+    return text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
+
+
+def _clamped(t_ns: int) -> int:
+    return min(max(0, t_ns), _MOST_NS)

@@ -1,0 +1,279 @@
+"""Keeps a run as evidence in a folder, and reads it back: the recordings are what judging takes, nothing is run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from grader.model.containment import Property
+from grader.model.errors import EvidenceError
+from grader.model.exercise import Exercise
+from grader.model.report import Environment, Reproduction
+from grader.model.run import Run
+from grader.model.submission import StudentFile, Submission
+from grader.model.trace import ClockKind, Trace
+from grader.recording.evidence import folder as files
+from grader.recording.evidence import manifest as kept
+from grader.recording.evidence.recording_file import recording_bytes, trace_of
+
+#: A longer recording is none that the grader wrote.
+MOST_BYTES = 512 << 20
+#: Where a submission lies that nobody will run.
+_NOWHERE = Path()
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """A folder of evidence whose manifest has been read.
+
+    Attributes:
+        folder: Where it lies.
+        manifest: What it says of itself.
+    """
+
+    folder: Path
+    manifest: kept.Manifest
+
+    @property
+    def exercises(self) -> tuple[str, ...]:
+        """Ids of the exercises that were graded, in the order of the report."""
+        return tuple(exercise.id for exercise in self.manifest.exercises)
+
+
+def check_place(folder: Path) -> None:
+    """Make sure, before anything is run, that evidence may be kept in a folder.
+
+    Raises:
+        EvidenceError: It is no folder, or holds files under our names that are not ours.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise EvidenceError(f"{folder}: expected a folder for the evidence, found a file", "name another folder")
+    files.refuse_foreign(folder, (files.MANIFEST, files.REPORT), _own(folder))
+
+
+def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapping[str, Any], report: bytes) -> None:
+    """Write a run as evidence; what an earlier run left there is replaced, what others put there stays.
+
+    Args:
+        folder: Created if it is not there.
+        run: What was recorded.
+        exercises: What was asked.
+        request: How grading was asked for, as JSON values; holds nothing that judging reads.
+        report: The report as JSON.
+
+    Raises:
+        EvidenceError: A file cannot be written, or is not ours to replace.
+    """
+    written: dict[str, bytes] = {}
+    digests: dict[tuple[str, str], str] = {}
+    for (exercise, scenario), trace in run.traces.items():
+        name = files.recording_name(exercise, scenario)
+        recording, metadata = recording_bytes(trace, _facts(run, exercise), Path(name).name)
+        written[name] = recording
+        written[files.metadata_name(exercise, scenario)] = metadata
+        digests[exercise, scenario] = kept.sha256(recording)
+    written[files.REPORT] = report
+    names = tuple(sorted({*written, files.MANIFEST}))
+    old = _own(folder)
+    files.refuse_foreign(folder, names, old)
+    manifest = _manifest(run, exercises, digests, request=request, names=names)
+    unfinished = msgspec.structs.replace(manifest, complete=False, files=tuple(sorted({*names, *old})))
+    files.write(folder, {files.MANIFEST: kept.dump(unfinished), **written})
+    files.remove(folder, set(old) - set(names))
+    files.write(folder, {files.MANIFEST: kept.dump(manifest)})
+
+
+def open_evidence(folder: Path) -> Evidence:
+    """Return the evidence that lies in a folder.
+
+    Raises:
+        EvidenceError: There is none, it is of another version, damaged, or was not finished.
+    """
+    path = folder / files.MANIFEST
+    data = files.read(path, kept.MOST_BYTES)
+    try:
+        manifest = kept.parse(data)
+    except EvidenceError as error:
+        raise EvidenceError(f"{path}: {error.message}", "grade the submission again") from error
+    if not manifest.complete:
+        raise EvidenceError(f"{path}: expected complete evidence, found some that was not finished", "grade again")
+    return Evidence(folder, manifest)
+
+
+def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = False) -> Run:
+    """Return the run that evidence holds, as far as these exercises ask for it.
+
+    A scenario that the rubric describes in another way now has a trace that says so and forbids judging.
+
+    Args:
+        evidence: Where it lies.
+        exercises: What is asked now.
+        verify: Whether every recording is written again from what is judged, and compared with what it shows.
+
+    Raises:
+        EvidenceError: A recording is missing or is not the one that was kept.
+    """
+    manifest = evidence.manifest
+    wanted = {e.id: e for e in exercises}
+    traces = {
+        (exercise.id, recording.scenario): _trace(evidence, exercise, recording, wanted[exercise.id], verify=verify)
+        for exercise in manifest.exercises
+        if exercise.id in wanted
+        for recording in exercise.recordings
+        if recording.digest is not None
+    }
+    return Run(
+        submission=_submission(manifest),
+        traces=traces,
+        sources=manifest.sources,
+        environment=_environment(manifest.environment),
+        seed=manifest.run.seed,
+        duration_s=manifest.run.duration_s,
+        notes=manifest.run.notes,
+        reproduce=Reproduction(
+            rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises), recording=manifest.run.recording
+        ),
+    )
+
+
+def first_report(evidence: Evidence) -> Mapping[str, Any] | None:
+    """Return the report that was made when the submission was graded; None if it is gone or no report."""
+    try:
+        report = json.loads(files.read(evidence.folder / files.REPORT, kept.MOST_BYTES))
+    except (EvidenceError, ValueError, RecursionError):
+        return None
+    return report if isinstance(report, dict) else None
+
+
+def is_evidence(folder: Path) -> bool:
+    """Return whether a folder says that it holds evidence."""
+    return (folder / files.MANIFEST).is_file()
+
+
+def found_under(folder: Path) -> Collection[Path]:
+    """Return the folders of evidence in and below a folder, sorted by path."""
+    return sorted(path.parent for path in folder.rglob(files.MANIFEST))
+
+
+def _trace(
+    evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording, exercise: Exercise, *, verify: bool
+) -> Trace:
+    asked = next((kept.scenario_digest(s) for s in exercise.scenarios if s.id == recording.scenario), "")
+    if asked != recording.asked:
+        problem = f"the rubric describes the scenario {recording.scenario} otherwise than when it was recorded"
+        return Trace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
+    name = files.recording_name(owner.id, recording.scenario)
+    path = evidence.folder / name
+    data = files.read(path, MOST_BYTES)
+    try:
+        found = kept.sha256(data)
+        if found != recording.digest:
+            raise EvidenceError(f"expected the recording {recording.digest}, found {found}")
+        trace = trace_of(data, wire=verify)
+        if verify:
+            _compare(data, trace, evidence, owner)
+    except EvidenceError as error:
+        raise EvidenceError(f"{path}: {error.message}", "the file was changed or damaged; grade again") from error
+    return trace
+
+
+def _compare(data: bytes, trace: Trace, evidence: Evidence, owner: kept.KeptExercise) -> None:
+    """Raise EvidenceError if a recording shows anything else than what is judged."""
+    facts = _kept_facts(evidence.manifest, owner)
+    name = Path(files.recording_name(owner.id, trace.scenario)).name
+    if recording_bytes(trace, facts, name)[0] != data:
+        raise EvidenceError("expected a recording that shows what is judged, found one that shows something else")
+
+
+def _own(folder: Path) -> tuple[str, ...]:
+    """Return the files in a folder that an earlier run wrote, by its manifest; none if there is no such manifest."""
+    try:
+        manifest = kept.parse(files.read(folder / files.MANIFEST, kept.MOST_BYTES))
+    except EvidenceError:
+        return ()
+    return tuple(name for name in manifest.files if files.is_own(name))
+
+
+def _facts(run: Run, exercise: str) -> dict[str, str]:
+    """Return what every recording says of the run; nothing that only one machine or one run has."""
+    rubrics = dict(run.reproduce.rubrics)
+    return _as_facts(
+        exercise, run.submission.digest, rubrics.get(exercise, ""), run.seed, run.reproduce.recording, run.environment
+    )
+
+
+def _kept_facts(manifest: kept.Manifest, owner: kept.KeptExercise) -> dict[str, str]:
+    run, environment = manifest.run, _environment(manifest.environment)
+    return _as_facts(owner.id, manifest.submission.digest, owner.rubric, run.seed, run.recording, environment)
+
+
+def _as_facts(  # noqa: PLR0913  each comes from another place
+    exercise: str, submission: str, rubric: str, seed: int, recording: str, environment: Environment
+) -> dict[str, str]:
+    return {
+        "format": kept.FORMAT,
+        "exercise": exercise,
+        "submission": submission,
+        "rubric": rubric,
+        "seed": str(seed),
+        "odometry": recording,
+        "environment": json.dumps(asdict(environment)),
+    }
+
+
+def _manifest(
+    run: Run,
+    exercises: Sequence[Exercise],
+    digests: Mapping[tuple[str, str], str],
+    *,
+    request: Mapping[str, Any],
+    names: tuple[str, ...],
+) -> kept.Manifest:
+    submission = run.submission
+    return kept.Manifest(
+        format=kept.FORMAT,
+        complete=True,
+        files=names,
+        submission=kept.KeptSubmission(
+            submission.name,
+            submission.digest,
+            tuple(kept.KeptFile(f.wanted, f.found, f.similar, f.others) for f in submission.files.values()),
+            submission.notes,
+        ),
+        run=kept.KeptRun(submission.path, run.seed, run.duration_s, run.notes, run.reproduce.recording, dict(request)),
+        environment=msgspec.convert(asdict(run.environment), kept.KeptEnvironment),
+        exercises=tuple(
+            kept.KeptExercise(
+                e.id,
+                e.digest,
+                tuple(
+                    kept.KeptRecording(s.id, kept.scenario_digest(s), digests.get((e.id, s.id))) for s in e.scenarios
+                ),
+            )
+            for e in exercises
+        ),
+        sources=dict(run.sources),
+    )
+
+
+def _submission(manifest: kept.Manifest) -> Submission:
+    submission = manifest.submission
+    return Submission(
+        name=submission.name,
+        path=manifest.run.path,
+        root=_NOWHERE,
+        digest=submission.digest,
+        files={f.wanted: StudentFile(f.wanted, f.found, f.similar, f.others) for f in submission.files},
+        notes=submission.notes,
+    )
+
+
+def _environment(environment: kept.KeptEnvironment) -> Environment:
+    plain = {name: getattr(environment, name) for name in environment.__struct_fields__ if name != "containment"}
+    held = tuple(Property(p.name, p.holds, p.mechanism, p.found) for p in environment.containment)
+    return Environment(**plain, containment=held)
