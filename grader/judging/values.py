@@ -8,7 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.model.trace import Delivery, Message, Trace
+from grader.model.quantities import NS_PER_MS
+from grader.model.trace import ClockKind, Delivery, Message, Trace
+
+#: How far two clock readings of one moment may lie apart.
+JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
 
 _NUMERIC_TYPE = re.compile(r"std_msgs/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature")
 

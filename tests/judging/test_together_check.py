@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from tracing import FLOAT32, FLOAT64, Recording
 
 from grader.judging.checks.together import AnswersTogether
+from grader.model.trace import ClockKind
 
 CHECK = AnswersTogether("/temperature", "/fan_speed", 25, 100, 0)
 
@@ -232,3 +234,10 @@ def test_wrong_answers_are_not_called_late() -> None:
     finding = CHECK.judge(each(lambda v: 100.0 - right(v)).trace())
     assert finding.credit == 0
     assert "before" not in finding.reason
+
+
+def test_on_the_wall_clock_an_answer_may_be_seen_before_its_input():
+    """The sensor sends to the controller first, and is held up before it sends to the observer; not so virtually."""
+    assert CHECK.judge(replace(each(delay=-0.02).trace(), clock=ClockKind.WALL)).credit == 1
+    assert CHECK.judge(each(delay=-0.02).trace()).credit == 0
+    assert CHECK.judge(replace(each(delay=-0.08).trace(), clock=ClockKind.WALL)).credit == 0

@@ -12,7 +12,7 @@ from typing import Any
 from grader.judging.findings import met, not_met
 from grader.judging.lateness import steps_behind
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
-from grader.judging.values import Reading, last_of_instant, published, readings
+from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, readings
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, seconds, within
@@ -105,7 +105,7 @@ class AnswersTogether:
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
         for answer in answers:
-            recent = _recent(inputs, answer.t_ns)
+            recent = _recent(inputs, answer.t_ns, JITTER_NS[trace.clock])
             if not recent or any(within(answer.value, self._expected(r.value), _EXACT) for r in recent):
                 continue
             value, unit = recent[-1].value, unit_of(self.input)
@@ -133,7 +133,7 @@ class AnswersTogether:
         if len(later) < _FEWEST_FOR_SHARE:
             return None
         shares = []
-        for delay_ns in range(0, _CURRENT_NS + 1, _CURRENT_NS // 5):
+        for delay_ns in (-JITTER_NS[trace.clock], *range(0, _CURRENT_NS + 1, _CURRENT_NS // 5)):
             for side in (bisect_left, bisect_right):
                 seen = [inputs[side(times, a.t_ns - delay_ns) - 1] for a in later]
                 fitting = sum(
@@ -211,9 +211,12 @@ def _stays(inputs: Sequence[Reading]) -> bool:
     return len(steps) >= _FEWEST_TO_STAY and max(values) - min(values) <= _STEPS_IN_RANGE * statistics.median(steps)
 
 
-def _recent(inputs: Sequence[Reading], t_ns: int) -> list[Reading]:
-    """Return the inputs that were current at some moment of the quarter second up to and including `t_ns`."""
-    until = [r for r in inputs if r.t_ns <= t_ns]
+def _recent(inputs: Sequence[Reading], t_ns: int, jitter_ns: int) -> list[Reading]:
+    """Return the inputs that were current at some moment of the quarter second up to and including `t_ns`.
+
+    On the wall clock an input may reach the controller, and its answer the observer, before the input does.
+    """
+    until = [r for r in inputs if r.t_ns <= t_ns + jitter_ns]
     older = [r for r in until if r.t_ns <= t_ns - _CURRENT_NS]
     return older[-1:] + [r for r in until if r.t_ns > t_ns - _CURRENT_NS]
 

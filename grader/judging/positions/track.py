@@ -6,14 +6,12 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from grader.judging.values import leaves
+from grader.judging.values import JITTER_NS, leaves
 from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, Trace
+from grader.model.trace import Trace
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop reads a queue.
 STALE_NS = 500 * NS_PER_MS
-#: How far two clock readings of one moment may lie apart.
-JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
 
 X = "pose.pose.position.x"
 Y = "pose.pose.position.y"
