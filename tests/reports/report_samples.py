@@ -6,6 +6,7 @@ from grader.model.containment import PROPERTIES, Property
 from grader.model.exercise import Location, Outcome
 from grader.model.report import Environment, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.model.trace import ClockKind, Endpoint, GraphSnapshot
+from grader.reports.classroom50 import HandedIn
 
 VIRTUAL = ClockKind.VIRTUAL
 ENVIRONMENT = Environment(
@@ -16,6 +17,18 @@ ENVIRONMENT = Environment(
     python="3.11.9",
     isolation="bubblewrap",
     containment=tuple(Property(name, holds=True, mechanism="a namespace") for name in PROPERTIES),
+)
+HANDED_IN = HandedIn(
+    classroom="robots-101",
+    assignment="rclpy",
+    assignment_type="individual",
+    owner="robots-101",
+    username="ada",
+    submission="submit/2026-01-31T10-00-00Z",
+    commit="https://git.example/robots-101/rclpy-ada/commit/1",
+    release="https://git.example/robots-101/rclpy-ada/releases/1",
+    review="https://git.example/robots-101/rclpy-ada/pull/1",
+    datetime="2026-01-31T10:00:00Z",
 )
 NASTY = "\x1b[2J\x1b]0;owned\x07[bold red]pwned[/] \u202edrowssap\u202c \ud800 a\nb\r\tc\u200b \x9b31m {x!r} \\"
 
