@@ -1,0 +1,27 @@
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Float32
+
+
+class FanController(Node):
+    def __init__(self):
+        super().__init__('fan_controller')
+        self.speed = Float32()
+        self.publisher = self.create_publisher(Float32, '/fan_speed', 10)
+        self.subscription = self.create_subscription(Float32, '/temperature', self.temperature_callback, 10)
+
+    def temperature_callback(self, msg):
+        if msg.data > 25.0:
+            self.speed.data = 100.0
+        elif msg.data < 25.0:
+            self.speed.data = 0.0
+        self.publisher.publish(self.speed)
+
+
+def main(args=None):
+    rclpy.init(args=args)
+    rclpy.spin(FanController())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,27 @@
+import rclpy
+from rclpy.node import Node
+from nav_msgs.msg import Odometry
+
+
+class OdomSubscriber(Node):
+    def __init__(self):
+        super().__init__('odom_subscriber')
+        self.pose = None
+        self.create_subscription(Odometry, '/odom', self.cb, 10)
+        self.create_timer(1.0, self.tick)
+
+    def cb(self, msg):
+        self.pose = msg.pose
+
+    def tick(self):
+        if self.pose is not None:
+            self.get_logger().info(f'x={self.pose.covariance[0]:.4f} y={self.pose.covariance[7]:.4f}')
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(OdomSubscriber())
+
+
+if __name__ == '__main__':
+    main()

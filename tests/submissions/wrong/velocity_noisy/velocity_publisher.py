@@ -1,0 +1,28 @@
+import random
+
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.tick)
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5 + random.uniform(-0.02, 0.02)
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+        self.get_logger().info('linear %.3f' % msg.linear.x)
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(VelocityPublisher())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,28 @@
+import math
+
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.tick)
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = math.radians(0.1)
+        self.pub.publish(msg)
+        self.get_logger().info('sent', throttle_duration_sec=1.0)
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(VelocityPublisher())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,29 @@
+from datetime import datetime
+
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class VelocityPublisher(Node):
+    def __init__(self):
+        super().__init__('velocity_publisher')
+        self.pub = self.create_publisher(Twist, '/cmd_vel', 10)
+        self.timer = self.create_timer(0.05, self.tick)
+
+    def tick(self):
+        msg = Twist()
+        msg.linear.x = 0.5
+        msg.angular.z = 0.1
+        self.pub.publish(msg)
+        with open('velocity_log.txt', 'a') as f:
+            f.write(f'{datetime.now()} linear={msg.linear.x} angular={msg.angular.z}\n')
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(VelocityPublisher())
+
+
+if __name__ == '__main__':
+    main()
