@@ -30,6 +30,8 @@ _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
+#: What `-o` calls the folder of recordings that a report rests on.
+EVIDENCE = "evidence"
 # Stands for "no subcommand was named"; no argument of a process can hold a NUL.
 _EVERYDAY = "\0"
 _PATH = click.Path(path_type=Path)
@@ -82,8 +84,10 @@ def _parse_output(value: str) -> Output:
     format_, equals, path = value.partition("=")
     if not equals or not path:
         raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
-    if format_ not in FORMATS:
-        raise click.BadParameter(f"{format_!r} is no format{_nearest(format_, list(FORMATS))}")
+    if format_ not in (*FORMATS, EVIDENCE):
+        raise click.BadParameter(f"{format_!r} is no format{_nearest(format_, [*FORMATS, EVIDENCE])}")
+    if format_ == EVIDENCE and path == "-":
+        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
     return Output(format_, None if path == "-" else Path(path))
 
 
@@ -109,7 +113,7 @@ def _parse_percent(ctx: click.Context, param: click.Parameter, value: float | No
     metavar="FORMAT=PATH",
     multiple=True,
     callback=_parse_outputs,
-    help=f"Write a report ({', '.join(FORMATS)}); `-` is standard output; repeatable.",
+    help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
 @click.option("--rubric", "rubrics", type=_PATH, multiple=True, help="Use this rubric; repeatable.")
 @click.option(
@@ -151,8 +155,9 @@ def _grade(  # noqa: PLR0913  one parameter an option
 
     A folder with the name of a command is graded as ./NAME.
     """
-    wanted = prepared((*outputs, Output("json")) if as_json else outputs)
-    from grader import session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+    rendered = tuple(output for output in outputs if output.format != EVIDENCE)
+    wanted = prepared((*rendered, Output("json")) if as_json else rendered)
+    from grader import keeping, session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
     from grader.recording.studio import NO_ISOLATION  # noqa: PLC0415
 
     request = session.Request(
@@ -164,13 +169,16 @@ def _grade(  # noqa: PLR0913  one parameter an option
         clock=clock,
         isolation=isolation,
     )
+    folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
+    keeper = keeping.Keeper(folders, request)
     with _progress(wanted=not no_progress) as progress:
-        report = session.grade(request, progress)
+        report = session.grade(request, progress, keeper.hear)
     if isolation == "auto" and report.environment.isolation == NO_ISOLATION:
         _warn(*report.notes[-1:])
     if report.environment.ros_distro not in session.TRIED_ON:
         _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted)
+    keeper.write(report)
     return exit_code(report, min_score)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -64,12 +64,15 @@ class Progress(Protocol):
         ...
 
 
-def grade(request: Request, progress: Progress) -> Report:
+def grade(
+    request: Request, progress: Progress, hear: Callable[[Run, Sequence[Exercise]], None] | None = None
+) -> Report:
     """Grade one submission.
 
     Args:
         request: What is to be graded, and how.
         progress: Hears which step begins.
+        hear: Hears what was recorded, and for which exercises.
 
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
@@ -94,6 +97,8 @@ def grade(request: Request, progress: Progress) -> Report:
             notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio.isolation)),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
+        if hear is not None:
+            hear(run, exercises)
         return judge_run(exercises, run)
 
 

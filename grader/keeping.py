@@ -1,0 +1,69 @@
+"""Keeps what was recorded as evidence, beside the report that was made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from grader.model.exercise import Exercise
+from grader.model.report import Report
+from grader.model.run import Run
+from grader.recording.evidence.store import check_place, keep
+from grader.reports.json_report import dumps
+from grader.session import Request
+
+
+class Keeper:
+    """Hears of a run while it is graded, and writes it down when its report has been delivered.
+
+    Args:
+        folders: Where to; checked at once, because grading takes long.
+        request: How grading was asked for.
+
+    Raises:
+        EvidenceError: Evidence cannot be kept in one of the folders.
+    """
+
+    def __init__(self, folders: Sequence[Path], request: Request) -> None:
+        for folder in folders:
+            check_place(folder)
+        self._folders = folders
+        self._request = request
+        self._heard: tuple[Run, Sequence[Exercise]] | None = None
+
+    def hear(self, run: Run, exercises: Sequence[Exercise]) -> None:
+        """Remember a whole run, and what was asked of it."""
+        self._heard = (run, exercises)
+
+    def write(self, report: Report) -> None:
+        """Write the run and its report; raises EvidenceError if that cannot be done."""
+        if self._heard is None or not self._folders:
+            return
+        run, exercises = self._heard
+        for folder in self._folders:
+            keep(folder, run, exercises, request=request_to_json(self._request), report=dumps(report).encode())
+
+
+def request_to_json(request: Request) -> dict[str, Any]:
+    """Return what a command to reproduce the report needs besides path, seed and rubrics."""
+    return {
+        "exercises": list(request.exercises),
+        "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
+        "clock": request.clock,
+        "isolation": request.isolation,
+    }
+
+
+def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> Request:
+    """Return the request that would record a kept run again, to be judged by these rubrics."""
+    bag = data.get("odom_bag")
+    return Request(
+        submission=submission,
+        exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
+        rubrics=rubrics,
+        seed=seed,
+        odom_bag=Path(str(bag)) if bag is not None else None,
+        clock=str(data.get("clock", "auto")),
+        isolation=str(data.get("isolation", "auto")),
+    )
