@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from grader.judging.checks import CHECKS
 from grader.model.errors import RubricError
 from grader.model.exercise import Check, Criterion, Exercise
+from grader.model.limits import Limits
 from grader.model.scenario import (
     Between,
     JustAbove,
@@ -27,6 +28,7 @@ from grader.model.scenario import (
 )
 from grader.reading.check_parameters import build
 from grader.reading.quoting import shown
+from grader.reading.rubric_limits import limits_of
 from grader.reading.rubric_links import broken_links
 from grader.reading.rubric_mistakes import mistakes_of
 from grader.reading.rubric_model import (
@@ -72,13 +74,14 @@ def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
     criteria = tuple(_criteria(rubric, checks, tree, mistakes))
     if mistakes:
         _refuse(path, mistakes)
+    limits = limits_of(rubric.limits)
     return Exercise(
         id=rubric.exercise.id,
         number=rubric.exercise.number,
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=tuple(_scenario(shape) for shape in rubric.scenarios),
+        scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
         criteria=criteria,
         digest=f"sha256:{hashlib.sha256(content).hexdigest()}",
     )
@@ -162,13 +165,14 @@ def _criterion(shape: CriterionShape, check: Check) -> Criterion:
     )
 
 
-def _scenario(shape: ScenarioShape) -> Scenario:
+def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
     span = Span(
         duration_ns=shape.observe.duration,
         after_first_message_on=shape.observe.after_first_message_on,
         wait_at_most_ns=shape.observe.wait_at_most,
     )
-    return Scenario(shape.id, shape.processes, span, tuple(_stimulus(stimulus) for stimulus in shape.stimuli))
+    stimuli = tuple(_stimulus(stimulus) for stimulus in shape.stimuli)
+    return Scenario(shape.id, shape.processes, span, stimuli, limits)
 
 
 def _stimulus(shape: StimulusShape) -> Stimulus:

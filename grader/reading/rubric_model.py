@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, create_model
 
 from grader.model.quantities import NS_PER_S
 from grader.reading.check_parameters import Choice, Shape, choice_model
+from grader.reading.rubric_limits import LimitsShape
 from grader.reading.rubric_types import (
     Duration,
     Id,
@@ -121,6 +122,7 @@ class RubricShape(Shape):
     format: Literal["grader/rubric/v1"] = Field(alias="schema")
     exercise: ExerciseShape
     files: tuple[PythonFile, ...] = Field(min_length=1)
+    limits: LimitsShape = Field(default_factory=LimitsShape)
     scenarios: tuple[ScenarioShape, ...] = Field(min_length=1)
     criteria: tuple[CriterionShape, ...] = Field(min_length=1)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 
-from grader.model.quantities import NS_PER_MS, NS_PER_S, Unit
+from grader.model.quantities import GIB, KIB, MIB, NS_PER_MS, NS_PER_S, Unit
 from grader.reading.quoting import listed, shown
 
 
@@ -26,13 +26,17 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """One dimension: its words for messages, and each unit as a multiple of the stored one, largest first."""
+    """One dimension: its words for messages, and each unit as a multiple of the stored one, largest first.
+
+    `whole` names what is stored, where parts of it cannot be.
+    """
 
     noun: str
     example: str
     units: Mapping[str, Fraction]
     spellings: Mapping[str, str]
     usual: tuple[str, ...]
+    whole: str = ""
 
 
 _KINDS: Mapping[str, _Kind] = {
@@ -55,6 +59,7 @@ _KINDS: Mapping[str, _Kind] = {
             **dict.fromkeys(("\N{MICRO SIGN}s", "\N{GREEK SMALL LETTER MU}s", "microseconds"), "us"),
         },
         usual=("s", "ms"),
+        whole="nanoseconds",
     ),
     "Hz": _Kind(
         noun="a frequency",
@@ -62,6 +67,19 @@ _KINDS: Mapping[str, _Kind] = {
         units={"kHz": Fraction(1000), "Hz": Fraction(1)},
         spellings={"hertz": "Hz", "kilohertz": "kHz"},
         usual=("Hz",),
+    ),
+    "B": _Kind(
+        noun="a size",
+        example="512 MiB",
+        units={"GiB": Fraction(GIB), "MiB": Fraction(MIB), "KiB": Fraction(KIB), "B": Fraction(1)},
+        spellings={
+            **dict.fromkeys(("byte", "bytes"), "B"),
+            **dict.fromkeys(("k", "kb", "kilobytes"), "KiB"),
+            **dict.fromkeys(("m", "mb", "megabytes"), "MiB"),
+            **dict.fromkeys(("g", "gb", "gigabytes"), "GiB"),
+        },
+        usual=("MiB", "KiB"),
+        whole="bytes",
     ),
 }
 
@@ -78,10 +96,10 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         unit: The dimension wanted, named by its base unit.
 
     Returns:
-        Whole nanoseconds for `Unit("s")`, a float in hertz for `Unit("Hz")`; at least 0.
+        Whole nanoseconds for `Unit("s")`, whole bytes for `Unit("B")`, a float in hertz for `Unit("Hz")`; at least 0.
 
     Raises:
-        QuantityError: Not a number, no unit, an unknown unit, below zero, or a part of a nanosecond.
+        QuantityError: Not a number, no unit, an unknown unit, below zero, or a part of a nanosecond or byte.
     """
     kind = _KINDS[unit.symbol]
     found = _QUANTITY.fullmatch(text.strip())
@@ -91,10 +109,10 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         raise QuantityError(f"{kind.noun} of at least 0")
     factor = _factor(found["number"], found["unit"], unit.symbol)
     value = Fraction(found["number"].rstrip(".")) * factor
-    if unit.symbol != "s":
+    if not kind.whole:
         return _finite(value, kind)
     if value.denominator != 1:
-        raise QuantityError("a whole number of nanoseconds")
+        raise QuantityError(f"a whole number of {kind.whole}")
     return int(value)
 
 
@@ -131,15 +149,16 @@ def format_quantity(value: int | float, unit: Unit) -> str:
     """Return a quantity as `parse_quantity` reads it, with nothing lost.
 
     Args:
-        value: Nanoseconds for `Unit("s")`, hertz for `Unit("Hz")`; finite and at least 0.
+        value: Nanoseconds for `Unit("s")`, bytes for `Unit("B")`, hertz for `Unit("Hz")`; finite and at least 0.
         unit: The dimension, named by its base unit.
     """
-    if unit.symbol != "s":
+    kind = _KINDS[unit.symbol]
+    if not kind.whole:
         digits = format(Decimal(repr(float(value))), "f")
         return f"{digits.removesuffix('.0')} {unit.symbol}"
     if value == 0:
-        return "0 s"
-    name, count = next((n, int(value / f)) for n, f in _KINDS["s"].units.items() if int(value) % f == 0)
+        return f"0 {unit.symbol}"
+    name, count = next((n, int(value / f)) for n, f in kind.units.items() if int(value) % f == 0)
     return f"{count} {name}"
 
 
