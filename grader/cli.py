@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +15,17 @@ import click
 
 import grader
 from grader.model.errors import GraderError, HarnessError, RubricError
-from grader.model.report import Report
+from grader.options import (
+    ALL_MET,
+    EVIDENCE,
+    INTERRUPTED,
+    PATH,
+    UNDECIDED,
+    UNUSABLE,
+    exit_code,
+    parse_outputs,
+    parse_percent,
+)
 from grader.reports.delivery import Output, deliver, prepared
 from grader.reports.escape import encoded, shown
 from grader.reports.formats import FORMATS
@@ -24,17 +33,12 @@ from grader.reports.formats import FORMATS
 if TYPE_CHECKING:
     from grader.session import Progress
 
-ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
-
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
-#: What `-o` calls the folder of recordings that a report rests on.
-EVIDENCE = "evidence"
 # Stands for "no subcommand was named"; no argument of a process can hold a NUL.
 _EVERYDAY = "\0"
-_PATH = click.Path(path_type=Path)
 
 
 class CommandLine(click.Group):
@@ -75,36 +79,11 @@ class _Everyday(click.Command):
         return ctx.parent.get_help() if ctx.parent else super().get_help(ctx)
 
 
-def _parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
-    del ctx, param
-    return tuple(_parse_output(value) for value in values)
-
-
-def _parse_output(value: str) -> Output:
-    format_, equals, path = value.partition("=")
-    if not equals or not path:
-        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
-    if format_ not in (*FORMATS, EVIDENCE):
-        raise click.BadParameter(f"{format_!r} is no format{_nearest(format_, [*FORMATS, EVIDENCE])}")
-    if format_ == EVIDENCE and path == "-":
-        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
-    return Output(format_, None if path == "-" else Path(path))
-
-
-def _parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
-    del ctx, param
-    if value is None:
-        return None
-    if not 0 <= value <= 100:  # NaN loses
-        raise click.BadParameter(f"expected 0 to 100, found {value}")
-    return Fraction(str(value))
-
-
 @click.command(cls=_Everyday, epilog=_EPILOG)
 @click.argument("submission")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from the files' digest.")
-@click.option("--odom-bag", type=_PATH, help="Play this /odom recording, not the built-in one.")
+@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
 @click.option(
     "-o",
@@ -112,15 +91,15 @@ def _parse_percent(ctx: click.Context, param: click.Parameter, value: float | No
     "outputs",
     metavar="FORMAT=PATH",
     multiple=True,
-    callback=_parse_outputs,
+    callback=parse_outputs,
     help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
 )
-@click.option("--rubric", "rubrics", type=_PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
 @click.option(
     "--min-score",
     type=float,
     metavar="P",
-    callback=_parse_percent,
+    callback=parse_percent,
     help="Exit with 0 if the score is at least P percent.",
 )
 @click.option(
@@ -183,9 +162,9 @@ def _grade(  # noqa: PLR0913  one parameter an option
 
 
 @click.command(name="observe")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_PATH)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
-@click.option("--odom-bag", type=_PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
+@click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(["auto", "none"]), default="auto", help="As for grading.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
@@ -217,19 +196,6 @@ app.add_command(_observe)
 def main() -> None:
     """Run the command line of this process, and exit."""
     app(prog_name="grade")
-
-
-def exit_code(report: Report, min_score: Fraction | None) -> int:
-    """Return what the exit code says about a report.
-
-    Args:
-        report: The result.
-        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
-    """
-    if not report.final:
-        return UNDECIDED
-    reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score
-    return ALL_MET if reached else NOT_ALL_MET
 
 
 def _guarded(run: Callable[[], object]) -> int:
@@ -267,11 +233,6 @@ def _complain(*lines: str, hint: str) -> None:
 def _warn(*lines: str) -> None:
     for line in lines:
         click.echo(f"warning: {shown(line)}", err=True)
-
-
-def _nearest(found: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
-    return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
 
 
 def _say_nothing(step: str) -> None:

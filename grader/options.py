@@ -1,0 +1,65 @@
+"""What the commands of the command line share: exit codes, and how options are read."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import click
+
+from grader.model.report import Report
+from grader.reports.delivery import Output
+from grader.reports.formats import FORMATS
+
+ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
+#: What `-o` calls the folder of recordings that a report rests on.
+EVIDENCE = "evidence"
+PATH = click.Path(path_type=Path)
+
+
+def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
+    """Return what `-o FORMAT=PATH` asks for; for click."""
+    del ctx, param
+    return tuple(_parse_output(value) for value in values)
+
+
+def _parse_output(value: str) -> Output:
+    format_, equals, path = value.partition("=")
+    if not equals or not path:
+        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
+    if format_ not in (*FORMATS, EVIDENCE):
+        raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
+    if format_ == EVIDENCE and path == "-":
+        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
+    return Output(format_, None if path == "-" else Path(path))
+
+
+def parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
+    """Return what `--min-score P` asks for; for click."""
+    del ctx, param
+    if value is None:
+        return None
+    if not 0 <= value <= 100:  # NaN loses
+        raise click.BadParameter(f"expected 0 to 100, found {value}")
+    return Fraction(str(value))
+
+
+def exit_code(report: Report, min_score: Fraction | None) -> int:
+    """Return what the exit code says about a report.
+
+    Args:
+        report: The result.
+        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
+    """
+    if not report.final:
+        return UNDECIDED
+    reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score
+    return ALL_MET if reached else NOT_ALL_MET
+
+
+def nearest(found: str, known: Sequence[str]) -> str:
+    """Return the end of a sentence that names what was probably meant, or all there is."""
+    near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
+    return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
