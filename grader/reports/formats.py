@@ -37,6 +37,13 @@ def _markdown(report: Report, layout: Layout) -> str:
     return render_markdown(report)
 
 
+def _html(report: Report, layout: Layout) -> str:
+    from grader.reports.html.render import render_html  # noqa: PLC0415  as above
+
+    del layout
+    return render_html(report)
+
+
 def _junit(report: Report, layout: Layout) -> str:
     from grader.reports.junit import render_junit  # noqa: PLC0415  as above
 
@@ -102,6 +109,7 @@ def check_surroundings(format_: str) -> None:
 FORMATS: dict[str, Callable[[Report, Layout], str]] = {
     "json": _json,
     "text": _text,
+    "html": _html,
     "markdown": _markdown,
     "junit": _junit,
     "github": _github,

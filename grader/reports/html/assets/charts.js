@@ -1,0 +1,373 @@
+// Draws the figures of kind "chart". All text is already harmless, and it is only ever set as text.
+const Charts = (() => {
+  const colour = (tone) => `var(--c-${tone})`;
+  const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect" };
+  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER] = [52, 150, 210, 44, 26, 16, 44, 34];
+  const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
+
+  function number(value) {
+    return value === null || value === undefined ? "none" : String(Number(Number(value).toPrecision(6)));
+  }
+
+  function withUnit(value, unit) {
+    return unit ? `${number(value)} ${unit}` : number(value);
+  }
+
+  // Round ends and steps for an axis that shows everything from low to high.
+  function niceAxis(low, high) {
+    if (!(high > low)) {
+      const room = Math.max(Math.abs(low) * 0.2, 0.1);
+      [low, high] = [low - room, low + room];
+    }
+    const raw = (high - low) / 4;
+    const power = 10 ** Math.floor(Math.log10(raw));
+    const interval = [1, 2, 2.5, 5, 10].map((f) => f * power).find((step) => step >= raw * 0.999);
+    const room = (high - low) * 0.04;
+    return {
+      min: Math.floor((low - room) / interval) * interval,
+      max: Math.ceil((high + room) / interval) * interval,
+      interval,
+    };
+  }
+
+  function finite(values) {
+    return values.filter((value) => value !== null && Number.isFinite(value));
+  }
+
+  function extent(values) {
+    const known = finite(values);
+    return known.length ? [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))] : [0, 1];
+  }
+
+  function extentX(figure) {
+    const points = figure.panels.flatMap((panel) => panel.series.flatMap((series) => series.points));
+    const [low, high] = extent([...points.map((p) => p[0]), ...figure.moments.map((m) => m.x)]);
+    return figure.square ? [low, high] : [Math.min(0, low), high > 0 ? high : 1];
+  }
+
+  function extentY(panel) {
+    const values = panel.series.flatMap((series) => series.points.map((p) => p[1]));
+    return extent([...values, ...panel.bands.flatMap((b) => [b.low, b.high]), ...panel.levels.map((l) => l.value)]);
+  }
+
+  // Where each panel lies, from the top; heights in pixels.
+  function places(figure, width) {
+    let top = figure.moments.length ? MOMENTS : 0;
+    const rows = figure.panels.map((panel) => {
+      const lone = figure.panels.length === 1;
+      const height = panel.lanes.length ? panel.lanes.length * LANE : lone ? LONE_PANEL : PANEL;
+      top += panel.title ? HEADER : 8;
+      const place = { top, height };
+      top += height + 8;
+      return place;
+    });
+    return { rows, height: top + AXIS + (figure.square ? 0 : SLIDER), width: width - SIDE - 14 };
+  }
+
+  // Extents and height with which a metre is as long upwards as sideways.
+  function squared(figure, width) {
+    const inner = width - SIDE - 14;
+    const [x, y] = [extentX(figure), extentY(figure.panels[0])];
+    const [dx, dy] = [(x[1] - x[0]) * 1.12 || 1, (y[1] - y[0]) * 1.12 || 1];
+    const height = Math.round(Math.min(Math.max((inner * dy) / dx, 240), Math.max(240, Math.min(inner, 460))));
+    const perPixel = Math.max(dx / inner, dy / height);
+    const around = (ends, pixels) => {
+      const middle = (ends[0] + ends[1]) / 2;
+      return [middle - (perPixel * pixels) / 2, middle + (perPixel * pixels) / 2];
+    };
+    return { height, x: around(x, inner), y: around(y, height) };
+  }
+
+  function xAxis(figure, panel, index, ends) {
+    const last = index === figure.panels.length - 1;
+    return {
+      type: "value",
+      gridIndex: index,
+      min: ends[0],
+      max: ends[1],
+      name: last ? `${figure.x.title} (${figure.x.unit})` : "",
+      nameLocation: "middle",
+      nameGap: 26,
+      nameTextStyle: FONT,
+      axisLabel: { show: last, ...FONT, hideOverlap: true, showMinLabel: !figure.square, showMaxLabel: false, formatter: number },
+      axisLine: { show: true, onZero: false, lineStyle: { color: colour("axis") } },
+      axisTick: { show: last, lineStyle: { color: colour("axis") } },
+      splitLine: { show: !panel.grid, lineStyle: { color: colour("grid") } },
+      axisPointer: { label: { show: false } },
+    };
+  }
+
+  function yAxis(panel, index, ends) {
+    const shared = {
+      gridIndex: index,
+      name: panel.unit ? `${panel.title} (${panel.unit})` : panel.title,
+      nameLocation: "end",
+      nameGap: 8,
+      nameTextStyle: { ...FONT, align: "left", padding: [0, 0, 0, -SIDE + 8], fontWeight: 600 },
+      axisLine: { show: false },
+      axisTick: { show: false },
+      axisPointer: { show: false },
+      splitLine: { show: true, lineStyle: { color: colour("grid") } },
+    };
+    if (panel.lanes.length) {
+      // The axis starts at the bottom, rows at the top; its name must stay above either way.
+      const label = { ...FONT, inside: true, margin: 4, verticalAlign: "bottom", padding: [0, 0, 6, 0] };
+      const data = [...panel.lanes].reverse();
+      return { ...shared, type: "category", data, axisLabel: label, z: 4 };
+    }
+    const round = ends ? { min: ends[0], max: ends[1] } : niceAxis(...extentY(panel));
+    return { ...shared, type: "value", ...round, axisLabel: { ...FONT, formatter: number } };
+  }
+
+  function row(panel, y) {
+    return panel.lanes.length && y !== null ? panel.lanes.length - 1 - y : y;
+  }
+
+  function seriesOption(panel, index, series) {
+    const data = series.points.map(([x, y]) => [x, row(panel, y)]);
+    const tone = colour(series.tone);
+    const common = {
+      name: series.name,
+      data,
+      xAxisIndex: index,
+      yAxisIndex: index,
+      animation: false,
+      emphasis: { disabled: true },
+      itemStyle: { color: tone, opacity: 0.9 },
+      symbol: SYMBOLS[series.tone] || "circle",
+      z: series.tone === "faint" ? 2 : 3,
+    };
+    if (series.look === "dots") {
+      const size = data.length > 250 ? 4 : panel.lanes.length ? 9 : 7;
+      return { ...common, type: "scatter", symbolSize: series.tone === "bad" ? size + 3 : size };
+    }
+    return {
+      ...common,
+      type: "line",
+      step: series.look === "step" ? "end" : false,
+      showSymbol: data.length < 70 && series.tone !== "faint",
+      symbolSize: 5,
+      lineStyle: { color: tone, width: series.tone === "faint" ? 3 : 2, type: "solid" },
+    };
+  }
+
+  function gridLines(panel, ends) {
+    const [first, distance] = panel.grid;
+    const lines = [];
+    for (let x = first; x <= ends[1] && lines.length < 500; x += distance) {
+      lines.push({ xAxis: x, label: { show: false }, lineStyle: { color: colour("axis"), type: "solid", width: 1, opacity: 0.55 } });
+    }
+    return lines;
+  }
+
+  // Bands, thresholds and moments: what is drawn behind the points.
+  function background(figure, panel, index, ends) {
+    const label = { ...FONT, fontSize: 11 };
+    const levels = panel.levels.map((level) => ({
+      yAxis: level.value,
+      lineStyle: { color: colour("third"), type: "dashed", width: 1.5 },
+      label: { ...label, show: true, position: "insideEndTop", formatter: () => level.label },
+    }));
+    const moments = figure.moments.map((moment) => ({
+      xAxis: moment.x,
+      lineStyle: { color: colour(moment.tone), type: "dotted", width: 1.5 },
+      label: { ...label, show: index === 0, position: "end", distance: panel.title ? 18 : 2, formatter: () => moment.label,
+        align: moment.x > ends[0] + (ends[1] - ends[0]) * 0.9 ? "right" : "center" },
+    }));
+    const grid = panel.grid ? gridLines(panel, ends) : [];
+    const bands = panel.bands.map((band) => [
+      {
+        yAxis: band.low,
+        itemStyle: { color: colour(band.tone), opacity: 0.14 },
+        label: { ...label, show: true, position: "insideTopRight", formatter: () => band.label },
+      },
+      { yAxis: band.high },
+    ]);
+    return {
+      type: "line",
+      name: "",
+      data: [],
+      xAxisIndex: index,
+      yAxisIndex: index,
+      silent: true,
+      animation: false,
+      markLine: { silent: true, symbol: "none", animation: false, data: [...grid, ...levels, ...moments] },
+      markArea: { silent: true, animation: false, data: bands },
+    };
+  }
+
+  function tooltip(figure, known, said) {
+    return (params) => {
+      const list = (Array.isArray(params) ? params : [params]).filter((p) => known[p.seriesIndex]);
+      const box = document.createElement("div");
+      box.className = "tip";
+      if (!list.length) return box;
+      const add = (parent, tag, text, name) => {
+        const element = parent.appendChild(document.createElement(tag));
+        element.textContent = text;
+        if (name) element.className = name;
+        return element;
+      };
+      const head = figure.square ? "" : `${figure.x.title} ${withUnit(list[0].data[0], figure.x.unit)}`;
+      if (head) add(box, "b", head);
+      const words = [head];
+      for (const one of list.slice(0, 8)) {
+        const { panel, series } = known[one.seriesIndex];
+        const line = add(box, "div", "", "row");
+        add(line, "i", "").style.background = colour(series.tone);
+        const value = figure.square
+          ? `(${number(one.data[0])}, ${number(one.data[1])}) ${figure.x.unit}`
+          : panel.lanes.length ? "" : withUnit(one.data[1], panel.unit);
+        add(line, "span", value ? `${series.name}: ${value}` : series.name);
+        const text = series.texts[one.dataIndex] || "";
+        if (text) add(box, "div", text, "text");
+        words.push(`${series.name} ${value} ${text}`.trim());
+      }
+      said(words.filter(Boolean).join("; "));
+      return box;
+    };
+  }
+
+  function zooms(figure, count, window) {
+    const all = [...Array(count).keys()];
+    const inside = {
+      type: "inside",
+      xAxisIndex: all,
+      filterMode: "none",
+      zoomOnMouseWheel: "ctrl",
+      moveOnMouseWheel: false,
+      preventDefaultMouseMove: false,
+      ...window,
+    };
+    if (figure.square) return [inside, { ...inside, xAxisIndex: undefined, yAxisIndex: all }];
+    const slider = {
+      type: "slider",
+      xAxisIndex: all,
+      filterMode: "none",
+      height: 14,
+      bottom: 6,
+      left: SIDE,
+      right: 14,
+      showDetail: false,
+      showDataShadow: false,
+      brushSelect: false,
+      borderColor: colour("grid"),
+      fillerColor: "var(--accent-wash)",
+      backgroundColor: "transparent",
+      handleStyle: { color: "var(--card)", borderColor: colour("main") },
+      moveHandleStyle: { color: colour("faint"), opacity: 0.5 },
+      handleSize: 16,
+      moveHandleSize: 4,
+      ...window,
+    };
+    return [inside, slider];
+  }
+
+  function option(figure, width, window, said) {
+    const square = figure.square ? squared(figure, width) : null;
+    const place = places(figure, width);
+    if (square) {
+      place.height += square.height - place.rows[0].height;
+      place.rows[0].height = square.height;
+    }
+    const ends = square ? square.x : extentX(figure);
+    const series = [];
+    const known = {};
+    figure.panels.forEach((panel, index) => {
+      series.push(background(figure, panel, index, ends));
+      for (const one of panel.series) {
+        known[series.length] = { panel, series: one };
+        series.push(seriesOption(panel, index, one));
+      }
+    });
+    return {
+      height: place.height,
+      known,
+      option: {
+        animation: false,
+        textStyle: { fontFamily: "inherit" },
+        grid: place.rows.map((r) => ({ left: SIDE, right: 14, top: r.top, height: r.height, outerBoundsMode: "none" })),
+        xAxis: figure.panels.map((panel, index) => xAxis(figure, panel, index, ends)),
+        yAxis: figure.panels.map((panel, index) => yAxis(panel, index, square && square.y)),
+        axisPointer: { link: [{ xAxisIndex: "all" }], lineStyle: { color: colour("axis") } },
+        dataZoom: zooms(figure, figure.panels.length, window),
+        tooltip: {
+          trigger: figure.square ? "item" : "axis",
+          confine: true,
+          transitionDuration: 0,
+          backgroundColor: "var(--card)",
+          borderColor: "var(--line)",
+          textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
+          formatter: tooltip(figure, known, said),
+        },
+        series,
+      },
+    };
+  }
+
+  // Draws a figure into an element; returns what the page's buttons and keys do with it.
+  function draw(element, figure, said) {
+    let chart = null;
+    let known = {};
+    let cursor = null;
+
+    function paint(width) {
+      const window = chart ? shown() : { start: 0, end: 100 };
+      const made = option(figure, width, window, said);
+      known = made.known;
+      element.style.height = `${made.height}px`;
+      const size = { width, height: made.height };
+      if (chart) chart.resize(size);
+      else chart = echarts.init(element, null, { renderer: "svg", ...size });
+      chart.setOption(made.option, { notMerge: true });
+      const picture = element.querySelector("svg");
+      if (picture) picture.setAttribute("aria-hidden", "true");
+    }
+
+    function shown() {
+      const { start, end } = chart.getOption().dataZoom[0];
+      return { start, end };
+    }
+
+    function show(start, end) {
+      const span = Math.min(Math.max(end - start, 0.5), 100);
+      const first = Math.min(Math.max(start, 0), 100 - span);
+      chart.getOption().dataZoom.forEach((_, index) => {
+        chart.dispatchAction({ type: "dataZoom", dataZoomIndex: index, start: first, end: first + span });
+      });
+    }
+
+    function zoom(factor) {
+      const { start, end } = shown();
+      const [middle, half] = [(start + end) / 2, ((end - start) * factor) / 2];
+      show(middle - half, middle + half);
+    }
+
+    function pan(share) {
+      const { start, end } = shown();
+      const way = (end - start) * share;
+      show(start + way, end + way);
+    }
+
+    // Goes to the next or the previous point of the row with the most to say.
+    function step(way) {
+      const rows = Object.entries(known).filter(([, { series }]) => series.points.length);
+      if (!rows.length) return;
+      rows.sort(([, a], [, b]) => (a.series.tone === "faint") - (b.series.tone === "faint"));
+      const [index, { series }] = rows[0];
+      const count = series.points.length;
+      cursor = cursor === null ? (way > 0 ? 0 : count - 1) : Math.min(Math.max(cursor + way, 0), count - 1);
+      chart.dispatchAction({ type: "showTip", seriesIndex: Number(index), dataIndex: cursor });
+    }
+
+    function hide() {
+      cursor = null;
+      chart.dispatchAction({ type: "hideTip" });
+    }
+
+    paint(element.clientWidth || 640);
+    return { zoom, pan, step, hide, paint, reset: () => show(0, 100), width: () => element.clientWidth };
+  }
+
+  return { draw, number, withUnit, colour, SYMBOLS };
+})();
