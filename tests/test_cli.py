@@ -38,7 +38,7 @@ class Session:
         self.requests = []
         self.result = a_report()
 
-    def grade(self, request, progress, hear=None):
+    def grade(self, request, progress, hear=None, early=None):
         self.requests.append(request)
         progress("exercise 1: alone")
         if isinstance(self.result, BaseException):
@@ -305,7 +305,7 @@ import sys
 sys.path.insert(0, {folder!r})
 from test_cli import a_report
 from grader import cli, session
-def grade(request, progress, hear=None):
+def grade(request, progress, hear=None, early=None):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from grader.judging.figures.pictures import illustrated
 from grader.judging.judge import judge_exercise
+from grader.judging.pending import not_graded_yet
 from grader.model.exercise import Exercise
 from grader.model.report import ExerciseReport, Report
 from grader.model.run import Run
 from grader.model.trace import Trace
 
 
-def judge_run(exercises: Sequence[Exercise], run: Run, *, pictures: bool = True) -> Report:
+def judge_run(
+    exercises: Sequence[Exercise], run: Run, *, pictures: bool = True, pending: Collection[str] = ()
+) -> Report:
     """Return the report of a run; pure, so the same run and the same exercises give the same report.
 
     Args:
         exercises: What is asked, in the order of the report.
         run: What was recorded for them.
         pictures: Whether to draw figures as well, which takes about as long as judging and only some formats show.
+        pending: Ids of the exercises that are still being recorded; the report is then a partial one.
     """
     return Report(
         name=run.submission.name,
@@ -26,10 +30,14 @@ def judge_run(exercises: Sequence[Exercise], run: Run, *, pictures: bool = True)
         digest=run.submission.digest,
         environment=run.environment,
         seed=run.seed,
-        exercises=tuple(_judged(exercise, run, pictures=pictures) for exercise in exercises),
+        exercises=tuple(
+            not_graded_yet(exercise) if exercise.id in pending else _judged(exercise, run, pictures=pictures)
+            for exercise in exercises
+        ),
         duration_s=run.duration_s,
         notes=run.notes,
         reproduce=run.reproduce,
+        pending=tuple(exercise.id for exercise in exercises if exercise.id in pending),
     )
 
 

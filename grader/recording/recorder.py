@@ -154,8 +154,13 @@ class Recorder:
 
     def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
         """Record every job and return the traces in the same order."""
+        return list(self.each(jobs, progress))
+
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        """Record every job and yield the traces in the same order, each as soon as those before it are there."""
         futures = [self._pool.submit(self._record, job, progress) for job in jobs]
-        return [future.result() for future in futures]
+        for future in futures:
+            yield future.result()
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
         progress(job.title)
