@@ -26,7 +26,7 @@ from grader.options import (
     parse_outputs,
     parse_percent,
 )
-from grader.reports.delivery import Output, deliver, prepared
+from grader.reports.delivery import Output, deliver, early_delivery, prepared
 from grader.reports.escape import encoded, shown
 from grader.reports.formats import FORMATS
 
@@ -151,7 +151,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     keeper = keeping.Keeper(folders, request)
     with _progress(wanted=not no_progress) as progress:
-        report = session.grade(request, progress, keeper.hear)
+        report = session.grade(request, progress, keeper.hear, early_delivery(wanted))
     if isolation == "auto" and report.environment.isolation == NO_ISOLATION:
         _warn(*report.notes[-1:])
     if report.environment.ros_distro not in session.TRIED_ON:

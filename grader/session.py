@@ -6,11 +6,12 @@ import difflib
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 import grader
+from grader.early import EarlyReports
 from grader.judging.whole import judge_run
 from grader.model.errors import RubricError
 from grader.model.exercise import Exercise
@@ -23,7 +24,6 @@ from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_submission
 from grader.recording.bag import Odometry, read_odometry
-from grader.recording.isolation.protocol import Isolation
 from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job
 from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
@@ -44,7 +44,7 @@ class Request:
         seed: Seed of every drawn value; None derives it from the submission.
         odom_bag: An /odom recording to play instead of the project's own.
         clock: `virtual`, `wall` or `auto`.
-        isolation: `auto` or `none`.
+        isolation: `auto`, `none` or the name of a tier.
     """
 
     submission: str
@@ -65,7 +65,10 @@ class Progress(Protocol):
 
 
 def grade(
-    request: Request, progress: Progress, hear: Callable[[Run, Sequence[Exercise]], None] | None = None
+    request: Request,
+    progress: Progress,
+    hear: Callable[[Run, Sequence[Exercise]], None] | None = None,
+    early: Callable[[Report], None] | None = None,
 ) -> Report:
     """Grade one submission.
 
@@ -73,6 +76,7 @@ def grade(
         request: What is to be graded, and how.
         progress: Hears which step begins.
         hear: Hears what was recorded, and for which exercises.
+        early: Hears a partial report whenever an exercise is done and others are not.
 
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
@@ -89,14 +93,17 @@ def grade(
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
         run = Run(
             submission=submission,
-            traces=studio.record(jobs, request.clock, progress),
+            traces={},
             sources=read_sources(submission),
             environment=_environment(studio),
             seed=seed,
             duration_s=time.perf_counter() - started,
-            notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio.isolation)),
+            notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio)),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
+        take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
+        traces = studio.record(jobs, request.clock, progress, take)
+        run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if hear is not None:
             hear(run, exercises)
         return judge_run(exercises, run)
@@ -150,12 +157,12 @@ def _release_notes(distro: str) -> tuple[str, ...]:
     return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED_ON)}",)
 
 
-def _isolation_notes(isolation: Isolation) -> tuple[str, ...]:
-    """Say that the submission ran without walls, and why."""
-    if isolation.name != NO_ISOLATION:
-        return ()
-    why = getattr(isolation, "why", "")
-    return (f"the submission ran without a sandbox: {why or 'as asked'}",)
+def _isolation_notes(studio: Studio) -> tuple[str, ...]:
+    """Say that the submission ran without walls, or what its sandbox does not hold back."""
+    if studio.isolation.name == NO_ISOLATION:
+        return ("the submission ran without a sandbox: as asked",)
+    open_ones = [str(found) for found in studio.containment if not found.holds]
+    return (f"sandbox {studio.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
 
 
 def _environment(studio: Studio) -> Environment:
@@ -166,4 +173,5 @@ def _environment(studio: Studio) -> Environment:
         rmw="rmw_fastrtps_cpp",
         python=platform.python_version(),
         isolation=studio.isolation.name,
+        containment=studio.containment,
     )

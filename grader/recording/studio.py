@@ -43,7 +43,13 @@ class Studio:
     recorder: Recorder
     folder: Path
 
-    def record(self, jobs: Mapping[Key, Job], clock: str, progress: Callable[[str], None]) -> dict[Key, Trace]:
+    def record(
+        self,
+        jobs: Mapping[Key, Job],
+        clock: str,
+        progress: Callable[[str], None],
+        finished: Callable[[Key, Trace], None] | None = None,
+    ) -> dict[Key, Trace]:
         """Record jobs and return their traces.
 
         Under `auto`, what virtual time does no justice to is recorded again on the wall clock, one at a time: side by
@@ -53,15 +59,26 @@ class Studio:
             jobs: Planned on the virtual clock, or on the wall clock for `wall`.
             clock: `virtual`, `wall` or `auto`.
             progress: Hears which job begins.
+            finished: Hears each trace as soon as nothing will replace it, while others are still being recorded.
         """
         first = [replace(job, plan=replace(job.plan, stop_when_unfit=clock == AUTO)) for job in jobs.values()]
-        traces = dict(zip(jobs, self.recorder.record(first, progress), strict=True))
-        for key, trace in traces.items():
-            if clock == AUTO and trace.clock_reason and not trace.harness_problem:
-                again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL))
-                repeated = self.recorder.record([again], progress)[0]
-                traces[key] = replace(repeated, clock_reason=trace.clock_reason)
+        traces: dict[Key, Trace] = {}
+        for key, trace in zip(jobs, self.recorder.each(first, progress), strict=True):
+            traces[key] = trace
+            if finished is not None and not _unfit(trace, clock):
+                finished(key, trace)
+        for key in [key for key, trace in traces.items() if _unfit(trace, clock)]:
+            again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL))
+            repeated = self.recorder.record([again], progress)[0]
+            traces[key] = replace(repeated, clock_reason=traces[key].clock_reason)
+            if finished is not None:
+                finished(key, traces[key])
         return traces
+
+
+def _unfit(trace: Trace, clock: str) -> bool:
+    """Whether a first recording has to be repeated on the wall clock."""
+    return clock == AUTO and bool(trace.clock_reason) and not trace.harness_problem
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,14 +62,18 @@ def deliver(report: Report, outputs: Sequence[Output]) -> None:
         raise problems[0]
 
 
-def deliver_early(report: Report, outputs: Sequence[Output]) -> None:
-    """Write a partial report to the files whose platform may end this run at any time.
+def early_delivery(outputs: Sequence[Output]) -> Callable[[Report], None] | None:
+    """Return what writes partial reports to the files whose platform may end this run at any time; None without any.
 
-    One that cannot be written is passed over: the whole report will say why.
+    A report that cannot be written is passed over: the whole one will say why.
     """
     files = [output for output in outputs if output.path is not None and output.format in WRITTEN_EARLY]
-    with suppress(GraderError):
-        deliver(report, files)
+
+    def write(report: Report) -> None:
+        with suppress(GraderError):
+            deliver(report, files)
+
+    return write if files else None
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:
