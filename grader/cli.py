@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import grader
+from grader.commands import rejudge
+from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
     ALL_MET,
@@ -37,6 +39,7 @@ _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
+_TIERS = ("auto", *TIERS)
 # Stands for "no subcommand was named"; no argument of a process can hold a NUL.
 _EVERYDAY = "\0"
 
@@ -110,9 +113,9 @@ class _Everyday(click.Command):
 )
 @click.option(
     "--isolation",
-    type=click.Choice(["auto", "none"]),
+    type=click.Choice(_TIERS),
     default="auto",
-    help="auto: the best sandbox that works here; none: run the student's code without one.",
+    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
@@ -130,14 +133,13 @@ def _grade(  # noqa: PLR0913  one parameter an option
     isolation: str,
     no_progress: bool,
 ) -> int:
-    """Grade a SUBMISSION, a folder or a .py file, and explain the score.
+    """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
 
     A folder with the name of a command is graded as ./NAME.
     """
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     from grader import keeping, session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
-    from grader.recording.studio import NO_ISOLATION  # noqa: PLC0415
 
     request = session.Request(
         submission=submission,
@@ -152,8 +154,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
     keeper = keeping.Keeper(folders, request)
     with _progress(wanted=not no_progress) as progress:
         report = session.grade(request, progress, keeper.hear, early_delivery(wanted))
-    if isolation == "auto" and report.environment.isolation == NO_ISOLATION:
-        _warn(*report.notes[-1:])
+    for found in missing(report.environment.containment):
+        _warn(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in session.TRIED_ON:
         _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted)
@@ -166,7 +168,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
 @click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
-@click.option("--isolation", type=click.Choice(["auto", "none"]), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(_TIERS), default="auto", help="As for grading.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
 def _observe(  # noqa: PLR0913  one parameter an option
     *, files: tuple[Path, ...], duration: float, odom_bag: Path | None, clock: str, isolation: str, as_json: bool
@@ -191,6 +193,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
 _grade.context_settings = app.context_settings
 app.add_command(_observe)
+app.add_command(rejudge.command)
 
 
 def main() -> None:

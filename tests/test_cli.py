@@ -148,7 +148,7 @@ def test_a_dash_prints_that_format_instead(run_session, tmp_path):
         (("ada", "--seed", "-1"), "x>=0", "grade --help"),
         (("ada", "--seed", "many"), "'many' is not a valid integer", "grade --help"),
         (("ada", "--clock", "sundial"), "'sundial' is not one of", "grade --help"),
-        (("ada", "--isolation", "bubblewrap"), "'bubblewrap' is not one of", "grade --help"),
+        (("ada", "--isolation", "docker"), "'docker' is not one of", "grade --help"),
         (("ada", "--min-score", "101"), "expected 0 to 100, found 101", "grade --help"),
         (("ada", "--min-score", "nan"), "expected 0 to 100, found nan", "grade --help"),
         (("ada", "-o", "json"), "expected FORMAT=PATH, found 'json'", "grade --help"),
@@ -257,7 +257,13 @@ def test_help_names_every_option_and_the_exit_codes(run_session):
     text = grade("--help").stdout
     for word in ("--exercise ID", "--seed N", "--odom-bag", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
         assert word in text
-    for word in ("--clock [virtual|wall|auto]", "--isolation [auto|none]", "--no-progress", "--version", "130"):
+    for word in (
+        "--clock [virtual|wall|auto]",
+        "--isolation [auto|bubblewrap-root|",
+        "--no-progress",
+        "--version",
+        "130",
+    ):
         assert word in text
     assert grade("-h").stdout == grade("ada", "--help").stdout == text
 

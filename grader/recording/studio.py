@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from grader.model.containment import Property
 from grader.model.trace import Trace
 from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.choose import choose_isolation
@@ -34,12 +35,14 @@ class Studio:
     Attributes:
         ros: The ROS installation that nodes run on.
         isolation: The sandbox tier.
+        containment: What it was seen to hold back; empty without walls.
         recorder: Its workers.
         folder: A folder of its own, gone afterwards.
     """
 
     ros: RosInstallation
     isolation: Isolation
+    containment: tuple[Property, ...]
     recorder: Recorder
     folder: Path
 
@@ -92,7 +95,8 @@ def open_studio(isolation: str) -> Iterator[Studio]:
         EnvironmentFault: This machine lacks ROS or the tier asked for.
     """
     ros = find_ros()
-    tier = choose_isolation(isolation, ros)
+    choice = choose_isolation(isolation, ros)
+    tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
     workers = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     with tempfile.TemporaryDirectory(prefix="grade-") as name:
@@ -100,7 +104,7 @@ def open_studio(isolation: str) -> Iterator[Studio]:
         folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
             recorder.warm_up(1)
-            yield Studio(ros, tier, recorder, folder)
+            yield Studio(ros, tier, choice.containment, recorder, folder)
 
 
 def planned_clock(clock: str) -> str:

@@ -15,6 +15,7 @@ from grader.recording.isolation import seccomp
 from grader.recording.isolation.environment import student_environment
 from grader.recording.isolation.exposure import STUDENT_GROUP, make_readable, secrets_within, some_user
 from grader.recording.isolation.protocol import Command, Limits, StudentProcess
+from grader.recording.isolation.remedies import install_command
 from grader.recording.isolation.view import parents_of, view_of
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
@@ -22,7 +23,6 @@ SUBMISSION = Path("/submission")
 HOST = Path("/grader_host/host")
 HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmpfs
 SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
-INSTALL_HINT = "sudo apt install bubblewrap"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +52,12 @@ class Bubblewrap:
         """
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
-        bwrap = _program("bwrap", INSTALL_HINT)
+        bwrap = _program("bwrap", install_command("bubblewrap"))
         told = subprocess.run([bwrap, "--help"], capture_output=True, check=False, env={}, timeout=10)
         return cls(
             bwrap=bwrap,
-            prlimit=_program("prlimit", "sudo apt install util-linux"),
-            setpriv=_program("setpriv", "sudo apt install util-linux"),
+            prlimit=_program("prlimit", install_command("util-linux")),
+            setpriv=_program("setpriv", install_command("util-linux")),
             as_root=os.geteuid() == 0,
             can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
         )

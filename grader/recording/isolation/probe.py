@@ -1,108 +1,277 @@
-"""Runs inside a sandbox and says which of its walls hold: prints a JSON object of property to true or false.
+"""Runs as a student's process inside a sandbox, tries what must fail and what must work, and says what it achieved.
 
-Usage: python -c SOURCE JSON, with an object of `hidden`, files that must not be readable; `readable`, files that must
-be; and `submission`. The source travels on the command line, since nothing of grader can be seen from inside.
+Usage: python -c SOURCE JSON; the object is that of `trial.probe_command`. Prints one JSON line, an object of property
+to what was achieved against it, empty if nothing was; then tries to outgrow its scratch folder, and prints `outgrown`
+if it could. The source travels on the command line, since nothing of grader can be seen from inside.
 """
 
-# Every run of the grader waits for it, and pathlib would be half of its imports.
+# Every run of the grader may wait for it, and pathlib would be half of its imports.
 # ruff: noqa: PTH108, PTH112, PTH118, PTH120, PTH123, PTH208
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import json
+import mmap
 import os
+import resource
+import select
+import signal
 import socket
 import sys
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 AF_VSOCK = 40
-CAPABILITIES = ("CapEff", "CapPrm", "CapInh", "CapBnd", "CapAmb")
+READ_SEARCH_ONLY = 1 << 2  # CAP_DAC_READ_SEARCH: to enter folders that are closed to the student's user
+PATIENCE_S = 0.2
+MARK = (4711, 4711)
 
 
 def main(request: dict[str, Any]) -> None:
-    """Try what must fail and what must work."""
-    holds = {
-        "hides files": not any(readable(path) for path in request["hidden"]),
-        "shows what ROS needs": all(readable(path) for path in request["readable"]),
-        "has only lo as its network": [name for _, name in socket.if_nameindex()] == ["lo"],
-        "reaches itself over lo": echo(),
-        "forbids writing": not any(writable(folder) for folder in folders(request["submission"])),
-        "allows scratch files": writable("/tmp") and writable("/dev/shm"),  # noqa: S108
-        "hides processes": {name for name in os.listdir("/proc") if name.isdigit()} <= {"1", str(os.getpid())},
-        # bubblewrap adds PWD to what it starts, and here the outer one starts the inner one.
-        "hides the environment outside": content("/proc/1/environ") in (b"", b"PWD=/\0"),
-        "has no privileges": os.getuid() != 0 and {status(name) for name in CAPABILITIES} == {"0" * 16},
-        "filters system calls": status("Seccomp") == "2" and status("NoNewPrivs") == "1" and not opens_vsock(),
-    }
-    print(json.dumps(holds))  # noqa: T201 -- the answer
+    """Try everything and report."""
+    achieved = {name: list(attempt(request)) for name, attempt in ATTEMPTS.items()}
+    exchange()
+    print(json.dumps(achieved), flush=True)  # noqa: T201 -- the answer
+    if outgrows(request["scratch"]):
+        print("outgrown", flush=True)  # noqa: T201
 
 
-def readable(path: str) -> bool:
-    """Return whether a file or folder can be read."""
+def works(attempt: Callable[..., Any], *arguments: Any) -> bool:
+    """Return whether an attempt is not refused."""
     try:
-        if os.path.isdir(path):
-            os.listdir(path)
-        else:
-            with open(path, "rb"):
-                pass
-    except OSError:
+        attempt(*arguments)
+    except (OSError, ValueError, OverflowError):
         return False
     return True
 
 
-def writable(folder: str) -> bool:
-    """Return whether a file can be made in a folder."""
-    path = os.path.join(folder, ".probe")
+# --- files ---
+
+
+def reads(request: dict[str, Any]) -> Iterator[str]:
+    """Open what is hidden."""
+    for path in request["hidden"]:
+        if works(os.listdir if os.path.isdir(path) else read, path):
+            yield f"read {path}"
+
+
+def writes(request: dict[str, Any]) -> Iterator[str]:
+    """Make, empty and change files outside the scratch folders, mount something, or have a privilege that would."""
+    for folder in (*request["closed"], os.path.dirname(os.__file__), os.path.dirname(sys.executable)):
+        path = os.path.join(folder, ".probe")
+        if works(make, path):
+            os.unlink(path)
+            yield f"wrote to {folder}"
+    for path in request["files"]:
+        for what, attempt, arguments in (
+            ("opened", os.open, (path, os.O_WRONLY)),
+            ("emptied", os.truncate, (path, 0)),
+            ("emptied", os.open, (path, os.O_RDONLY | os.O_TRUNC)),
+            ("changed the mode of", os.chmod, (path, 0o600)),
+        ):
+            if works(attempt, *arguments):
+                yield f"{what} {path}"
+    if ctypes.CDLL(None).mount(b"none", b"/tmp", b"tmpfs", 0, None) == 0:
+        yield "mounted a file system"
+    if os.getuid() == 0 or (status("CapEff") | status("CapPrm")) & ~READ_SEARCH_ONLY:
+        yield "has privileges"
+
+
+def read(path: str) -> None:
+    """Open a file to read it."""
+    with open(path, "rb"):
+        pass
+
+
+def make(path: str) -> None:
+    """Make a file."""
+    with open(path, "xb"):
+        pass
+
+
+def status(name: str) -> int:
+    """Return a hexadecimal entry of /proc/self/status."""
+    with open("/proc/self/status", encoding="ascii", errors="replace") as lines:
+        return next((int(line.split()[1], 16) for line in lines if line.startswith(name + ":")), 0)
+
+
+def outgrows(size: int) -> bool:
+    """Write more than the scratch folder may hold, in several files; whoever is ended meanwhile does not return."""
+    block = bytes(1 << 20)
     try:
-        with open(path, "xb"):
-            pass
-        os.unlink(path)
+        for number in range(2 * (size >> 20)):
+            with open(f"scratch-{number}", "wb") as file:
+                file.write(block)
     except OSError:
         return False
+    time.sleep(PATIENCE_S)
     return True
 
 
-def folders(submission: str) -> list[str]:
-    """Return folders that nobody may write to."""
-    own = [os.path.dirname(path) for path in (os.__file__, sys.executable)]
-    return ["/", "/dev", "/etc", "/usr/lib", "/proc", submission, os.path.dirname(submission), *own]
+# --- processes ---
 
 
-def content(path: str) -> bytes:
-    """Return what a file holds, nothing if it cannot be read."""
+def others(request: dict[str, Any]) -> set[int]:
+    """Return the numbers that other processes may have."""
+    seen = set()
+    with contextlib.suppress(OSError):
+        seen = {int(name) for name in os.listdir("/proc") if name.isdigit()}
+    return {number for number in seen | {1, os.getppid(), request["worker"]} if number not in (0, os.getpid())}
+
+
+def sees(request: dict[str, Any]) -> Iterator[str]:
+    """Find the worker's secret, which its command line and environment hold."""
+    secret = "".join(request["secret"]).encode()
+    for process in sorted(others(request)):
+        for name in ("cmdline", "environ"):
+            with contextlib.suppress(OSError), open(f"/proc/{process}/{name}", "rb") as file:
+                if secret in file.read():
+                    yield f"read /proc/{process}/{name}"
+
+
+def disturbs(request: dict[str, Any]) -> Iterator[str]:
+    """Aim at the worker; it says itself whether anything arrived."""
+    worker = request["worker"]
+    if worker == os.getpid():
+        return
+    for what, attempt, arguments in (
+        ("signalled", os.kill, (worker, signal.SIGUSR1)),
+        ("limited", resource.prlimit, (worker, resource.RLIMIT_MSGQUEUE, MARK)),
+        ("opened", os.pidfd_open, (worker,)),
+    ):
+        if works(attempt, *arguments):
+            yield f"{what} the worker"
+    works(os.setpriority, os.PRIO_PROCESS, worker, 15)
+    works(os.sched_setaffinity, worker, {max(os.sched_getaffinity(0))})
+
+
+# --- network and memory that is shared ---
+
+
+def leaves(request: dict[str, Any]) -> Iterator[str]:
+    """Reach an address of this machine from outside, or find a way to another one."""
+    for host, port in request["sinks"]:
+        for name, kind in (("TCP", socket.SOCK_STREAM), ("UDP", socket.SOCK_DGRAM)):
+            if works(send, host, port, kind):
+                yield f"{name} to {host}"
+    for family, host in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
+        # Connecting a datagram socket asks for a route and sends nothing.
+        if works(send, host, 9, socket.SOCK_DGRAM, family, b""):
+            yield f"a route to {host}"
+
+
+def send(
+    host: str, port: int, kind: socket.SocketKind, family: socket.AddressFamily = socket.AF_INET, text: bytes = b"probe"
+) -> None:
+    """Connect to an address and send something there."""
+    with socket.socket(family, kind) as there:
+        there.settimeout(PATIENCE_S)
+        there.connect((host, port))
+        if text:
+            there.send(text)
+
+
+def calls_out(request: dict[str, Any]) -> Iterator[str]:
+    """Send to what listens on the loopback address outside, which says itself whether anything arrived."""
+    works(send, "127.0.0.1", request["loopback"], socket.SOCK_DGRAM)
+    return iter(())
+
+
+def opens_vsock(request: dict[str, Any]) -> Iterator[str]:
+    """Open a socket to the machine's hypervisor; no network namespace holds it back."""
+    del request
+    if works(socket.socket, AF_VSOCK, socket.SOCK_STREAM):
+        yield "opened AF_VSOCK"
+
+
+def shares(request: dict[str, Any]) -> Iterator[str]:
+    """Open segments of shared memory that others made, or make one that outlives this process."""
+    for path in request["segments"]:
+        if works(os.open, path, os.O_RDWR):
+            yield f"opened {path}"
+    segment = ctypes.CDLL(None).shmget(0, 4096, 0o1600)
+    if segment >= 0:
+        ctypes.CDLL(None).shmctl(segment, 0, None)
+        yield "made a System V segment"
+
+
+# --- limits ---
+
+
+def raises(which: int) -> bool:
+    """Return whether a limit is missing or can be raised."""
+    _, most = resource.getrlimit(which)
+    return most == resource.RLIM_INFINITY or works(resource.setrlimit, which, (most + 1, most + 1))
+
+
+def hoards(request: dict[str, Any]) -> Iterator[str]:
+    """Map more memory than there is to be had."""
+    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000  # MAP_NORESERVE: a small machine's refusal is no limit
+    if raises(resource.RLIMIT_AS) or works(mmap.mmap, -1, request["memory"], private):
+        yield f"mapped {request['memory'] >> 20} MiB"
+
+
+def multiplies(request: dict[str, Any]) -> Iterator[str]:
+    """Fork until it is refused, or far too often."""
+    here, there = os.pipe()
+    children: list[int] = []
     try:
-        with open(path, "rb") as file:
-            return file.read()
+        while len(children) < 2 * request["processes"]:
+            child = os.fork()
+            if not child:
+                os.close(there)
+                os.read(here, 1)
+                os._exit(0)
+            children.append(child)
+        yield f"started {len(children)} processes"
     except OSError:
-        return b""
+        pass
+    finally:
+        os.close(there)
+        for child in children:
+            os.waitpid(child, 0)
+        os.close(here)
 
 
-def status(name: str) -> str:
-    """Return an entry of /proc/self/status."""
-    lines = content("/proc/self/status").decode().splitlines()
-    return next((line.split()[-1] for line in lines if line.startswith(name + ":")), "")
+def computes(request: dict[str, Any]) -> Iterator[str]:
+    """Compute without end: the limit is seen, and cannot be raised."""
+    del request
+    if raises(resource.RLIMIT_CPU):
+        yield "has no limit of processor time"
 
 
-def echo() -> bool:
-    """Return whether a datagram over the loopback address arrives."""
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
-            there.bind(("127.0.0.1", 0))
-            there.settimeout(1.0)
-            there.sendto(b"echo", there.getsockname())
-            return there.recv(16) == b"echo"
-    except OSError:
-        return False
+# --- ROS ---
 
 
-def opens_vsock() -> bool:
-    """Return whether a socket to the machine's hypervisor can be opened; no network namespace holds it back."""
-    try:
-        socket.socket(AF_VSOCK, socket.SOCK_STREAM).close()
-    except OSError:
-        return False
-    return True
+def exchange() -> None:
+    """Send back what the worker's node sends, until it hangs up."""
+    import rclpy  # noqa: PLC0415 -- after the attempts: it starts threads
+    from std_msgs.msg import String  # noqa: PLC0415
 
+    rclpy.init()
+    node = rclpy.create_node("probe", start_parameter_services=False, enable_rosout=False)
+    back = node.create_publisher(String, "probe_back", 10)
+    node.create_subscription(String, "probe_forth", back.publish, 10)
+    while not select.select([0], [], [], 0)[0]:
+        rclpy.spin_once(node, timeout_sec=0.01)
+
+
+ATTEMPTS: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
+    "fs_read": reads,
+    "fs_write": writes,
+    "procs": sees,
+    "signals": disturbs,
+    "net_egress": leaves,
+    "vsock": opens_vsock,
+    "shm": shares,
+    "mem": hoards,
+    "pids": multiplies,
+    "cpu": computes,
+    "dds_private": calls_out,
+}
 
 if __name__ == "__main__":
     main(json.loads(sys.argv[1]))

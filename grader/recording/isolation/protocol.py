@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from grader.model.limits import Limits
 
-__all__ = ["Command", "Isolation", "Limits", "PythonRuntime", "StudentProcess"]
+__all__ = [
+    "Command",
+    "Isolation",
+    "Limits",
+    "PythonRuntime",
+    "StudentProcess",
+    "runtime_from_json",
+    "runtime_to_json",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +37,28 @@ class PythonRuntime:
     library_paths: tuple[Path, ...]
     python_paths: tuple[Path, ...]
     environment: Mapping[str, str]
+
+
+def runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
+    """Return a runtime as JSON values."""
+    return {
+        "executable": str(runtime.executable),
+        "read_paths": [str(path) for path in runtime.read_paths],
+        "library_paths": [str(path) for path in runtime.library_paths],
+        "python_paths": [str(path) for path in runtime.python_paths],
+        "environment": dict(runtime.environment),
+    }
+
+
+def runtime_from_json(values: Mapping[str, Any]) -> PythonRuntime:
+    """Return a runtime from JSON values."""
+    return PythonRuntime(
+        executable=Path(values["executable"]),
+        read_paths=tuple(map(Path, values["read_paths"])),
+        library_paths=tuple(map(Path, values["library_paths"])),
+        python_paths=tuple(map(Path, values["python_paths"])),
+        environment=values["environment"],
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,129 @@
+"""Remembers the self-tests of a login session in a file of the user's own; whatever is wrong with it, it is ignored."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import socket
+import stat
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import grader
+from grader.model.containment import PROPERTIES, TIERS, Property, TierReport
+from grader.recording.isolation.bubblewrap import SYSTEM_PROGRAMS
+from grader.recording.isolation.remedies import SETTINGS
+from grader.recording.ros_installation import RosInstallation
+
+LARGEST = 64 << 10
+FOLDER = "rclpy-grader"
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The place of one tier's self-test.
+
+    Attributes:
+        folder: The user's own folder; None if there is none.
+        key: Everything that a result depends on, as a digest: with another key there is another file.
+    """
+
+    folder: Path | None
+    key: str
+
+    @classmethod
+    def of(cls, tier: str, ros: RosInstallation) -> Memory:
+        """Return the place for a tier, this machine as it is booted, this user and this ROS."""
+        text = "\n".join((tier, *circumstances(ros)))
+        return cls(own_folder(), hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:32])
+
+    def recall(self) -> TierReport | None:
+        """Return the self-test remembered, if there is one and the file is this user's alone."""
+        if self.folder is None:
+            return None
+        try:
+            descriptor = os.open(self.folder / self.key, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+            with os.fdopen(descriptor, "rb") as file:
+                found = os.fstat(descriptor)
+                if found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) != 0o600 or found.st_size > LARGEST:
+                    return None
+                return report_from_json(json.loads(file.read(LARGEST)))
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            return None
+
+    def keep(self, report: TierReport) -> None:
+        """Remember a self-test, if that can be done."""
+        if self.folder is None:
+            return
+        draft = self.folder / f".{self.key}-{secrets.token_hex(4)}"
+        with contextlib.suppress(OSError):
+            descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+                json.dump(asdict(report), file)
+            draft.replace(self.folder / self.key)
+
+
+def report_from_json(values: object) -> TierReport:
+    """Return a report from what was remembered; raises ValueError, TypeError or KeyError if it is none."""
+    if not isinstance(values, dict) or values["name"] not in TIERS:
+        raise ValueError("a report of a tier")
+    properties = tuple(Property(**found) for found in values.pop("properties"))
+    report = TierReport(**values, properties=properties)
+    texts = (report.why, report.remedy, *(text for found in properties for text in (found.mechanism, found.found)))
+    flags = (report.usable, *(found.holds for found in properties))
+    if [found.name for found in properties] != list(PROPERTIES):
+        raise ValueError("a report of every property")
+    if not all(type(text) is str for text in texts) or not all(type(flag) is bool for flag in flags):
+        raise TypeError("texts and flags")
+    return report
+
+
+def own_folder() -> Path | None:
+    """Return a folder that only this user can write to, made if need be; None if there is none."""
+    given = os.environ.get("XDG_RUNTIME_DIR") or os.environ.get("XDG_CACHE_HOME")
+    base = Path(given) if given else Path.home() / ".cache"
+    folder = base / FOLDER
+    with contextlib.suppress(OSError, RuntimeError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022:
+            return folder
+    return None
+
+
+def circumstances(ros: RosInstallation) -> Iterator[str]:
+    """Yield what a self-test depends on: boot, user, namespaces, privileges, settings, programs, ROS, this grader."""
+    yield _content("/proc/sys/kernel/random/boot_id")
+    yield f"{os.geteuid()} {os.getegid()}"
+    for name in ("net", "user", "mnt", "pid"):
+        with contextlib.suppress(OSError):
+            yield os.readlink(f"/proc/self/ns/{name}")  # noqa: PTH115 -- it points to no path
+    status = _content("/proc/self/status").splitlines()
+    yield from (line for line in status if line.startswith(("Cap", "Seccomp", "NoNewPrivs")))
+    yield " ".join(name for _, name in socket.if_nameindex())
+    yield from (f"{name} {_content('/proc/sys/' + name.replace('.', '/'))}" for name, _, _ in SETTINGS)
+    for program in ("bwrap", "prlimit", "setpriv"):
+        yield _stamp(Path(shutil.which(program, path=SYSTEM_PROGRAMS) or shutil.which(program) or "/nowhere"))
+    yield f"{ros.prefix} {ros.distro} {ros.rclpy_version} {ros.runtime.executable} {ros.runtime.read_paths}"
+    yield grader.__version__
+    yield from map(_stamp, sorted(Path(__file__).parent.iterdir()))
+
+
+def _content(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def _stamp(path: Path) -> str:
+    try:
+        found = path.stat()
+    except OSError:
+        return f"{path} missing"
+    return f"{path} {found.st_size} {found.st_mtime_ns}"

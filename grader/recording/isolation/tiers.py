@@ -1,0 +1,37 @@
+"""The tiers of isolation by their names."""
+
+from __future__ import annotations
+
+import os
+
+from grader.model.containment import TIERS
+from grader.model.errors import EnvironmentFault
+from grader.recording.isolation import bubblewrap, flat, landlock, plain
+from grader.recording.isolation.bubblewrap import Bubblewrap
+from grader.recording.isolation.flat import FlatBubblewrap
+from grader.recording.isolation.landlock import Landlock
+from grader.recording.isolation.plain import Plain
+from grader.recording.isolation.protocol import Isolation
+
+#: What contains anything, strongest first.
+WALLED = (bubblewrap.ROOT_NAME, bubblewrap.USER_NAME, flat.NAME, landlock.NAME)
+
+
+def isolation_from_name(name: str) -> Isolation:
+    """Return a tier, without trying whether it holds.
+
+    Raises:
+        EnvironmentFault: There is no such tier, it is for another user, or something it is made of is missing.
+    """
+    if name not in TIERS:
+        raise EnvironmentFault(f"isolation: expected one of {', '.join(TIERS)}, found {name}")
+    if name == landlock.NAME:
+        return Landlock.here()
+    if name == flat.NAME:
+        return FlatBubblewrap.here()
+    if name == plain.NAME:
+        return Plain()
+    if (name == bubblewrap.ROOT_NAME) != (os.geteuid() == 0):
+        wanted, mend = ("root", "run it with sudo") if name == bubblewrap.ROOT_NAME else ("an ordinary user", "")
+        raise EnvironmentFault(f"isolation {name}: expected {wanted}, found user {os.geteuid()}", mend)
+    return Bubblewrap.here()
