@@ -37,6 +37,11 @@ def is_own(name: str) -> bool:
     return _OWN.fullmatch(name) is not None
 
 
+def is_recording(folder: Path) -> bool:
+    """Return whether a folder is named as that of a recording is, and holds one."""
+    return is_own(f"{folder.name}/{METADATA}") and (folder / f"{folder.name}_0.mcap").is_file()
+
+
 def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> None:
     """Raise EvidenceError if a file would be replaced that is not the grader's own.
 

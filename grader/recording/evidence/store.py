@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -155,9 +156,14 @@ def is_evidence(folder: Path) -> bool:
     return (folder / files.MANIFEST).is_file()
 
 
-def found_under(folder: Path) -> Collection[Path]:
-    """Return the folders of evidence in and below a folder, sorted by path."""
-    return sorted(path.parent for path in folder.rglob(files.MANIFEST))
+def found_under(folder: Path) -> Sequence[Path]:
+    """Return the folders of evidence in and below a folder, sorted by path; also those that lost their manifest."""
+    found = []
+    for root, inner, names in os.walk(folder):
+        if files.MANIFEST in names or any(files.is_recording(Path(root, name)) for name in inner):
+            found.append(Path(root))
+            inner.clear()
+    return sorted(found)
 
 
 def _trace(

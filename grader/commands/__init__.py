@@ -1,0 +1,1 @@
+"""Subcommands of `grade`, each with an attribute `command`."""
