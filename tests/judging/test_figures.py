@@ -1,0 +1,261 @@
+"""Figures: what is drawn from which check, what they say in words, and that floods stay small."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from tracing import (
+    FLOAT32,
+    ODOM_TIMES,
+    TWIST,
+    Recording,
+    driving,
+    held_at,
+    position_logs,
+    scripted,
+    twist,
+    velocity,
+)
+
+from grader.judging.checks import CHECKS
+from grader.judging.figures import pictures
+from grader.judging.figures.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
+from grader.judging.figures.expectations import expectation
+from grader.judging.figures.pictures import MAKERS, figures_of, illustrated
+from grader.judging.judge import judge_exercise
+from grader.model.figure import GraphFigure, Look, Tone
+from grader.model.submission import StudentFile, Submission
+from grader.model.trace import FaultKind
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+
+EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
+ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))
+
+
+def submission_of(exercise, tmp_path):
+    files = {name: StudentFile(name, name) for name in exercise.files}
+    return Submission("ada", "./ada", tmp_path, "sha256:" + "0" * 64, files)
+
+
+def titled(figures, start):
+    return next(f for f in figures if f.title.startswith(start))
+
+
+def test_a_rate_is_drawn_with_its_bands_and_its_intervals():
+    """The rate over the last second, the accepted bands, and every interval with the expected one."""
+    chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "How often")
+    rate, interval = chart.panels
+    assert {(b.low, b.high) for b in rate.bands} == {(19, 21), (18, 22)}
+    assert all(math.isclose(y, 20) for _, y in rate.series[0].points)
+    assert all(math.isclose(y, 50) for _, y in interval.series[0].points)
+    assert interval.levels[0].value == 50
+    assert chart.criteria == ("rate",)
+    assert "200 messages on /cmd_vel within 9.9 s, at 20.000 Hz on average" in chart.about
+
+
+def test_a_rate_that_changes_is_seen():
+    """What an average hides shows in the picture."""
+    rec = Recording(10.05, process="velocity_publisher.py")
+    for k in range(100):
+        rec.message(0.05 + k / 20 + (k > 50) * (k - 50) / 40, "/cmd_vel", twist(), TWIST)
+    rates = [y for _, y in titled(figures_of(ONE, {"alone": rec.trace()}), "How often").panels[0].series[0].points]
+    assert max(rates) > 19.9
+    assert min(rates) < 14
+
+
+def test_linear_and_angular_velocity_share_one_picture():
+    """Two criteria on one topic make one chart with two panels."""
+    chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "Commanded")
+    assert chart.criteria == ("linear_velocity", "angular_velocity")
+    assert [(p.title, p.unit, len(p.series)) for p in chart.panels] == [("linear", "m/s", 3), ("angular", "rad/s", 3)]
+    assert {level.value for level in chart.panels[0].levels} == {0.5, 0.0}
+
+
+def test_logged_positions_lie_on_the_path():
+    """Right positions are good dots on the path, with what was logged."""
+    trace = position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}").trace("waiting_then_driving")
+    chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
+    path, dots = chart.panels[0].series
+    assert chart.square
+    assert (path.tone, path.look) == (Tone.FAINT, Look.LINE)
+    assert MOST_TEXTS / 2 < len(path.points) <= MOST_TEXTS + 2
+    assert (dots.tone, len(dots.points)) == (Tone.GOOD, 18)
+    assert dots.texts[0].startswith("t = 6.000 s: x=")
+    assert "18 of 18 logged pairs" in chart.about
+
+
+def test_wrong_positions_are_drawn_as_wrong():
+    """Swapped x and y are off the path, and say so."""
+    trace = position_logs(lambda x, y: f"x={y:.3f} y={x:.3f}").trace("waiting_then_driving")
+    chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
+    assert [s.tone for s in chart.panels[0].series] == [Tone.FAINT, Tone.BAD]
+
+
+def test_a_position_far_away_does_not_shrink_the_path():
+    """It is told in words."""
+    trace = position_logs(lambda x, y: f"x={1000 * x + 9000:.3f} y={y:.3f}").trace("waiting_then_driving")
+    chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
+    assert len(chart.panels[0].series) == 1
+    assert "too far away to be drawn" in chart.about
+
+
+def test_log_times_stand_on_the_grid_of_the_period():
+    """The grid begins at the first log; intervals are compared with the accepted band."""
+    trace = position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}").trace("waiting_then_driving")
+    chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "When positions")
+    logs, intervals = chart.panels
+    assert logs.grid == (6.0, 1.0)
+    assert logs.lanes == ("log",)
+    assert all(math.isclose(y, 1.0) for _, y in intervals.series[0].points)
+    assert (intervals.bands[0].low, intervals.bands[0].high) == (0.9, 1.1)
+    assert [m.label for m in chart.moments] == ["/odom begins", "/odom ends"]
+
+
+def test_answers_stand_under_what_they_answer():
+    """Temperature with its threshold, the fan speed and what was expected under it, once for both sides."""
+    rec = scripted()
+    for k in range(80):
+        value = held_at(0.5 + 0.2 * k)
+        rec.number(0.51 + 0.2 * k, "/fan_speed", 100.0 if value > 25 else 0.0)
+    figures = figures_of(THREE, {"controller_alone": rec.trace("controller_alone")})
+    charts = [f for f in figures if f.title.startswith("Answers")]
+    assert len(charts) == 1
+    upper, lower = charts[0].panels
+    assert charts[0].criteria == ("fan_on_above_25", "fan_off_at_or_below_25")
+    assert (upper.title, upper.unit, upper.levels[0].value) == ("temperature", "°C", 25)
+    assert [s.name for s in lower.series] == ["expected", "fan speed"]
+
+
+def test_the_graph_is_shown_before_and_after():
+    """Each file alone, then both together; topics that every node has are left out."""
+    sensor = Recording(12).endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor")
+    sensor.endpoint("publisher", "/rosout", "rcl_interfaces/msg/Log", "/temperature_sensor")
+    both = Recording(20).endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor")
+    both.endpoint("subscription", "/temperature", FLOAT32, "/fan_controller", 2)
+    traces = {"sensor_alone": sensor.trace("sensor_alone"), "together": both.trace("together")}
+    graph = next(f for f in figures_of(THREE, traces) if isinstance(f, GraphFigure))
+    assert [s.title for s in graph.stages] == ["sensor alone", "together"]
+    assert {e.topic for s in graph.stages for e in s.graph.endpoints} == {"/temperature"}
+    assert "/temperature_sensor publishes /temperature to /fan_controller" in graph.about
+    assert graph.criteria == ("bidirectional_graph",)
+
+
+def test_the_timeline_has_a_row_for_each_kind_of_thing():
+    """Logs by severity, printed lines, faults and limits; nothing is left to a silent node but its row."""
+    rec = Recording(10, process="velocity_publisher.py").log(1, "hello").log(2, "oh", "ERROR").line(3, "printed")
+    rec.crashed(4).mark(5, "limit", "more than 3 lines")
+    chart = titled(figures_of(ONE, {"alone": rec.trace()}), "Logs")
+    (panel,) = chart.panels
+    assert panel.lanes == ("velocity_publisher.py: logged", "velocity_publisher.py: printed", "faults")
+    assert [(s.name, s.tone) for s in panel.series] == [
+        ("INFO", Tone.MAIN),
+        ("ERROR", Tone.BAD),
+        ("printed", Tone.SECOND),
+        ("fault", Tone.BAD),
+    ]
+    assert panel.series[-1].texts == ("velocity_publisher.py:12: ValueError: no", "more than 3 lines")
+    silent = titled(figures_of(ONE, {"alone": Recording(10).trace()}), "Logs")
+    assert silent.panels[0].lanes == ("velocity_publisher.py: logged",)
+
+
+def test_a_flood_becomes_a_picture_of_bounded_size():
+    """A hundred thousand messages and logs are drawn with about as many points as a screen has columns."""
+    rec = Recording(10, process="velocity_publisher.py")
+    for k in range(20_000):
+        rec.message(k / 2000, "/cmd_vel", twist((k % 7, 0, 0)), TWIST).log(k / 2000, "x" * 1000)
+    figures = figures_of(ONE, {"alone": rec.trace()})
+    series = [s for f in figures if not isinstance(f, GraphFigure) for p in f.panels for s in p.series]
+    assert max(len(s.points) for s in series) <= MOST_POINTS + 2
+    assert max(len(s.texts) for s in series) <= MOST_TEXTS + 2
+    assert max(len(text) for s in series for text in s.texts) <= 200
+
+
+def test_thinning_keeps_the_extremes():
+    """A single outlier among many values stays in the picture."""
+    values = [0.0] * 10_000
+    values[6789], values[1234] = 5.0, -5.0
+    kept = kept_indices(values, 100)
+    assert {0, 1234, 6789, 9999} <= set(kept)
+    assert len(kept) <= 102
+    assert kept_indices(values[:50], 100) == list(range(50))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf"), 1e308])
+def test_strange_numbers_are_drawn_or_left_out(value):
+    """No figure fails for what a student publishes."""
+    rec = Recording(10).number(1, "/temperature", value).number(2, "/temperature", value)
+    rec.number(1.5, "/fan_speed", value)
+    for scenario in ("sensor_alone", "together"):
+        figures_of(THREE, {scenario: rec.trace(scenario)})
+
+
+@pytest.mark.parametrize("exercise", [ONE, TWO, THREE], ids=lambda e: e.id)
+def test_a_node_that_does_nothing_has_figures_too(exercise, tmp_path):
+    """An empty recording, and none at all."""
+    submission = submission_of(exercise, tmp_path)
+    for traces in ({}, {s.id: Recording(5).trace(s.id) for s in exercise.scenarios}):
+        report = judge_exercise(exercise, traces, submission, {})
+        assert len(illustrated(report, exercise, traces, submission, {}).figures) == len(traces)
+
+
+def test_a_picture_that_fails_costs_only_itself(monkeypatch):
+    """The other figures are there all the same."""
+
+    def broken(check, trace):
+        raise ZeroDivisionError
+
+    kinds = dict(MAKERS)
+    rate = next(kind for kind in kinds if kind.__name__ == "TopicRate")
+    monkeypatch.setattr(pictures, "MAKERS", kinds | {rate: broken})
+    titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
+    assert not any(t.startswith("How often") for t in titles)
+    assert len(titles) == 3
+
+
+def test_figure_ids_are_unique_and_of_their_exercise():
+    """A page with several exercises can link to each."""
+    ids = [f.id for f in figures_of(ONE, {"alone": velocity().trace()})]
+    assert ids == ["velocity_publisher-1", "velocity_publisher-2", "velocity_publisher-3", "velocity_publisher-4"]
+
+
+def test_every_check_says_what_it_expects():
+    """With the numbers of its rubric; no criterion of ours is without a phrase."""
+    said = {c.id: expectation(c.check) for e in (ONE, TWO, THREE) for c in e.criteria}
+    assert all(said.values())
+    assert said["rate"] == "/cmd_vel at 20 ± 1 Hz on average over 10.0 s; half the points at 20 ± 2 Hz"
+    assert said["fan_off_at_or_below_25"] == "0 on /fan_speed for every /temperature at or below 25 °C"
+    asked = {type(c.check) for e in (ONE, TWO, THREE) for c in e.criteria}
+    assert asked <= set(CHECKS.values())
+
+
+def test_the_source_around_a_fault_is_shown(tmp_path):
+    """Three lines before and after, tabs widened, the file's name as handed in."""
+    rec = velocity(stop_s=4).fault(
+        3, FaultKind.EXCEPTION, "ValueError: no", line=5, process="velocity_publisher.py", frames=("a",)
+    )
+    traces = {"alone": rec.trace()}
+    submission = submission_of(ONE, tmp_path)
+    source = {"velocity_publisher.py": "\n".join(["one", "two", "three", "four", "\tfive", "six", "seven", "eight"])}
+    report = illustrated(judge_exercise(ONE, traces, submission, source), ONE, traces, submission, source)
+    (excerpt,) = report.excerpts
+    assert (excerpt.file, excerpt.line, excerpt.first) == ("velocity_publisher.py", 5, 2)
+    assert excerpt.lines == ("two", "three", "four", "    five", "six", "seven", "eight")
+
+
+@pytest.mark.parametrize("line", [0, -1, 9, 10**9])
+def test_a_line_that_the_source_does_not_have_is_not_shown(line, tmp_path):
+    """A forged traceback can name any."""
+    rec = velocity(stop_s=4).fault(3, FaultKind.EXCEPTION, "E: x", line=5, process="velocity_publisher.py")
+    fault = replace(rec.trace().faults()[0], line=line)
+    rec.items = [fault if i == rec.trace().faults()[0] else i for i in rec.items]
+    traces, submission = {"alone": rec.trace()}, submission_of(ONE, tmp_path)
+    source = {"velocity_publisher.py": "one\ntwo\n"}
+    report = illustrated(judge_exercise(ONE, traces, submission, source), ONE, traces, submission, source)
+    assert report.excerpts == ()
+
+
+def test_driving_alone_has_no_dots():
+    """A node that logs nothing leaves the path without positions."""
+    chart = titled(figures_of(TWO, {"waiting_then_driving": driving().trace("waiting_then_driving")}), "The path")
+    assert len(chart.panels[0].series) == 1
+    assert len(chart.panels[0].series[0].points) <= len(ODOM_TIMES)
