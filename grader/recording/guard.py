@@ -22,8 +22,8 @@ from grader.recording.usage import Usage, families, starved_ns, usage
 #: How often it looks, and every how many looks it searches for new children.
 LOOK_S = 0.025
 SEARCH_EVERY = 10
-#: Processes of the sandbox around a student's, which the system does not count against its limit.
-WRAPPERS = 4
+#: Processes of the sandbox around a student's, which the system does not count, and some more: it should be first.
+WRAPPERS = 16
 #: What the worker itself may fill beyond its size at the start: messages that have come and were not yet taken.
 UNREAD_BYTES = 512 * MIB
 #: Out of real time with this share of it spent waiting for a processor, a run says nothing about the nodes.

@@ -178,10 +178,10 @@ class Observer:
 
     def notes(self) -> list[str]:
         """Return what readers must know of messages whose content was not read."""
-        large = f"larger than {size(self._limits.message_bytes)}, and their content was not looked at"
-        broken = "not what their type says, and could not be read"
+        large = f"larger than {size(self._limits.message_bytes)}"
+        broken = "that are not what their type says"
         return [
-            f"{topic[:NAME_CHARACTERS]}: {count:,} messages were {what}"
+            f"{topic[:NAME_CHARACTERS]}: the content of messages {what} was not looked at ({count:,} in all)"
             for counts, what in ((self._large, large), (self._broken, broken))
             for topic, count in sorted(counts.items())[:TOLD]
         ]
