@@ -71,6 +71,7 @@ class Criterion:
         check: The question.
         needs: Ids of criteria that must be met or partly met for this one to make sense.
         hint: What to tell a student who did not meet it, if the check has nothing better.
+        chapter: Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
     """
 
     id: str
@@ -80,6 +81,7 @@ class Criterion:
     check: Check
     needs: tuple[str, ...] = ()
     hint: str = ""
+    chapter: str = ""
 
 
 @dataclass(frozen=True, slots=True)

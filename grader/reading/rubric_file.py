@@ -162,6 +162,7 @@ def _criterion(shape: CriterionShape, check: Check) -> Criterion:
         check=check,
         needs=shape.needs,
         hint=" ".join((shape.hint or "").split()),
+        chapter=" ".join((shape.chapter or "").split()),
     )
 
 

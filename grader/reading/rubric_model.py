@@ -114,6 +114,7 @@ class CriterionShape(Shape):
     check: Choice
     needs: tuple[Id, ...] = ()
     hint: Text | None = None
+    chapter: Text | None = None
 
 
 class RubricShape(Shape):

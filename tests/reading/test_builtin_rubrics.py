@@ -1,6 +1,7 @@
 """The rubrics that come with the grader hold the criteria and points that are promised, and editors can check them."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -152,3 +153,11 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatc
     monkeypatch.setattr(shipped, "__file__", str(tmp_path / "grader" / "reading" / "shipped.py"))
     assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
+
+
+def test_every_criterion_says_which_part_of_the_chapter_asks_for_it():
+    """By the exercise's number, and the number of the criterion or task there."""
+    for path in builtin_rubrics().values():
+        exercise = read_rubric(path)
+        begin = rf"Exercise {exercise.number}, (acceptance criterion|task) \d"
+        assert [c.id for c in exercise.criteria if not re.match(begin, c.chapter)] == []
