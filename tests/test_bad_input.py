@@ -85,11 +85,11 @@ def wait_for(condition, seconds=60):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda path: None, "expected a folder or a .py file, found nothing there"),
+        (lambda path: None, "expected a folder, a .py file or an archive, found nothing there"),
         (lambda path: path.mkdir(), "expected at least one .py file, found none"),
-        (lambda path: path.write_text("x"), "expected a folder or a .py file, found another kind of file"),
-        (lambda path: path.symlink_to("/nonexistent"), "expected a folder or a .py file, found nothing there"),
-        (os.mkfifo, "expected a folder or a .py file, found a device, pipe or socket"),
+        (lambda path: path.write_text("x"), "expected a folder, a .py file or an archive, found another kind of file"),
+        (lambda path: path.symlink_to("/nonexistent"), "expected a folder, a .py file or an archive, found nothing there"),
+        (os.mkfifo, "expected a folder, a .py file or an archive, found a device, pipe or socket"),
     ],
     ids=["nothing", "empty folder", "another file", "dangling link", "pipe"],
 )

@@ -1,4 +1,4 @@
-"""Copies what a student handed in to a place of our own, within limits; the student's folder is only read."""
+"""Collects what a student handed in as a folder or file, which is only read, and copies it to a place of our own."""
 
 from __future__ import annotations
 
@@ -6,114 +6,93 @@ import errno
 import hashlib
 import os
 import stat
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from grader.model.errors import HarnessError, SubmissionError
-from grader.reading.quoting import listed, shown
-
-MAX_FILES = 2_000
-MAX_TOTAL_BYTES = 50 << 20
-MAX_FILE_BYTES = 8 << 20
-MAX_DEPTH = 20
-
-#: Longest path inside a submission: the system refuses longer ones once the staging folder stands before it.
-MAX_PATH_BYTES = 2_000
-
-#: Entries of any kind that are looked at before a folder is taken for something else than a submission.
-MAX_ENTRIES = 20_000
-
-_SKIPPED_FOLDERS = frozenset({"__pycache__", "__MACOSX", "venv", "node_modules"})
-
-#: A folder that holds one of these was made by a tool: a virtual environment, or what `colcon build` left behind.
-_GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
+from grader.reading.collected import (
+    MAX_DEPTH,
+    MAX_ENTRIES,
+    MAX_FILE_BYTES,
+    MAX_FILES,
+    MAX_TOTAL_BYTES,
+    Collected,
+    LeftOut,
+)
+from grader.reading.member_names import GENERATED_MARKERS, MAX_PATH_BYTES, passed_over_file, passed_over_folder
 
 _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
-@dataclass(slots=True)
-class Staged:
-    """What was copied.
-
-    Attributes:
-        files: Relative POSIX paths, sorted by their bytes.
-        digest: `sha256:` and 64 hex digits over names and contents.
-        notes: Sentences about what was not copied.
-    """
-
-    files: list[str]
-    digest: str
-    notes: tuple[str, ...]
-
-
-@dataclass(slots=True)
-class _Left:
-    """Names of what was not copied, by the reason."""
-
-    by_reason: dict[str, list[str]] = field(default_factory=dict)
-
-    def add(self, reason: str, relative: str) -> None:
-        self.by_reason.setdefault(reason, []).append(relative)
-
-    def notes(self) -> tuple[str, ...]:
-        """Return one sentence per reason, in an order that does not depend on how the system lists folders."""
-        return tuple(
-            self._note(reason, sorted(names, key=os.fsencode)) for reason, names in sorted(self.by_reason.items())
-        )
-
-    @staticmethod
-    def _note(reason: str, names: Sequence[str]) -> str:
-        first = [shown(name) for name in names[:3]]
-        more = [f"{len(names) - 3} more"] if len(names) > 3 else []
-        return f"not copied: {listed([*first, *more], 'and')} ({reason})"
-
-
-def stage_folder(folder: Path, into: Path, *, where: str) -> Staged:
-    """Copy the files of a folder.
+def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
+    """Read the files of a folder.
 
     Args:
-        folder: The student's folder; only read.
-        into: Empty folder of the caller's; files arrive readable by everybody, in the same layout.
+        folder: The student's folder.
+        into: Where they will be copied; if that lies in the student's folder, it is no part of the submission.
         where: The folder as messages show it.
 
     Returns:
-        What was copied. Links, devices, sockets, pipes and unreadable files are left out with a note.
+        The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out
+        with a note.
 
     Raises:
         SubmissionError: The folder cannot be listed, or a limit is exceeded.
-        HarnessError: The copy cannot be written.
     """
-    left = _Left()
+    left = LeftOut()
     walk = _Walk(where=where, left=left, own=_identity(into.stat()))
     try:
         top = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         raise SubmissionError(f"{where}: the folder cannot be read: {error.strerror}") from None
     try:
-        relatives = sorted(walk.files(top), key=os.fsencode)
+        files = []
+        total = 0
+        for relative in sorted(walk.files(top), key=os.fsencode):
+            content = _content(top, relative, left)
+            if content is not None:
+                total += len(content)
+                if total > MAX_TOTAL_BYTES:
+                    raise _too_much(where, f"{MAX_TOTAL_BYTES >> 20} MiB in all")
+                files.append((relative, content))
     finally:
         os.close(top)
-    return _copy_all([(relative, folder / relative) for relative in relatives], into, where, left)
+    return Collected(tuple(files), left.notes())
 
 
-def stage_file(file: Path, into: Path, *, where: str) -> Staged:
-    """Copy one file, as a folder that holds only it.
-
-    Args:
-        file: The student's file; a link to one is followed, because it was named.
-        into: Empty folder of the caller's.
-        where: The file as messages show it.
+def read_start(file: Path, most: int, *, where: str) -> bytes:
+    """Return the first bytes of a file that was named, at most so many; a link to it is followed.
 
     Raises:
-        SubmissionError: The file cannot be read or is too large.
-        HarnessError: The copy cannot be written.
+        SubmissionError: The file cannot be read, or is no plain file.
     """
-    left = _Left()
-    staged = _copy_all([(file.name, file.resolve())], into, where, left)
-    if not staged.files:
-        raise SubmissionError(f"{where}: the file cannot be graded: {next(iter(left.by_reason))}")
-    return staged
+    try:
+        with os.fdopen(os.open(file, _OPEN_FLAGS & ~os.O_NOFOLLOW), "rb") as opened:
+            if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
+                raise SubmissionError(f"{where}: expected a plain file, found a device, pipe or socket")
+            return opened.read(most)
+    except OSError as error:
+        raise SubmissionError(f"{where}: the file cannot be read: {error.strerror}") from None
+
+
+def write_files(collected: Collected, into: Path) -> str:
+    """Write what was collected into an empty folder of the caller's, readable by everybody, in the same layout.
+
+    Returns:
+        The digest: `sha256:` and 64 hex digits over names and contents.
+
+    Raises:
+        HarnessError: A file cannot be written.
+    """
+    digest = hashlib.sha256()
+    for relative, content in sorted(collected.files, key=lambda file: os.fsencode(file[0])):
+        _write(into / relative, content)
+        # Lengths first: without them, two different sets of files could give the same bytes.
+        for part in (os.fsencode(relative), content):
+            digest.update(len(part).to_bytes(8, "big"))
+            digest.update(part)
+    return f"sha256:{digest.hexdigest()}"
 
 
 @dataclass(slots=True)
@@ -121,7 +100,7 @@ class _Walk:
     """Lists a folder; works on descriptors, because paths may be longer than the system takes."""
 
     where: str
-    left: _Left
+    left: LeftOut
     own: tuple[int, int]
     entries: int = 0
     found: int = 0
@@ -153,7 +132,7 @@ class _Walk:
         return names
 
     def _file(self, relative: str, name: str) -> Iterator[str]:
-        if name.startswith("._"):  # what macOS puts beside every file in an archive
+        if passed_over_file(name):
             return
         if len(os.fsencode(relative)) > MAX_PATH_BYTES:
             self.left.add("the path is too long", relative)
@@ -164,7 +143,7 @@ class _Walk:
         yield relative
 
     def _folder(self, parent: int, name: str, relative: str, depth: int, info: os.stat_result) -> Iterator[str]:
-        if name in _SKIPPED_FOLDERS or name.startswith(".") or _identity(info) == self.own:
+        if passed_over_folder(name) or _identity(info) == self.own:
             return
         if depth > MAX_DEPTH:
             raise _too_much(self.where, f"{MAX_DEPTH} folders inside each other")
@@ -174,7 +153,7 @@ class _Walk:
             self.left.add(f"the folder cannot be read: {error.strerror}", relative)
             return
         try:
-            marker = next((m for m in _GENERATED_MARKERS if _exists(m, descriptor)), None)
+            marker = next((m for m in GENERATED_MARKERS if _exists(m, descriptor)), None)
             if marker is None:
                 yield from self.files(descriptor, f"{relative}/", depth)
             else:
@@ -205,31 +184,10 @@ def _kind(mode: int) -> str:
     return "a link, which is not followed" if stat.S_ISLNK(mode) else "a device, pipe or socket, not a plain file"
 
 
-def _copy_all(sources: Sequence[tuple[str, Path]], into: Path, where: str, left: _Left) -> Staged:
-    """Copy files, given as relative name and place, and digest them in the order given."""
-    digest = hashlib.sha256()
-    copied: list[str] = []
-    total = 0
-    for relative, source in sources:
-        content = _content(source, relative, left)
-        if content is None:
-            continue
-        total += len(content)
-        if total > MAX_TOTAL_BYTES:
-            raise _too_much(where, f"{MAX_TOTAL_BYTES >> 20} MiB in all")
-        _write(into / relative, content)
-        # Lengths first: without them, two different sets of files could give the same bytes.
-        for part in (os.fsencode(relative), content):
-            digest.update(len(part).to_bytes(8, "big"))
-            digest.update(part)
-        copied.append(relative)
-    return Staged(copied, f"sha256:{digest.hexdigest()}", left.notes())
-
-
-def _content(path: Path, relative: str, left: _Left) -> bytes | None:
+def _content(top: int, relative: str, left: LeftOut) -> bytes | None:
     """Return what a file holds, or None and a note if it cannot or must not be read."""
     try:
-        with os.fdopen(os.open(path, _OPEN_FLAGS), "rb") as file:
+        with os.fdopen(_opened(top, relative), "rb") as file:
             info = os.fstat(file.fileno())
             if not stat.S_ISREG(info.st_mode):
                 left.add(_kind(info.st_mode), relative)
@@ -243,6 +201,20 @@ def _content(path: Path, relative: str, left: _Left) -> bytes | None:
         left.add(f"larger than {MAX_FILE_BYTES >> 20} MiB", relative)
         return None
     return content
+
+
+def _opened(top: int, relative: str) -> int:
+    """Open a file below a folder without following any link, also none that came after the folder was listed."""
+    *folders, name = relative.split("/")
+    here = os.dup(top)
+    try:
+        for folder in folders:
+            inner = os.open(folder, _OPEN_FLAGS | os.O_DIRECTORY, dir_fd=here)
+            os.close(here)
+            here = inner
+        return os.open(name, _OPEN_FLAGS, dir_fd=here)
+    finally:
+        os.close(here)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -12,8 +12,10 @@ from pathlib import Path, PurePosixPath
 
 from grader.model.errors import SubmissionError
 from grader.model.submission import StudentFile, Submission
+from grader.reading.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
+from grader.reading.collected import MAX_FILE_BYTES, Collected
 from grader.reading.quoting import listed, shown
-from grader.reading.staging import Staged, stage_file, stage_folder
+from grader.reading.staging import collect_folder, read_start, write_files
 
 #: Names at least this alike are shown as a possible misspelling.
 SIMILARITY = 0.8
@@ -21,7 +23,7 @@ SIMILARITY = 0.8
 #: Misspelt names shown for one file.
 MAX_SIMILAR = 3
 
-_ARCHIVES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".txz", ".zst", ".7z", ".rar")
+_EXPECTED = "a folder, a .py file or an archive"
 
 # What browsers, editors and file managers put behind a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
 _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py))+$")
@@ -32,7 +34,8 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
     """Copy a submission and find the wanted files in it.
 
     Args:
-        path: A folder or one .py file, as the user typed it.
+        path: A folder, an archive or one .py file, as the user typed it. A folder or archive without a .py file that
+            holds one archive stands for that: so learning platforms deliver what students upload.
         wanted: File names of all exercises being graded.
         into: Empty folder of the caller's, which receives the copy.
 
@@ -40,36 +43,37 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
         The submission; a file that is not there has `found` None and names that look like it.
 
     Raises:
-        SubmissionError: No such path, not a folder or a .py file, no .py file inside, or a limit is exceeded.
+        SubmissionError: No such path, not a folder, archive or .py file, no .py file inside, a limit is exceeded, or an
+            archive cannot be used.
         HarnessError: The copy cannot be written.
     """
     where = shown(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
-        staged = stage_folder(source, into, where=where)
-        _expect_python(staged, wanted, where)
+        collected = _with_python(collect_folder(source, into=into, where=where), wanted, where)
     else:
-        _expect_python_file(source, where)
-        staged = stage_file(source, into, where=where)
-    files = {name: _look_for(name, staged.files, wanted) for name in wanted}
+        collected = _collect_file(source, wanted, where)
+    digest = write_files(collected, into)
+    names = [name for name, _ in collected.files]
+    files = {name: _look_for(name, names, wanted) for name in wanted}
     several = tuple(_several(file) for file in files.values() if file.others)
     return Submission(
         name=_name(source),
         path=path,
         root=into,
-        digest=staged.digest,
+        digest=digest,
         files=files,
-        notes=(*several, *staged.notes),
+        notes=(*several, *collected.notes),
     )
 
 
 def _mode(path: str, where: str) -> int:
     if not path:
-        raise SubmissionError("expected a folder or a .py file, found an empty path", "use . for this folder")
+        raise SubmissionError(f"expected {_EXPECTED}, found an empty path", "use . for this folder")
     try:
         return os.stat(path).st_mode  # noqa: PTH116 - a Path would change what was typed, e.g. `x.py/`
     except (FileNotFoundError, NotADirectoryError):
-        text = f"{where}: expected a folder or a .py file, found nothing there"
+        text = f"{where}: expected {_EXPECTED}, found nothing there"
         raise SubmissionError(text, "check the path, and the folder you are in") from None
     except OSError as error:
         raise SubmissionError(f"{where}: cannot be read: {error.strerror}") from None
@@ -77,29 +81,54 @@ def _mode(path: str, where: str) -> int:
         raise SubmissionError(f"{where}: expected a path, found one that no file can have") from None
 
 
-def _expect_python_file(source: Path, where: str) -> None:
+def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
     if not source.is_file():
-        raise SubmissionError(f"{where}: expected a folder or a .py file, found a device, pipe or socket")
-    if source.suffix.casefold() in _ARCHIVES:
-        text = f"{where}: expected a folder or a .py file, found an archive, which this version cannot read"
-        raise SubmissionError(text, "unpack it and name the folder")
-    if source.suffix.casefold() != ".py":
-        raise SubmissionError(f"{where}: expected a folder or a .py file, found another kind of file")
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
+    content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
+    kind = archive_kind(content[:HEAD_BYTES])
+    # By chance or on purpose, a program may look like an old tar.
+    if source.suffix.casefold() == ".py" and kind in (None, "tar"):
+        if len(content) > MAX_FILE_BYTES:
+            raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
+        return Collected(((source.name, content),))
+    if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file")
+    return _with_python(collect_archive(content, where=where), wanted, where)
 
 
-def _expect_python(staged: Staged, wanted: Sequence[str], where: str) -> None:
-    if any(name.casefold().endswith(".py") for name in staged.files):
-        return
-    archives = [name for name in staged.files if name.casefold().endswith(_ARCHIVES)]
-    similar = [name for want in wanted for name in _similar(want, staged.files, wanted)]
+def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
+    """Return what holds .py files: this, or the only archive in it."""
+    names = [name for name, _ in collected.files]
+    if _has_python(names):
+        return collected
+    archives = [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    if len(archives) != 1:
+        raise _no_python(collected, wanted, where)
+    name, packed = archives[0]
+    inside = f"{where.rstrip('/')}/{shown(name)}"
+    inner = collect_archive(packed, where=inside)
+    if not _has_python(name for name, _ in inner.files):
+        raise _no_python(inner, wanted, inside)
+    return Collected(inner.files, (f"graded is what {shown(name)} holds", *collected.notes, *inner.notes))
+
+
+def _has_python(names: Iterable[str]) -> bool:
+    return any(name.casefold().endswith(".py") for name in names)
+
+
+def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
+    names = [name for name, _ in collected.files]
+    archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    similar = [name for want in wanted for name in _similar(want, names, wanted)]
     hint = ""
     if similar:
         hint = f"rename {shown(similar[0])} so that it ends in .py"
     elif archives:
         hint = f"unpack {shown(archives[0])} and name the folder that holds your files"
-    elif staged.notes:
-        hint = staged.notes[0]
-    raise SubmissionError(f"{where}: expected at least one .py file, found none", hint)
+    elif collected.notes:
+        hint = collected.notes[0]
+    found = f"{len(archives)} archives" if len(archives) > 1 else "none"
+    return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
 
 
 def _name(source: Path) -> str:

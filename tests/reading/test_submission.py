@@ -306,23 +306,23 @@ def test_a_file_that_is_too_large_is_skipped_with_a_note(work, into):
 def test_a_single_file_that_is_too_large_is_an_error(work, into):
     """There is nothing else to grade."""
     file = put(work, "velocity_publisher.py", b"#" * ((8 << 20) + 1))
-    with pytest.raises(SubmissionError, match="the file cannot be graded: larger than 8 MiB"):
+    with pytest.raises(SubmissionError, match="expected at most 8 MiB, found more"):
         stage_submission(str(file), WANTED, into)
 
 
 @pytest.mark.parametrize(
     ("make", "typed", "message", "hint"),
     [
-        (None, "nobody", "nobody: expected a folder or a .py file, found nothing there", "check the path"),
-        (None, "", "expected a folder or a .py file, found an empty path", "use ."),
+        (None, "nobody", "nobody: expected a folder, a .py file or an archive, found nothing there", "check the path"),
+        (None, "", "expected a folder, a .py file or an archive, found an empty path", "use ."),
         (None, "a\0b", "a\\x00b: expected a path, found one that no file can have", ""),
         (None, "x" * 300, "x: cannot be read: File name too long", ""),
-        ("a.py", "a.py/", "a.py/: expected a folder or a .py file, found nothing there", "check the path"),
-        ("a.zip", "a.zip", "a.zip: expected a folder or a .py file, found an archive", "unpack it"),
-        ("a.tar.gz", "a.tar.gz", "a.tar.gz: expected a folder or a .py file, found an archive", "unpack it"),
-        ("a.txt", "./a.txt", "./a.txt: expected a folder or a .py file, found another kind of file", ""),
+        ("a.py", "a.py/", "a.py/: expected a folder, a .py file or an archive, found nothing there", "check the path"),
+        ("a.zip", "a.zip", "a.zip: expected a zip or tar archive, found another kind of file", "as a zip"),
+        ("a.tar.gz", "a.tar.gz", "a.tar.gz: expected a zip or tar archive, found another kind of file", "as a zip"),
+        ("a.txt", "./a.txt", "./a.txt: expected a folder, a .py file or an archive, found another kind of file", ""),
         ("d/notes.txt", "d", "d: expected at least one .py file, found none", ""),
-        ("d/alice.zip", "d", "d: expected at least one .py file, found none", "unpack alice.zip"),
+        ("d/alice.zip", "d", "d/alice.zip: expected a zip or tar archive, found another kind of file", "as a zip"),
         (
             "d/fan_controller.py.txt",
             "d",
@@ -481,3 +481,31 @@ def test_any_name_can_be_asked_for(tmp_path_factory, name):
         return
     submission = stage_submission(str(work), WANTED, into)
     assert submission.files["velocity_publisher.py"].found is not None
+
+
+def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(work, tmp_path, into, monkeypatch):
+    """Between listing and reading, nothing can be slipped in from elsewhere."""
+    put(work, "velocity_publisher.py")
+    put(work, "sub/odom_subscriber.py", "mine")
+    secret = put(tmp_path, "secret/odom_subscriber.py", "secret").parent
+    real = staging._content
+
+    def exchanged(*arguments):
+        if not (work / "sub").is_symlink():
+            (work / "sub").rename(tmp_path / "moved")
+            (work / "sub").symlink_to(secret)
+        return real(*arguments)
+
+    monkeypatch.setattr(staging, "_content", exchanged)
+    submission = stage_submission(str(work), WANTED, into)
+    assert staged_files(into) == ["velocity_publisher.py"]
+    assert submission.notes == ("not copied: sub/odom_subscriber.py (it cannot be read: Not a directory)",)
+
+
+def test_what_file_managers_leave_is_passed_over(work, into):
+    """Their files are nobody's work, and change no digest."""
+    put(work, "velocity_publisher.py")
+    for name in (".DS_Store", "sub/Thumbs.db", "desktop.ini", "._velocity_publisher.py"):
+        put(work, name)
+    assert stage_submission(str(work), WANTED, into).notes == ()
+    assert staged_files(into) == ["velocity_publisher.py"]

@@ -1,0 +1,487 @@
+"""Archives are taken in like the folder they hold, or refused; nothing is ever written outside the staging folder."""
+
+import bz2
+import contextlib
+import gzip
+import io
+import lzma
+import os
+import stat
+import struct
+import tarfile
+import zipfile
+import zlib
+
+import pytest
+from archive_samples import tarred, zipped
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from grader.model.errors import SubmissionError
+from grader.reading import archives
+from grader.reading.submission import stage_submission
+
+WANTED = ("velocity_publisher.py", "odom_subscriber.py")
+FILES = {"velocity_publisher.py": b"x = 1\n", "pkg/helper.py": b"", "pkg/data.bin": bytes(range(256)) * 40}
+
+PACKERS = {
+    "zip": zipped,
+    "stored zip": lambda files: zipped(files, zipfile.ZIP_STORED),
+    "tar": tarred,
+    "ustar": lambda files: tarred(files, format_=tarfile.USTAR_FORMAT),
+    "gnu tar": lambda files: tarred(files, format_=tarfile.GNU_FORMAT),
+    "tar.gz": lambda files: tarred(files, "gz"),
+    "tar.bz2": lambda files: tarred(files, "bz2"),
+    "tar.xz": lambda files: tarred(files, "xz"),
+    "two gzip streams": lambda files: (data := tarred(files)) and gzip.compress(data[:700]) + gzip.compress(data[700:]),
+}
+
+
+@pytest.fixture
+def into(tmp_path):
+    folder = tmp_path / "into"
+    folder.mkdir()
+    return folder
+
+
+def staged(root):
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+
+def hand_in(tmp_path, data, name="alice.zip"):
+    """Stage an archive in a folder where everything else would be noticed."""
+    place, into = tmp_path / "place", tmp_path / "place" / "staging" / "into"
+    into.mkdir(parents=True)
+    (place / name).write_bytes(data)
+    before = sorted(p for p in tmp_path.rglob("*") if into not in (p, *p.parents))
+    try:
+        return stage_submission(str(place / name), WANTED, into)
+    finally:
+        assert sorted(p for p in tmp_path.rglob("*") if into not in (p, *p.parents)) == before
+        assert all(p.is_dir() or (p.is_file() and not p.is_symlink()) for p in into.rglob("*"))
+
+
+def refusal(tmp_path, data, name="alice.zip"):
+    """Return message and hint of the refusal, without the place, and check that nothing was written."""
+    with pytest.raises(SubmissionError) as caught:
+        hand_in(tmp_path, data, name)
+    assert not list((tmp_path / "place/staging/into").iterdir())
+    where = str(tmp_path / "place" / name)
+    assert caught.value.message.startswith(where)
+    assert caught.value.hint
+    assert (caught.value.message + caught.value.hint).isprintable()
+    return caught.value.message[len(where) :].lstrip(": "), caught.value.hint
+
+
+@pytest.mark.parametrize("kind", PACKERS)
+@pytest.mark.parametrize("name", ["alice.zip", "alice.tar.gz", "alice", "alice.py", "alice.txt"])
+def test_an_archive_is_staged_like_the_folder_it_holds(tmp_path, kind, name):
+    """Every format, under whatever name: the same files, the same digest, the copy readable by everybody."""
+    if name == "alice.py" and "tar" in kind and "." not in kind:
+        pytest.skip("a .py file that looks like a tar is a program")
+    work, other = tmp_path / "w" / "alice", tmp_path / "w" / "into"
+    other.mkdir(parents=True)
+    for file, content in FILES.items():
+        (work / file).parent.mkdir(parents=True, exist_ok=True)
+        (work / file).write_bytes(content)
+    folder = stage_submission(str(work), WANTED, other)
+    archive = hand_in(tmp_path, PACKERS[kind](FILES), name)
+    assert staged(archive.root) == FILES
+    assert archive.digest == folder.digest
+    assert archive.files == folder.files
+    assert (archive.name, archive.notes) == (name, ())
+    assert stat.S_IMODE((archive.root / "pkg/helper.py").stat().st_mode) == 0o644
+
+
+def test_what_a_folder_is_copied_without_is_passed_over(tmp_path):
+    """What systems and tools add changes nothing, wherever it lies and whatever it is; what is generated is noted."""
+    extra = {"__MACOSX/._velocity_publisher.py": b"1", ".DS_Store": b"2", ".git/config": b"3", "a/__pycache__/x": b"4"}
+    extra |= {"._x.py": b"5", "a/Thumbs.db": b"6", "venv/bin/python": b"/usr/bin/python3", ".venv/lib64": b"lib"}
+    extra |= {"desktop.ini": b"7"}
+    links = {"venv/bin/python": tarfile.SYMTYPE, ".venv/lib64": tarfile.SYMTYPE}
+    generated = {
+        "build/COLCON_IGNORE": b"",
+        "build/p/velocity_publisher.py": b"",
+        "env/pyvenv.cfg": b"",
+        "env/x/y": b"",
+    }
+    plain = hand_in(tmp_path / "1", tarred(FILES))
+    full = hand_in(tmp_path / "2", tarred({**extra, **generated, **FILES}, types=links))
+    assert staged(full.root) == FILES
+    assert full.digest == plain.digest
+    assert full.notes == (
+        "not copied: build (it holds COLCON_IGNORE, so a tool made it)",
+        "not copied: env (it holds pyvenv.cfg, so a tool made it)",
+    )
+
+
+@pytest.mark.parametrize("outer", ["zip", "tar.gz"])
+@pytest.mark.parametrize("inner", ["zip", "tar.xz"])
+def test_an_archive_in_an_archive_is_opened_once(tmp_path, outer, inner):
+    """As learning platforms deliver it: the student's own archive, perhaps beside a text, is what is graded."""
+    direct = hand_in(tmp_path / "1", PACKERS[inner](FILES))
+    delivered = {"Alice_42_file_/homework.ZIP": PACKERS[inner](FILES), "Alice_42_text_/onlinetext.html": b"<p>hi"}
+    nested = hand_in(tmp_path / "2", PACKERS[outer](delivered))
+    assert staged(nested.root) == FILES
+    assert nested.digest == direct.digest
+    assert nested.notes == ("graded is what Alice_42_file_/homework.ZIP holds",)
+
+
+def test_a_folder_that_holds_one_archive_stands_for_it(tmp_path, into):
+    """A student's folder out of a bulk download."""
+    (tmp_path / "Alice").mkdir()
+    (tmp_path / "Alice/hw.zip").write_bytes(zipped(FILES))
+    submission = stage_submission(str(tmp_path / "Alice"), WANTED, into)
+    assert staged(into) == FILES
+    assert submission.name == "Alice"
+
+
+def test_an_archive_beside_programs_is_a_file_like_others(tmp_path):
+    """What lies open is graded."""
+    submission = hand_in(tmp_path, zipped({"odom_subscriber.py": b"", "old.zip": zipped(FILES)}))
+    assert set(staged(submission.root)) == {"odom_subscriber.py", "old.zip"}
+
+
+def test_deeper_nesting_and_several_archives_are_refused(tmp_path):
+    """Once and no further; and nobody guesses which of two was meant."""
+    twice = zipped({"a.zip": zipped({"b.zip": zipped(FILES)})})
+    message, hint = refusal(tmp_path / "1", twice)
+    assert (message, hint) == (
+        "/a.zip: expected at least one .py file, found none",
+        "unpack b.zip and name the folder that holds your files",
+    )
+    message, _ = refusal(tmp_path / "2", zipped({"a.zip": zipped(FILES), "b.zip": zipped(FILES)}))
+    assert message == "expected at least one .py file, found 2 archives"
+    message, _ = refusal(tmp_path / "3", zipped({"a.zip": b"PK\x03\x04 broken"}))
+    assert message == "/a.zip: expected a whole zip archive, found a damaged or incomplete one"
+
+
+BAD_NAMES = {
+    "/etc/passwd.py": "an absolute name",
+    "C:/x.py": "an absolute name",
+    "c:x.py": "an absolute name",
+    "../x.py": "a name that leads out of the archive",
+    "a/../../x.py": "a name that leads out of the archive",
+    "a/..": "a name that leads out of the archive",
+    "a/../.git/x.py": "a name that leads out of the archive",
+    "__MACOSX/../../x.py": "a name that leads out of the archive",
+    "new\nline.py": "a name with a control character",
+    "esc\x1b[2J.py": "a name with a control character",
+    "del\x7f.py": "a name with a control character",
+    "line\u2028.py": "a name with a control character",
+    "a//b.py": "a name with an empty part",
+    "a/./b.py": "a name with an empty part",
+    "con.py": "a name that Windows keeps for a device",
+    "a/NUL": "a name that Windows keeps for a device",
+    "Lpt1.tar.gz": "a name that Windows keeps for a device",
+    "aux/x.py": "a name that Windows keeps for a device",
+    "COM\u00b9 .py": "a name that Windows keeps for a device",
+    "n" * 256: "a name that is too long",
+    "\u00e9" * 128: "a name that is too long",
+    "/".join(["d" * 200] * 10) + "/x.py": "a name that is too long",
+}
+
+
+@pytest.mark.parametrize("packed", [zipped, tarred])
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_a_name_that_no_archive_may_hold_is_refused(tmp_path, packed, name):
+    """One such name and nothing is taken, also beside good files, and the name is shown harmlessly."""
+    message, hint = refusal(tmp_path, packed({**FILES, name: b"x = 2\n"}))
+    assert message.startswith(f"expected plain relative names, found {BAD_NAMES[name]}: ")
+    assert "zip" in hint
+
+
+def test_a_nul_in_a_name_of_a_zip_is_refused(tmp_path):
+    """Where one reader stops at it, another would not."""
+    data = zipped({"velocity_publisher.pyXevil": b""}).replace(b"pyXevil", b"py\0evil")
+    assert refusal(tmp_path, data)[0].startswith("expected plain relative names, found a name with a control character")
+
+
+def test_a_backslash_stands_between_parts_in_a_zip_and_is_refused_in_a_tar(tmp_path):
+    """Old Windows programs wrote it; no tar program did."""
+    submission = hand_in(tmp_path / "1", zipped({"a\\b\\velocity_publisher.py": b""}))
+    assert submission.files["velocity_publisher.py"].found == "a/b/velocity_publisher.py"
+    assert "leads out" in refusal(tmp_path / "2", zipped({"a\\..\\..\\x.py": b""}))[0]
+    assert "a name with a backslash" in refusal(tmp_path / "3", tarred({"a\\x.py": b""}))[0]
+
+
+def test_names_in_utf8_without_the_flag_are_read(tmp_path):
+    """As macOS writes them."""
+    data = zipped({"h\u00e9/velocity_publisher.py": b""})
+    plain = bytearray(data)
+    for start in (data.index(b"PK\x03\x04") + 6, data.index(b"PK\x01\x02") + 8):
+        plain[start + 1] &= ~0x08
+    assert hand_in(tmp_path, bytes(plain)).files["velocity_publisher.py"].found == "h\u00e9/velocity_publisher.py"
+
+
+@pytest.mark.parametrize("packed", [zipped, tarred])
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        (["x.py", "x.py"], "found x.py twice"),
+        (["x.py", "X.PY"], "found x.py and X.PY"),
+        (["a/x.py", "A/y.py"], "found a and A"),
+        (["a", "a/x.py"], "found a twice"),
+        (["a/x.py", "a"], "found a twice"),
+        (["a", "A/x.py"], "found a and A"),
+        (["\u00e9.py", "e\u0301.py"], "found \u00e9.py and e\u0301.py"),
+        (["stra\u00dfe.py", "STRASSE.py"], "found stra\u00dfe.py and STRASSE.py"),
+        (["./x.py", "x.py"], "found x.py twice"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_names_of_which_only_one_could_be_kept_are_refused(tmp_path, packed, names, found):
+    """Twice the same, another case, another way of composing letters, a file that is a folder too."""
+    message, _ = refusal(tmp_path, packed([(name, b"") for name in names]))
+    assert message == f"expected different names, {found}"
+
+
+@pytest.mark.parametrize(
+    ("kind", "found"),
+    [
+        (tarfile.SYMTYPE, "a link"),
+        (tarfile.LNKTYPE, "a link"),
+        (tarfile.CHRTYPE, "a device, pipe or other special file"),
+        (tarfile.BLKTYPE, "a device, pipe or other special file"),
+        (tarfile.FIFOTYPE, "a device, pipe or other special file"),
+    ],
+)
+def test_what_is_no_file_in_a_tar_is_refused(tmp_path, kind, found):
+    """Links, devices and pipes have no place in a submission, whatever they point to."""
+    data = tarred(
+        [*FILES.items(), ("odom_subscriber.py", b"velocity_publisher.py")], types={"odom_subscriber.py": kind}
+    )
+    assert refusal(tmp_path, data)[0] == f"expected plain files, found {found}: odom_subscriber.py"
+
+
+@pytest.mark.parametrize(
+    ("mode", "found"),
+    [(stat.S_IFLNK, "a link"), (stat.S_IFIFO, "a device, pipe or socket"), (stat.S_IFCHR, "a device, pipe or socket")],
+)
+def test_what_is_no_file_in_a_zip_is_refused(tmp_path, mode, found):
+    """A zip made on Unix holds links as well."""
+    data = zipped({**FILES, "x": b"/etc/passwd"}, modes={"x": mode | 0o777})
+    assert refusal(tmp_path, data)[0] == f"expected plain files, found {found}: x"
+
+
+@pytest.mark.parametrize("packed", [zipped, tarred])
+@pytest.mark.parametrize(
+    ("limit", "value", "files", "found"),
+    [
+        ("MAX_FILES", 3, [f"{n}.py" for n in range(4)], "expected at most 3 files, found more"),
+        ("MAX_ENTRIES", 3, [f".git/{n}" for n in range(4)], "expected at most 3 entries, found more"),
+        ("MAX_DEPTH", 2, ["a/b/c/x.py"], "expected at most 2 folders inside each other, found more"),
+        ("MAX_TOTAL_BYTES", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
+        ("MAX_ARCHIVE_BYTES", 0, ["a.py"], "expected at most 0 MiB, found more"),
+    ],
+)
+def test_a_limit_exceeded_is_refused(tmp_path, monkeypatch, packed, limit, value, files, found):
+    """Members, files, levels, bytes in all and of the archive itself; nothing has been written by then."""
+    monkeypatch.setattr(archives, limit, value)
+    if limit == "MAX_ENTRIES" and packed is tarred:
+        files = [f".git/{n}" for n in range(10)]
+    assert refusal(tmp_path, packed({name: os.urandom(600 << 10) for name in files}))[0] == found
+
+
+def test_a_file_that_is_too_large_is_left_out_with_a_note(tmp_path):
+    """As of a folder: a recording beside the work costs nothing."""
+    for number, packed in enumerate([zipped, tarred]):
+        submission = hand_in(tmp_path / str(number), packed({**FILES, "bag.mcap": os.urandom((8 << 20) + 1)}))
+        assert staged(submission.root) == FILES
+        assert submission.notes == ("not copied: bag.mcap (larger than 8 MiB)",)
+
+
+def test_bombs_are_refused_after_little_work(tmp_path):
+    """Much from little, in one member, in many and in streams; what is counted are real bytes."""
+    zeros = bytes(7 << 20)
+    assert "200 times" in refusal(tmp_path / "1", zipped({"a.py": zeros}))[0]
+    assert "200 times" in refusal(tmp_path / "2", zipped({f"{n}.py": zeros for n in range(10)}))[0]
+    assert "MiB unpacked" in refusal(tmp_path / "3", gzip.compress(bytes(200 << 20)))[0]
+    assert "MiB unpacked" in refusal(tmp_path / "4", bz2.compress(bytes(100 << 20)))[0]
+    assert "MiB unpacked" in refusal(tmp_path / "5", lzma.compress(bytes(100 << 20)))[0]
+    assert "compressed parts" in refusal(tmp_path / "6", gzip.compress(b"") * 5_000)[0]
+
+
+def test_a_declared_size_is_not_believed(tmp_path):
+    """A member that says one byte and holds a mebibyte, and the other way round, is damaged."""
+    for number, size in enumerate((1, 7 << 20)):
+        data = bytearray(zipped({"velocity_publisher.py": b"#" * (1 << 20)}))
+        for mark, at in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
+            start = data.index(mark) + at
+            data[start : start + 4] = struct.pack("<I", size)
+        assert "damaged or incomplete" in refusal(tmp_path / str(number), bytes(data))[0]
+
+
+def test_an_xz_that_asks_for_gigabytes_of_memory_is_refused(tmp_path):
+    """The size of the window is what the archive says; only a bounded one is given."""
+    filters = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 16 << 20}]
+    data = bytearray(lzma.compress(tarred(FILES), filters=filters))
+    # Byte 17 of the first block's header is the size of the window; 39 means 3 GiB. The header's checksum follows it.
+    header = 12
+    length = (data[header] + 1) * 4
+    assert data[header + 2] == 0x21
+    data[header + 4] = 39
+    data[header + length - 4 : header + length] = struct.pack("<I", zlib.crc32(data[header : header + length - 4]))
+    assert "damaged or incomplete" in refusal(tmp_path, bytes(data))[0]
+
+
+@pytest.mark.parametrize("kind", PACKERS)
+def test_an_archive_cut_off_anywhere_is_refused(tmp_path, kind):
+    """At any byte: never a part of the files."""
+    data = PACKERS[kind](FILES)
+    # The second block of zeros at the end of a tar, and the padding behind it, say nothing.
+    ends = len(data) if "tar" not in kind or "." in kind else len(data.rstrip(b"\0")) + 512
+    for number, size in enumerate(sorted({1, 5, 30, 200, ends // 3, ends // 2, ends - 30, ends - 1})):
+        message, _ = refusal(tmp_path / str(number), data[:size])
+        assert "damaged or incomplete" in message or "another kind of file" in message
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "found"),
+    [
+        (b"", "a.zip", "expected a zip or tar archive, found another kind of file"),
+        (b"x = 1\n", "a.zip", "expected a zip or tar archive, found another kind of file"),
+        (b"x = 1\n", "a.tar.gz", "expected a zip or tar archive, found another kind of file"),
+        (
+            gzip.compress(b"x = 1\n"),
+            "velocity_publisher.py.gz",
+            "expected a tar archive inside the gzip, found another",
+        ),
+        (b"7z\xbc\xaf\x27\x1c....", "a.zip", "expected a zip or tar archive, found 7z, which cannot be read"),
+        (b"Rar!\x1a\x07\x01\x00", "a.zip", "expected a zip or tar archive, found rar, which cannot be read"),
+        (b"\x28\xb5\x2f\xfd....", "a.tar.zst", "expected a zip or tar archive, found zstd, which cannot be read"),
+        (b"PK\x07\x08PK\x03\x04", "a.zip", "expected a zip or tar archive, found split zip, which cannot be read"),
+        (zipped({}), "a.zip", "expected at least one .py file, found none"),
+        (zipped({"x.txt": b""}), "a.zip", "expected at least one .py file, found none"),
+        (
+            zipped(FILES, zipfile.ZIP_LZMA),
+            "a.zip",
+            "expected a zip with the usual compression (deflate), found method 14",
+        ),
+        (
+            zipped(FILES, zipfile.ZIP_BZIP2),
+            "a.zip",
+            "expected a zip with the usual compression (deflate), found method 12",
+        ),
+    ],
+)
+def test_what_is_no_usable_archive_is_told(tmp_path, data, name, found):
+    """What was found decides, not the name; each refusal says what to hand in instead."""
+    if found.endswith("none"):
+        with pytest.raises(SubmissionError, match=found):
+            hand_in(tmp_path, data, name)
+        return
+    message, hint = refusal(tmp_path, data, name)
+    assert message.startswith(found)
+    assert "zip" in hint
+
+
+def test_an_encrypted_zip_is_told(tmp_path):
+    """The flag is enough: nobody is asked for a password."""
+    data = bytearray(zipped(FILES))
+    at = -1
+    while (at := data.find(b"PK\x01\x02", at + 1)) >= 0:
+        data[at + 8] |= 1
+    assert refusal(tmp_path, bytes(data))[0] == "expected an archive without a password, found an encrypted one"
+
+
+def tar_header(**changes):
+    info = tarfile.TarInfo("velocity_publisher.py")
+    for name, value in changes.items():
+        setattr(info, name, value)
+    return info.tobuf(tarfile.GNU_FORMAT)
+
+
+def pax(records):
+    body = b"".join(records)
+    padded = body + bytes(-len(body) % 512)
+    return tar_header(type=tarfile.XHDTYPE, size=len(body)) + padded + tar_header(size=4) + b"x=1\n" + bytes(508 + 1024)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pax([b"11 size=512\n"]),  # another size than the header says
+        pax([b"12 size=-999\n"]),
+        pax([b"5 a=\n", b"9999 path=x\n"]),
+        pax([b"1 "] * 3_000),  # records that overlap each other
+        pax([b"0 a=b\n"]),
+        pax([b"22 GNU.sparse.major=1\n", b"22 GNU.sparse.minor=0\n"]),
+        pax([b"61 path=" + b"1" * 52 + b"\n"]),
+        tar_header(type=tarfile.XHDTYPE, size=1 << 20) + bytes((1 << 20) + 1024),
+        tar_header(type=tarfile.GNUTYPE_LONGNAME, size=1 << 20) + b"n" * (1 << 20) + tar_header() + bytes(1024),
+        tar_header(type=tarfile.GNUTYPE_SPARSE) + bytes(1024),
+        tar_header(size=-512) + bytes(1024),
+        tar_header(size=1 << 40) + bytes(1024),
+        tar_header() + b"\xff" * 512,
+        tar_header(),
+    ],
+)
+def test_a_tar_that_two_readers_could_read_differently_is_refused(tmp_path, data):
+    """Headers that move, stretch or hide a member, or that cost more than they are worth."""
+    message, _ = refusal(tmp_path, data)
+    assert "damaged or incomplete" in message or "a feature that is not supported" in message
+
+
+def test_a_tar_of_the_folder_itself_is_read(tmp_path):
+    """`tar -c .` puts `./` before every name."""
+    data = tarred([("./", b""), ("./velocity_publisher.py", b"x = 1\n")], types={"./": tarfile.DIRTYPE})
+    assert staged(hand_in(tmp_path, data).root) == {"velocity_publisher.py": b"x = 1\n"}
+
+
+PART = st.sampled_from(
+    ["a", "B", "b", "..", ".", "", "con", "x.py", "velocity_publisher.py", ".git", "\n", "C:"]
+) | st.text(st.characters(exclude_characters="/", exclude_categories=("Cs",)), min_size=1, max_size=5)
+NAME = st.lists(PART, min_size=1, max_size=4).map("/".join)
+MEMBERS = st.lists(st.tuples(NAME, st.binary(max_size=20), st.sampled_from(["file", "file", "file", "link", "pipe"])))
+TAR_TYPES = {"file": tarfile.REGTYPE, "link": tarfile.SYMTYPE, "pipe": tarfile.FIFOTYPE}
+ZIP_MODES = {"file": stat.S_IFREG, "link": stat.S_IFLNK, "pipe": stat.S_IFIFO}
+
+
+def any_archive(members, *, as_zip):
+    buffer = io.BytesIO()
+    if as_zip:
+        with zipfile.ZipFile(buffer, "w") as archive:
+            for name, content, kind in members:
+                info = zipfile.ZipInfo("x")
+                info.filename, info.external_attr = name, ZIP_MODES[kind] << 16
+                archive.writestr(info, content)
+    else:
+        with tarfile.open(fileobj=buffer, mode="w:") as archive:
+            for name, content, kind in members:
+                info = tarfile.TarInfo(name)
+                info.type, info.linkname = TAR_TYPES[kind], "/etc/passwd"
+                info.size = len(content) if kind == "file" else 0
+                archive.addfile(info, io.BytesIO(content))
+    return buffer.getvalue()
+
+
+@given(members=MEMBERS, as_zip=st.booleans())
+@example(members=[("x.py", b"1", "file"), ("a/B", b"2", "file")], as_zip=True)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_any_archive_is_staged_exactly_or_refused(tmp_path_factory, members, as_zip):
+    """Either each of its files that counts lies in the staging folder, and nothing else anywhere, or nothing does."""
+    tmp_path = tmp_path_factory.mktemp("any")
+    try:
+        submission = hand_in(tmp_path, any_archive(members, as_zip=as_zip))
+    except SubmissionError:
+        assert not list((tmp_path / "place/staging/into").iterdir())
+        return
+    counted = {
+        n: c for n, c, kind in members if kind == "file" and not any(p.startswith(".") for p in n.split("/")[:-1])
+    }
+    counted = {n: c for n, c in counted.items() if not n.split("/")[-1].startswith("._") and not n.endswith("/")}
+    names = {n.replace("\\", "/") if as_zip else n: c for n, c in counted.items()}
+    assert staged(submission.root) == {n: c for n, c in names.items() if n != ".DS_Store"}
+
+
+@given(start=st.sampled_from(sorted(PACKERS)), seed=st.data())
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_a_damaged_archive_never_breaks_the_intake(tmp_path_factory, start, seed):
+    """Bytes changed anywhere: some files or a refusal, but no other error, and nothing elsewhere."""
+    data = bytearray(PACKERS[start](FILES))
+    for _ in range(seed.draw(st.integers(1, 6))):
+        data[seed.draw(st.integers(0, len(data) - 1))] = seed.draw(st.integers(0, 255))
+    with contextlib.suppress(SubmissionError):
+        hand_in(tmp_path_factory.mktemp("damaged"), bytes(data))
