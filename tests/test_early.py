@@ -1,0 +1,80 @@
+"""Partial reports: one whenever an exercise is done and others are not, and never a mark for what is to come."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.early import EarlyReports
+from grader.model.exercise import Outcome
+from grader.model.report import Environment
+from grader.model.run import Run
+from grader.model.submission import StudentFile, Submission
+from grader.model.trace import ClockKind, Trace
+from grader.session import Request, read_exercises
+
+EXERCISES = read_exercises(Request("x"))
+SCENARIOS = [(exercise.id, scenario.id) for exercise in EXERCISES for scenario in exercise.scenarios]
+
+
+def a_run():
+    files = {name: StudentFile(name, name) for exercise in EXERCISES for name in exercise.files}
+    submission = Submission("ada", "./ada", Path("nowhere"), "sha256:" + "0" * 64, files)
+    environment = Environment("0.1.0", "jazzy", "7.1.6", "rmw_fastrtps_cpp", "3.11.9", "none")
+    return Run(submission, traces={}, sources={}, environment=environment, seed=7)
+
+
+def silent(scenario):
+    return Trace(scenario, ClockKind.VIRTUAL, stop_ns=10**10, observations=())
+
+
+@pytest.fixture
+def heard():
+    return []
+
+
+def take_all(reports, scenarios):
+    for exercise, scenario in scenarios:
+        reports.take((exercise, scenario), silent(scenario))
+
+
+def test_every_exercise_but_the_last_makes_a_report(heard):
+    """After the last one the whole report follows at once."""
+    take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS)
+    assert [report.pending for report in heard] == [
+        ("odom_subscriber", "two_node_communication"),
+        ("two_node_communication",),
+    ]
+
+
+def test_the_order_of_the_recordings_does_not_matter(heard):
+    """An exercise on the wall clock may come last although it was asked for first."""
+    take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS[::-1])
+    assert [report.pending for report in heard] == [
+        ("velocity_publisher", "odom_subscriber"),
+        ("velocity_publisher",),
+    ]
+
+
+def test_what_is_to_come_is_undecided_and_counts_in_the_maximum(heard):
+    """A share of all points means the same in a partial report as in the whole one."""
+    take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS)
+    for report in heard:
+        assert not report.final
+        assert report.max_score == 100
+        for part in report.exercises:
+            outcomes = {verdict.outcome for verdict in part.verdicts}
+            assert (outcomes == {Outcome.UNDECIDED}) == (part.id in report.pending)
+
+
+def test_an_exercise_whose_files_are_missing_is_judged_with_the_first(heard):
+    """Nothing of it is recorded, so nothing of it is awaited."""
+    scenarios = [key for key in SCENARIOS if key[0] != "odom_subscriber"]
+    take_all(EarlyReports(EXERCISES, scenarios, a_run(), heard.append), scenarios)
+    assert [report.pending for report in heard] == [("two_node_communication",)]
+
+
+def test_one_exercise_makes_no_partial_report(heard):
+    """There is nothing to wait for."""
+    first = [key for key in SCENARIOS if key[0] == "velocity_publisher"]
+    take_all(EarlyReports(EXERCISES[:1], first, a_run(), heard.append), first)
+    assert heard == []
