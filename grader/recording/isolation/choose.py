@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from grader.model.containment import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, TierReport
+from grader.model.containment import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
 from grader.model.errors import EnvironmentFault
-from grader.recording.isolation import landlock, selftest
+from grader.recording.isolation import landlock, selftest, tiers
 from grader.recording.isolation.mechanisms import NOTHING
 from grader.recording.isolation.memory import Memory
 from grader.recording.isolation.protocol import Isolation
@@ -19,6 +19,8 @@ from grader.recording.ros_installation import RosInstallation
 __all__ = ["AUTO", "Choice", "choose_isolation", "inspect_tiers", "isolation_from_name"]
 
 AUTO = "auto"
+#: So much of the reason against one tier is told where all of them are refused.
+MOST_CHARACTERS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +83,11 @@ def inspect_tier(name: str, ros: RosInstallation, *, afresh: bool = False) -> Ti
     if remembered is not None:
         return remembered
     report = selftest.inspect(isolation, ros)
+    report = replace(report, remedy=remedy_for(report))
     if _kept(report):
+        # What fails may fail because the machine is busy, or be mended in the next minute.
         memory.keep(report)
-        return report
-    return TierReport(name, report.tier, report.usable, report.why, report.properties, remedy_for(report))
+    return report
 
 
 def _named(wanted: str, ros: RosInstallation) -> Choice:
@@ -103,8 +106,15 @@ def _kept(report: TierReport) -> bool:
 
 
 def _refusal(tried: Sequence[TierReport]) -> EnvironmentFault:
-    found = "; ".join(f"{report.name}: {report.why}" for report in tried if "expected root" not in report.why)
-    remedies = [report.remedy for report in tried if report.remedy]
-    hint = remedies[0] if remedies else "look at what each tier lacks: grade doctor"
+    mine = [report for report in tried if not tiers.is_for_others(report.name)]
+    found = "; ".join(f"{report.name}: {_shortly(report)}" for report in mine)
+    # The remedy of a tier for another user comes last: it asks for the most.
+    remedies = [report.remedy for report in (*mine, *tried) if report.remedy]
+    hint = remedies[0] if remedies else "grade doctor says what each tier lacks"
     wanted = ", ".join(REQUIRED)
     return EnvironmentFault(f"isolation: expected a sandbox that contains {wanted}, found none ({found})", hint)
+
+
+def _shortly(report: TierReport) -> str:
+    open_ones = [found.name for found in missing(report.properties)]
+    return f"not contained: {', '.join(open_ones)}" if open_ones else report.why[:MOST_CHARACTERS]

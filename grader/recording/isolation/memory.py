@@ -29,43 +29,46 @@ class Memory:
     """The place of one tier's self-test.
 
     Attributes:
-        folder: The user's own folder; None if there is none.
-        key: Everything that a result depends on, as a digest: with another key there is another file.
+        file: A file in the user's own folder; None if there is no such folder.
+        key: Everything that a result depends on, as a digest: what was remembered under another key is ignored.
     """
 
-    folder: Path | None
+    file: Path | None
     key: str
 
     @classmethod
     def of(cls, tier: str, ros: RosInstallation) -> Memory:
         """Return the place for a tier, this machine as it is booted, this user and this ROS."""
         text = "\n".join((tier, *circumstances(ros)))
-        return cls(own_folder(), hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:32])
+        folder = own_folder()
+        key = hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+        return cls(folder / f"sandbox-{tier}.json" if folder else None, key)
 
     def recall(self) -> TierReport | None:
         """Return the self-test remembered, if there is one and the file is this user's alone."""
-        if self.folder is None:
+        if self.file is None:
             return None
         try:
-            descriptor = os.open(self.folder / self.key, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+            descriptor = os.open(self.file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
             with os.fdopen(descriptor, "rb") as file:
                 found = os.fstat(descriptor)
                 if found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) != 0o600 or found.st_size > LARGEST:
                     return None
-                return report_from_json(json.loads(file.read(LARGEST)))
+                remembered = json.loads(file.read(LARGEST))
+            return report_from_json(remembered["report"]) if remembered["key"] == self.key else None
         except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
             return None
 
     def keep(self, report: TierReport) -> None:
         """Remember a self-test, if that can be done."""
-        if self.folder is None:
+        if self.file is None:
             return
-        draft = self.folder / f".{self.key}-{secrets.token_hex(4)}"
+        draft = self.file.with_name(f".{secrets.token_hex(8)}")
         with contextlib.suppress(OSError):
             descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
             with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-                json.dump(asdict(report), file)
-            draft.replace(self.folder / self.key)
+                json.dump({"key": self.key, "report": asdict(report)}, file)
+            draft.replace(self.file)
 
 
 def report_from_json(values: object) -> TierReport:

@@ -21,7 +21,7 @@ INSTALLERS = {
     "zypper": "zypper install -y",
     "apk": "apk add",
 }
-IN_CONTAINER = "start the container with --network none, or with --privileged for a stronger sandbox"
+IN_CONTAINER = "start the container without a network: docker run --network none"
 
 
 def install_command(package: str) -> str:

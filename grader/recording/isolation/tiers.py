@@ -31,7 +31,13 @@ def isolation_from_name(name: str) -> Isolation:
         return FlatBubblewrap.here()
     if name == plain.NAME:
         return Plain()
-    if (name == bubblewrap.ROOT_NAME) != (os.geteuid() == 0):
+    if is_for_others(name):
         wanted, mend = ("root", "run it with sudo") if name == bubblewrap.ROOT_NAME else ("an ordinary user", "")
         raise EnvironmentFault(f"isolation {name}: expected {wanted}, found user {os.geteuid()}", mend)
     return Bubblewrap.here()
+
+
+def is_for_others(name: str) -> bool:
+    """Return whether a tier is root's and this is not root, or the other way round."""
+    as_root = os.geteuid() == 0
+    return name == (bubblewrap.USER_NAME if as_root else bubblewrap.ROOT_NAME)
