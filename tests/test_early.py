@@ -1,5 +1,9 @@
 """Partial reports: one whenever an exercise is done and others are not, and never a mark for what is to come."""
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +16,7 @@ from grader.model.submission import StudentFile, Submission
 from grader.model.trace import ClockKind, Trace
 from grader.session import Request, read_exercises
 
+REFERENCE = Path(__file__).resolve().parent.parent / "reference_solutions"
 EXERCISES = read_exercises(Request("x"))
 SCENARIOS = [(exercise.id, scenario.id) for exercise in EXERCISES for scenario in exercise.scenarios]
 
@@ -78,3 +83,27 @@ def test_one_exercise_makes_no_partial_report(heard):
     first = [key for key in SCENARIOS if key[0] == "velocity_publisher"]
     take_all(EarlyReports(EXERCISES[:1], first, a_run(), heard.append), first)
     assert heard == []
+
+
+@pytest.mark.ros
+def test_a_platform_that_ends_the_run_finds_what_was_earned(tmp_path):
+    """Each exercise that is done adds its points to the file; killed after the first, they are there."""
+    pipe = tmp_path / "results.json"
+    os.mkfifo(pipe)
+    command = [
+        sys.executable,
+        "-c",
+        "from grader.cli import main; main()",
+        str(REFERENCE),
+        "-o",
+        f"gradescope={pipe}",
+        "--no-progress",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
+        try:
+            found = [json.loads(pipe.read_text()) for _ in range(2)]  # each reading waits for the next writing
+        finally:
+            running.kill()
+    assert [whole["score"] for whole in found] == [30, 60]
+    assert [len(whole["extra_data"]["pending"]) for whole in found] == [2, 1]
+    assert "This report is partial" in found[1]["output"]
