@@ -72,8 +72,8 @@ class WallConductor:
         )
 
     def _slip(self) -> str:
-        """Say that the machine did not keep up, if it did not."""
-        if self.held_up_ns <= HELD_UP_NS:
+        """Say that the machine did not keep up, if it did not; a node that floods holds it up itself."""
+        if self.held_up_ns <= HELD_UP_NS or self._tape.full:
             return ""
         return "the machine was too busy: a reference timer beside the node was held up as well"
 

@@ -180,3 +180,10 @@ def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock)
     gone = ("/odom", "", False)
     assert Run(quiet, recordings=(recording,), duration_ns=600 * MS).observer.advertised[-1] != gone
     assert Run(quiet, recordings=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
+
+
+def test_a_node_that_floods_is_no_excuse(clock):
+    """What holds the machine up is then the node itself: it is judged, not let off."""
+    clock.held_up = {300: 400}
+    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500)).trace
+    assert (trace.harness_problem, len(trace.messages("/cmd_vel"))) == ("", 500)
