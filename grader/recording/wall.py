@@ -66,6 +66,7 @@ class WallConductor:
             scenario=self._plan.scenario,
             clock=ClockKind.WALL,
             stop_ns=self._end_ns,
+            clock_reason="it was asked for",
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             harness_problem=self._slip(),
