@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from grader.model.quantities import NS_PER_MS
@@ -36,6 +37,8 @@ class Held:
 
 def as_number(value: object) -> float | None:
     """Return a plain JSON value as a number; a bool, a string or a list is none."""
+    if type(value) is float:  # nearly always, and this is asked very often
+        return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:
@@ -92,18 +95,23 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
 def field(value: Mapping[str, Any], path: str) -> float | None:
     """Return the number at a path such as `linear.x`, or None if there is none."""
     here: Any = value
-    for name in path.split("."):
-        if not isinstance(here, Mapping) or name not in here:
+    for name in _names(path):
+        if not isinstance(here, (dict, Mapping)) or name not in here:  # a dict is known for one much faster
             return None
         here = here[name]
     return as_number(here)
+
+
+@lru_cache(maxsize=256)
+def _names(path: str) -> tuple[str, ...]:
+    return tuple(path.split("."))
 
 
 def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
     """Return every number of a message by its path."""
     found: dict[str, float] = {}
     for name, inner in value.items():
-        if isinstance(inner, Mapping):
+        if isinstance(inner, (dict, Mapping)):
             found |= leaves(inner, f"{prefix}{name}.")
         elif (got := as_number(inner)) is not None:
             found[f"{prefix}{name}"] = got

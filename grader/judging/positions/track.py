@@ -5,10 +5,11 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from grader.judging.values import JITTER_NS, leaves
+from grader.judging.values import JITTER_NS, field
 from grader.model.quantities import NS_PER_MS
-from grader.model.trace import Trace
+from grader.model.trace import Delivery, Trace
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop reads a queue.
 STALE_NS = 500 * NS_PER_MS
@@ -20,14 +21,23 @@ _NAN = float("nan")
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """One odometry message: when it was delivered and every number in it by path."""
+    """One odometry message: when it was delivered, its position, and all its fields."""
 
     t_ns: int
-    numbers: Mapping[str, float]
+    x: float
+    y: float
+    fields: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, delivery: Delivery) -> Pose:
+        """Return the pose that a message carries."""
+        return cls(delivery.t_ns, _number(delivery.value, X), _number(delivery.value, Y), delivery.value)
 
     def at(self, path: str) -> float:
         """Return a number of the message; NaN, which matches nothing, if it has none there."""
-        return self.numbers.get(path, _NAN)
+        if path == X:
+            return self.x
+        return self.y if path == Y else _number(self.fields, path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +66,7 @@ class Track:
 
 def track_of(trace: Trace, topic: str) -> Track | None:
     """Return the odometry that was played on a topic, or None if none was."""
-    poses = tuple(Pose(d.t_ns, leaves(d.value)) for d in trace.deliveries(topic) if d.t_ns < trace.stop_ns)
+    poses = tuple(Pose.of(d) for d in trace.deliveries(topic) if d.t_ns < trace.stop_ns)
     if not poses:
         return None
     times = tuple(p.t_ns for p in poses)
@@ -64,3 +74,8 @@ def track_of(trace: Trace, topic: str) -> Track | None:
     start_ns = min(starts[0].t_ns, times[0]) if starts else times[0]
     stop_ns = stops[-1].t_ns if stops else times[-1] + (times[-1] - times[0]) // max(1, len(times) - 1)
     return Track(poses, times, start_ns, min(stop_ns, trace.stop_ns), JITTER_NS[trace.clock])
+
+
+def _number(fields: Mapping[str, Any], path: str) -> float:
+    found = field(fields, path)
+    return _NAN if found is None else found
