@@ -197,8 +197,18 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
 
 
 def command(report: Report) -> list[str]:
-    """Return the words of the command that gives the report again, quoted for a shell; safe to show as text."""
-    return [shown(quoted(word), limit=_WORD_LIMIT) for word in report.reproduce.command]
+    """Return the command that gives the report again, quoted for a shell and safe to show as text.
+
+    Its pieces are to be joined by spaces; an option and its value are one piece.
+    """
+    pieces: list[str] = []
+    for word in report.reproduce.command:
+        text = shown(quoted(word), limit=_WORD_LIMIT)
+        if pieces and pieces[-1].startswith("--") and " " not in pieces[-1]:
+            pieces[-1] += f" {text}"
+        else:
+            pieces.append(text)
+    return pieces
 
 
 def _short(digest: str) -> str:
