@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import grader
-from grader.commands import rejudge
+from grader.commands import doctor, rejudge
 from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
@@ -28,12 +27,10 @@ from grader.options import (
     parse_outputs,
     parse_percent,
 )
+from grader.progress import shown_progress
 from grader.reports.delivery import Output, deliver, early_delivery, prepared
 from grader.reports.escape import encoded, shown
 from grader.reports.formats import FORMATS
-
-if TYPE_CHECKING:
-    from grader.session import Progress
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -152,7 +149,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     keeper = keeping.Keeper(folders, request)
-    with _progress(wanted=not no_progress) as progress:
+    with shown_progress(wanted=not no_progress) as progress:
         report = session.grade(request, progress, keeper.hear, early_delivery(wanted))
     for found in missing(report.environment.containment):
         _warn(f"sandbox {report.environment.isolation}: {found}")
@@ -181,7 +178,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
     from grader.reports.observed import render_summary, summary_to_json  # noqa: PLC0415
 
     request = observing.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
-    with _progress(wanted=True) as progress:
+    with shown_progress(wanted=True) as progress:
         summary = observing.observe(request, progress)
     text = summary_to_json(summary) if as_json else render_summary(summary)
     sys.stdout.buffer.write(encoded(text, sys.stdout.encoding or "utf-8"))
@@ -194,6 +191,7 @@ app = CommandLine(_grade, name="grade", context_settings={"help_option_names": [
 _grade.context_settings = app.context_settings
 app.add_command(_observe)
 app.add_command(rejudge.command)
+app.add_command(doctor.command)
 
 
 def main() -> None:
@@ -236,20 +234,3 @@ def _complain(*lines: str, hint: str) -> None:
 def _warn(*lines: str) -> None:
     for line in lines:
         click.echo(f"warning: {shown(line)}", err=True)
-
-
-def _say_nothing(step: str) -> None:
-    del step
-
-
-@contextmanager
-def _progress(*, wanted: bool) -> Iterator[Progress]:
-    """Show on a terminal what is being done, and leave no trace of it there."""
-    if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
-        yield _say_nothing
-        return
-    from rich.console import Console  # noqa: PLC0415  only for a terminal
-    from rich.text import Text  # noqa: PLC0415
-
-    with Console(stderr=True).status("starting") as status:
-        yield lambda step: status.update(Text(shown(step)))

@@ -76,6 +76,21 @@ def early_delivery(outputs: Sequence[Output]) -> Callable[[Report], None] | None
     return write if files else None
 
 
+def show(render: Callable[[Layout], str], *, for_people: bool) -> None:
+    """Print something on standard output.
+
+    Args:
+        render: Makes the text, as wide and as coloured as it is told.
+        for_people: Whether a terminal with a poor encoding gets plain signs; programs read UTF-8.
+
+    Raises:
+        OSError: It cannot be written; a reader that had enough is no problem.
+    """
+    if sys.stdout is not None:
+        layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
+        _print(encoded(render(layout), sys.stdout.encoding if for_people else "utf-8"))
+
+
 def _refuse_twins(paths: Sequence[Path]) -> None:
     targets = [os.path.realpath(path) for path in paths]
     for path, target in zip(paths, targets, strict=True):
@@ -108,10 +123,8 @@ def _write(report: Report, output: Output) -> None:
     render = FORMATS[output.format]
     if output.path is not None:
         write_whole(output.path, render(report, Layout(_FILE_WIDTH, colour=False)).encode("utf-8"))
-    elif sys.stdout is not None:
-        layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
-        # A poor encoding is that of a terminal; programs read UTF-8.
-        _print(encoded(render(report, layout), sys.stdout.encoding if output.format == "text" else "utf-8"))
+    else:
+        show(lambda layout: render(report, layout), for_people=output.format == "text")
 
 
 def _coloured(stream: TextIO) -> bool:
