@@ -7,9 +7,9 @@ Times are integer nanoseconds since the scenario started. Within one instant obs
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, TypeVar
 
 
 class ClockKind(str, Enum):
@@ -184,6 +184,7 @@ class Mark:
     detail: str = ""
 
 
+Kind = TypeVar("Kind")
 Observation = Message | Delivery | LogRecord | OutputLine | GraphSnapshot | Fault | Offer | Mark
 
 
@@ -208,36 +209,44 @@ class Trace:
     clock_reason: str = ""
     notes: tuple[str, ...] = ()
     harness_problem: str = ""
+    _kinds: dict[type, tuple[Any, ...]] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
+        """Return the observations of a kind, in order; they are sorted out when first asked for."""
+        if not self._kinds:
+            sorted_out: dict[type, list[Observation]] = {}
+            for observation in self.observations:
+                sorted_out.setdefault(type(observation), []).append(observation)
+            self._kinds.update((of, tuple(found)) for of, found in sorted_out.items())
+        return self._kinds.get(kind, ())
 
     def messages(self, topic: str | None = None) -> tuple[Message, ...]:
         """Return the messages published by student nodes, on one topic or on all."""
-        return tuple(o for o in self.observations if isinstance(o, Message) and topic in (None, o.topic))
+        return tuple(o for o in self.of(Message) if topic in (None, o.topic))
 
     def deliveries(self, topic: str) -> tuple[Delivery, ...]:
         """Return what the grader published on a topic."""
-        return tuple(o for o in self.observations if isinstance(o, Delivery) and o.topic == topic)
+        return tuple(o for o in self.of(Delivery) if o.topic == topic)
 
     def records(self, process: str | None = None) -> tuple[LogRecord, ...]:
         """Return the records written through rclpy loggers, by one process or by all."""
-        return tuple(o for o in self.observations if isinstance(o, LogRecord) and process in (None, o.process))
+        return tuple(o for o in self.of(LogRecord) if process in (None, o.process))
 
     def lines(self, process: str | None = None) -> tuple[OutputLine, ...]:
         """Return the lines written without the logger, by one process or by all."""
-        return tuple(o for o in self.observations if isinstance(o, OutputLine) and process in (None, o.process))
+        return tuple(o for o in self.of(OutputLine) if process in (None, o.process))
 
     def faults(self, process: str | None = None) -> tuple[Fault, ...]:
         """Return the faults, of one process or of all."""
-        return tuple(o for o in self.observations if isinstance(o, Fault) and process in (None, o.process))
+        return tuple(o for o in self.of(Fault) if process in (None, o.process))
 
     def graphs(self) -> tuple[GraphSnapshot, ...]:
         """Return the snapshots of the live graph; a new one is there whenever the graph had changed."""
-        return tuple(o for o in self.observations if isinstance(o, GraphSnapshot))
+        return self.of(GraphSnapshot)
 
     def marks(self, name: str, detail: str | None = None) -> tuple[Mark, ...]:
         """Return the marks of a name, with one detail or with any."""
-        return tuple(
-            o for o in self.observations if isinstance(o, Mark) and o.name == name and detail in (None, o.detail)
-        )
+        return tuple(o for o in self.of(Mark) if o.name == name and detail in (None, o.detail))
 
     def endpoints(self, kind: str, topic: str | None = None) -> tuple[Endpoint, ...]:
         """Return every `publisher` or `subscription` that was ever in the graph, each once, in order of appearance."""

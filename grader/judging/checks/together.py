@@ -132,6 +132,8 @@ class AnswersTogether:
         later = [a for a in answers if a.t_ns - _CURRENT_NS > times[0]]
         if len(later) < _FEWEST_FOR_SHARE:
             return None
+        prompt = trace.clock is ClockKind.VIRTUAL and len(inputs) <= 2 * len(answers) <= 2 * len(inputs)
+        enough = _AGREEING_SHARE_PROMPT if prompt else _AGREEING_SHARE
         shares = []
         for delay_ns in (-JITTER_NS[trace.clock], *range(0, _CURRENT_NS + 1, _CURRENT_NS // 5)):
             for side in (bisect_left, bisect_right):
@@ -140,9 +142,8 @@ class AnswersTogether:
                     within(a.value, self._expected(r.value), _EXACT) for a, r in zip(later, seen, strict=True)
                 )
                 shares.append(fitting / len(later))
-        prompt = trace.clock is ClockKind.VIRTUAL and len(inputs) <= 2 * len(answers) <= 2 * len(inputs)
-        if max(shares) >= (_AGREEING_SHARE_PROMPT if prompt else _AGREEING_SHARE):
-            return None
+                if shares[-1] >= enough:
+                    return None
         reason = f"{self.output}: at best {number(100 * max(shares))} % of {len(later)} answers fit {self.input}, "
         return not_met(f"{reason}expected all of them", evidence)
 
@@ -160,9 +161,10 @@ class AnswersTogether:
         for asked in inputs:
             if asked.t_ns + _SPEAK_NS >= trace.stop_ns:
                 break
-            if any(asked.t_ns <= a.t_ns <= asked.t_ns + _SPEAK_NS for a in answers):
+            later = bisect_left(answers, asked.t_ns, key=_time)
+            if later < len(answers) and answers[later].t_ns <= asked.t_ns + _SPEAK_NS:
                 continue
-            before = [a for a in answers if a.t_ns < asked.t_ns]
+            before = answers[:later]
             # before its first answer nobody knows what a controller that publishes on change believes
             if before and not within(before[-1].value, self._expected(asked.value), _EXACT):
                 return self._stopped(trace, self.output, before[-1].t_ns, evidence)
@@ -216,9 +218,13 @@ def _recent(inputs: Sequence[Reading], t_ns: int, jitter_ns: int) -> list[Readin
 
     On the wall clock an input may reach the controller, and its answer the observer, before the input does.
     """
-    until = [r for r in inputs if r.t_ns <= t_ns + jitter_ns]
-    older = [r for r in until if r.t_ns <= t_ns - _CURRENT_NS]
-    return older[-1:] + [r for r in until if r.t_ns > t_ns - _CURRENT_NS]
+    stop = bisect_right(inputs, t_ns + jitter_ns, key=_time)
+    start = bisect_right(inputs, t_ns - _CURRENT_NS, hi=stop, key=_time)
+    return list(inputs[max(0, start - 1) : stop])
+
+
+def _time(reading: Reading) -> int:
+    return reading.t_ns
 
 
 def _kept_apart(trace: Trace, topic: str) -> Finding | None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from grader.judging.findings import met, not_met
 from grader.judging.silence import explain_no_message, explain_no_subscription, student_endpoints
@@ -104,12 +105,26 @@ class FieldValues:
         messages = published(trace, self.topic)
         if not messages:
             return explain_no_message(trace, self.topic)
-        wrong = [m for m in messages if self._wrong_fields(m)]
+        wrong = self._differing(messages)
         if wrong:
             return self._differs(wrong, len(messages))
         wanted = ", ".join(f"{path} = {number(want)}" for path, want in self.values.items())
         reason = f"{self.topic}: {wanted} in {counted(len(messages), 'message')}"
         return met(reason, {"topic": self.topic, "values": dict(self.values), "messages": len(messages), "wrong": 0})
+
+    def _differing(self, messages: Sequence[Message]) -> list[Message]:
+        """Return the messages with a wrong field; one that equals a right one before it is right."""
+        wrong = []
+        right: tuple[str, Mapping[str, Any]] | None = None
+        for message in messages:
+            content = (message.type, message.value)
+            if content == right:
+                continue
+            if self._wrong_fields(message):
+                wrong.append(message)
+            else:
+                right = content
+        return wrong
 
     def _wrong_fields(self, message: Message) -> dict[str, float | None]:
         got = {path: field(message.value, path) for path in self.values}
