@@ -59,7 +59,7 @@ def _units(report: Report) -> tuple[Fraction, list[_Row]]:
     scores, tops = [v.score for _, v in found], [v.max_score for _, v in found]
     unit = _greatest_unit([*scores, *tops])
     counts = [(int(s / unit), int(t / unit)) for s, t in zip(scores, tops, strict=True)]
-    if sum(top for _, top in counts) > MOST_ROWS:
+    if unit < 1 and sum(top for _, top in counts) > MOST_ROWS:
         unit, counts = Fraction(1), whole_points(scores, tops)
     return unit, [(e, v, *count) for (e, v), count in zip(found, counts, strict=True)]
 

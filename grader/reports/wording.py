@@ -193,7 +193,7 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
         rows.append(("rubrics", ", ".join(f"{id_} {_short(digest)}" for id_, digest in report.reproduce.rubrics)))
     if report.reproduce.recording:
         rows.append(("recording", _short(report.reproduce.recording)))
-    return [(name, shown(value)) for name, value in rows]
+    return [(name, shown(value, limit=_WORD_LIMIT)) for name, value in rows]
 
 
 def command(report: Report) -> list[str]:

@@ -5,6 +5,8 @@ import json
 from fractions import Fraction
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from report_samples import SAMPLES, exercise, hostile, middling, perfect, report, undecided
 
 from grader.model.exercise import Outcome
@@ -50,6 +52,23 @@ def test_rows_have_every_key_that_the_reporter_reads(name):
         assert {"name", "status", "score", "message", "test_code", "filename", "line_no", "duration"} == set(test)
         assert test["status"] in ("pass", "fail", "error")
         assert isinstance(test["line_no"], int)
+
+
+SHARES = st.fractions(min_value=0, max_value=1, max_denominator=12)
+
+
+@given(st.lists(st.tuples(st.integers(1, 40), SHARES), min_size=1, max_size=12))
+def test_both_totals_agree_for_any_scores(rows):
+    """Thirds, halves and whole points mixed; where rows would be too many, both are the rounded score."""
+    verdicts = [
+        Verdict(f"c{n}", "C", Outcome.MET if share == 1 else Outcome.PARTLY, top * share, Fraction(top), "x")
+        for n, (top, share) in enumerate(rows)
+    ]
+    sample = report(exercise("e", "1", "E", *verdicts))
+    found = result(sample)
+    assert console_total(found) == pytest.approx(annotation_total(found), abs=1e-3)
+    assert abs(annotation_total(found) - float(sample.score)) < 1
+    assert (found["status"] == "pass") == (annotation_total(found) == found["max_score"])
 
 
 def test_the_status_tells_a_lost_point_from_a_fault_of_ours():
