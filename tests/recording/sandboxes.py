@@ -17,14 +17,16 @@ import grader
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation.bubblewrap import Bubblewrap
 from grader.recording.isolation.environment import runtime_environment
-from grader.recording.isolation.plain import Plain
+from grader.recording.isolation.exposure import closed_folders
+from grader.recording.isolation.flat import FlatBubblewrap
+from grader.recording.isolation.landlock import Landlock
 from grader.recording.isolation.protocol import Command, Isolation, Limits, StudentProcess
+from grader.recording.isolation.tiers import isolation_from_name
+from grader.recording.isolation.view import view_of
 from grader.recording.ros_installation import RosInstallation
 
 HOST = Path(grader.__file__).resolve().parent / "host"
 USER = 1000
-# Through env, since setpriv itself still finds programs with root's eyes.
-AS_USER = ("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "env")
 
 # The worker of these tests: starts the student's command that the test prepared, and ends as it ends.
 RELAY = """
@@ -113,25 +115,57 @@ def close(command: Command) -> None:
 
 
 def walls(name: str, ros: RosInstallation, submission: Path) -> Sandbox | str:
-    """Return the sandbox of a tier, or why this machine and user cannot have it."""
-    if name == "none":
-        return Sandbox(Plain(), ros, submission)
+    """Return the sandbox of a tier, or why this machine and user cannot have it.
+
+    `landlock` and `bubblewrap-flat` are there twice: with `-user` behind the name as an ordinary user has them.
+    """
+    as_user = os.geteuid() == 0 and (name.endswith("-user") or name == "bubblewrap")
     try:
-        here = Bubblewrap.here()
+        isolation = _isolation(name.removesuffix("-user"), as_user=as_user)
     except EnvironmentFault as fault:
         return fault.message
-    if name == here.name:
-        return Sandbox(here, ros, submission)
-    if not here.as_root:
-        return "only root can try the tier of root"
-    blocked = unreachable((*AS_USER,), ros)
-    return blocked or Sandbox(replace(here, as_root=False), ros, submission, AS_USER)
+    if not as_user:
+        return Sandbox(isolation, ros, submission)
+    start_as = user_start(ros)
+    return unreachable(start_as, ros) or Sandbox(isolation, ros, submission, start_as)
+
+
+def _isolation(name: str, *, as_user: bool) -> Isolation:
+    if not as_user:
+        return isolation_from_name(name)
+    if name == "landlock":
+        return Landlock(as_root=False)
+    outer = replace(Bubblewrap.here(), as_root=False)
+    return FlatBubblewrap(outer) if name == "bubblewrap-flat" else outer
+
+
+def user_start(ros: RosInstallation) -> tuple[str, ...]:
+    """Return what starts a program as an ordinary user, who sees the interpreter even where root's home holds it."""
+    # Through env, since setpriv itself still finds programs with root's eyes.
+    start = ("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "env")
+    return (*opened_start(ros), *start)
+
+
+def opened_start(ros: RosInstallation, *further: str) -> tuple[str, ...]:
+    """Return what starts a program as root with closed folders on the way to the interpreter opened.
+
+    In one process after another and not beside each other, as bubblewrap would: whoever has another user than its
+    parent does not die with it.
+    """
+    paths = view_of((*ros.runtime.read_paths, ros.runtime.executable)).bound
+    script = ""
+    for folder in reversed(closed_folders((*paths, HOST))):
+        inside = sorted({path.relative_to(folder).parts[0] for path in paths if folder in path.parents})
+        script += "mount -t tmpfs -o mode=0755 opened /mnt; "
+        script += "".join(f"mkdir /mnt/{name}; mount --rbind {folder / name} /mnt/{name}; " for name in inside)
+        script += f"mount --move /mnt {folder}; "
+    return ("unshare", "--mount", *further, "sh", "-e", "-c", f'{script} exec "$@"', "sh")
 
 
 def unreachable(start_as: tuple[str, ...], ros: RosInstallation) -> str:
     """Return why another user cannot run the interpreter of these tests; empty if it can."""
-    if shutil.which("setpriv") is None:
-        return "setpriv is not installed"
+    if shutil.which("setpriv") is None or shutil.which("unshare") is None:
+        return "the programs of util-linux are not installed"
     tried = subprocess.run(
         (
             *start_as,

@@ -19,10 +19,6 @@ from sandboxes import HOST, Sandbox, close, finish, make_submission, start, wall
 
 import grader
 from grader.model.errors import EnvironmentFault, HarnessError
-from grader.recording.isolation import choose, seccomp
-from grader.recording.isolation.bubblewrap import Bubblewrap
-from grader.recording.isolation.choose import choose_isolation, isolation_from_name
-from grader.recording.isolation.plain import Plain
 from grader.recording.isolation.protocol import Limits, StudentProcess
 from grader.recording.ros_installation import RosInstallation, find_ros
 
@@ -61,7 +57,17 @@ def plain(ros, submission) -> Sandbox:
     return _sandbox("none", ros, submission)
 
 
-@pytest.fixture(params=["bubblewrap-root", "bubblewrap", "none"])
+@pytest.fixture(
+    params=[
+        "bubblewrap-root",
+        "bubblewrap",
+        "bubblewrap-flat",
+        "bubblewrap-flat-user",
+        "landlock",
+        "landlock-user",
+        "none",
+    ]
+)
 def any_tier(request, ros, submission) -> Sandbox:
     return _sandbox(request.param, ros, submission)
 
@@ -594,79 +600,6 @@ def test_without_walls_the_submission_is_seen_where_it_lies(plain):
     """An empty folder name says so."""
     assert plain.isolation.submission_seen_at == ""
     assert (Path(plain.isolation.host_seen_at) / "launcher.py").is_file()
-
-
-# --- the choice ---
-
-
-def _working_tier(ros: RosInstallation) -> str:
-    try:
-        here = Bubblewrap.here()
-    except EnvironmentFault as fault:
-        pytest.skip(fault.message)
-    if why := choose.why_not(here, ros):
-        pytest.skip(why)
-    return here.name
-
-
-def test_the_strongest_tier_that_holds_is_chosen(ros):
-    """With bubblewrap working, auto means bubblewrap, and the worker rebuilds the same value from its name."""
-    name = _working_tier(ros)
-    chosen = choose_isolation("auto", ros)
-    assert chosen.name == name
-    assert isolation_from_name(chosen.name) == chosen
-
-
-def test_none_is_taken_at_its_word(ros):
-    """Nothing is probed."""
-    assert choose_isolation("none", ros) == Plain()
-    assert isolation_from_name("none") == Plain()
-
-
-@pytest.mark.parametrize("make", [lambda name: choose_isolation(name, find_ros()), isolation_from_name])
-def test_an_unknown_tier_is_a_fault_of_the_set_up(make):
-    """The names that exist are told."""
-    with pytest.raises(EnvironmentFault, match=r"expected .*bubblewrap.*, found docker"):
-        make("docker")
-
-
-def test_without_bubblewrap_there_are_no_walls_and_the_reason_is_told(ros, monkeypatch, tmp_path):
-    """The reason names the program and the command that installs it."""
-    monkeypatch.setattr("grader.recording.isolation.bubblewrap.SYSTEM_PROGRAMS", str(tmp_path))
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert choose_isolation("auto", ros) == Plain(
-        "sandbox: expected the program bwrap, found none; sudo apt install bubblewrap"
-    )
-    with pytest.raises(EnvironmentFault, match="bwrap"):
-        choose_isolation("bubblewrap", ros)
-
-
-def test_a_wall_that_does_not_hold_is_noticed(ros, monkeypatch):
-    """Without the filter the probe reports the property, and auto falls back to none."""
-    name = _working_tier(ros)
-    monkeypatch.setattr(seccomp, "student_filter", lambda: seccomp._instruction(seccomp.RETURN, seccomp.ALLOW))
-    chosen = choose_isolation("auto", ros)
-    assert chosen == Plain("it does not do this: filters system calls")
-    with pytest.raises(EnvironmentFault, match="filters system calls"):
-        choose_isolation(name, ros)
-
-
-def test_a_sandbox_that_shows_too_much_is_noticed(ros, monkeypatch):
-    """The probe looks for files of the grader itself."""
-    _working_tier(ros)
-    monkeypatch.setattr("grader.recording.isolation.bubblewrap._secrets_within", lambda *_: [])
-    package = Path(grader.__file__).resolve().parent
-    shown = replace(ros, runtime=replace(ros.runtime, read_paths=(*ros.runtime.read_paths, package / "model")))
-    assert choose_isolation("auto", shown) == Plain("it does not do this: hides files")
-
-
-def test_a_sandbox_that_cannot_start_is_noticed(ros, monkeypatch, tmp_path):
-    """The last words of bubblewrap are the reason."""
-    broken = tmp_path / "bwrap"
-    broken.write_text("#!/bin/sh\necho 'bwrap: No permissions to create new namespace' >&2\nexit 1\n")
-    broken.chmod(0o755)
-    monkeypatch.setattr("grader.recording.isolation.bubblewrap.SYSTEM_PROGRAMS", f"{tmp_path}:/usr/bin:/bin")
-    assert choose_isolation("auto", ros) == Plain("bwrap: No permissions to create new namespace")
 
 
 # --- real nodes ---

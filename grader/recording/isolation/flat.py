@@ -65,4 +65,4 @@ class FlatBubblewrap:
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker."""
-        return walled_command(process, limits, Ground(SCRATCH, loopback=False))
+        return walled_command(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))

@@ -5,6 +5,7 @@ The network is the caller's: what leaves it is contained only where there is no 
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,13 +28,19 @@ NAME = "landlock"
 
 @dataclass(frozen=True, slots=True)
 class Landlock:
-    """The walls that Landlock, seccomp and resource limits give in the namespaces that there are."""
+    """The walls that Landlock, seccomp and resource limits give in the namespaces that there are.
+
+    Attributes:
+        as_root: Whether this process is root: students then run as another user.
+    """
+
+    as_root: bool
 
     @classmethod
     def here(cls) -> Landlock:
         """Return the isolation for this machine; raises EnvironmentFault if its kernel or processor has none."""
         require_walls()
-        return cls()
+        return cls(as_root=os.geteuid() == 0)
 
     @property
     def name(self) -> str:
@@ -67,4 +74,5 @@ class Landlock:
         """
         if "ROS_DOMAIN_ID" not in process.environment:
             raise HarnessError("isolation landlock: expected ROS_DOMAIN_ID for a student's process, found none")
-        return walled_command(process, limits, Ground(Path(tempfile.gettempdir()), loopback=True))
+        ground = Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root)
+        return walled_command(process, limits, ground)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 import platform
 import secrets
 import sys
@@ -37,10 +36,12 @@ class Ground:
     Attributes:
         scratch: The folder that its folder is made in; any user may enter it.
         loopback: Whether Fast DDS has to be kept to the loopback address, because the network is shared with others.
+        as_root: Whether this process is root: the student's then becomes another user.
     """
 
     scratch: Path
     loopback: bool
+    as_root: bool
 
 
 def start_command(
@@ -84,8 +85,7 @@ def walled_command(process: StudentProcess, limits: Limits, ground: Ground) -> C
 
     As root the process becomes another user, and the staged copy is made readable by everyone.
     """
-    as_root = os.geteuid() == 0
-    if as_root:
+    if ground.as_root:
         make_readable(process.submission)
     folder = ground.scratch / f"grade-student-{secrets.token_hex(8)}"
     environment = student_environment(process, folder / "home")
@@ -97,21 +97,21 @@ def walled_command(process: StudentProcess, limits: Limits, ground: Ground) -> C
         scratch=limits.scratch_bytes,
         limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
         processes=limits.processes,
-        user=[some_user(), STUDENT_GROUP] if as_root else None,
-        walls=_walls(process, as_root=as_root, loopback=ground.loopback),
+        user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
+        walls=_walls(process, ground),
     )
     return Command((*start, str(process.runtime.executable), *process.arguments), environment, tuple(process.pass_fds))
 
 
-def _walls(process: StudentProcess, *, as_root: bool, loopback: bool) -> dict[str, object]:
+def _walls(process: StudentProcess, ground: Ground) -> dict[str, object]:
     bound = view_of((*process.runtime.read_paths, process.runtime.executable)).bound
-    own = (process.submission, process.host_folder, *(HERE.glob("loopback*.xml") if loopback else ()))
+    own = (process.submission, process.host_folder, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
     return {
         "read": [str(path) for path in (*bound, *own)],
         "hidden": [str(path) for path in secrets_within(bound, process.runtime)],
         "devices": DEVICES,
-        "tcp": not loopback,
-        "reach": as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
+        "tcp": not ground.loopback,
+        "reach": ground.as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
         "filter": flat_filter(signals=_version() < WITH_SIGNALS).hex(),
     }
 
