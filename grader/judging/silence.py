@@ -122,7 +122,7 @@ def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | 
     reason += f" of type {quote(found.type)}"
     wrong = found.topic != topic or (type_ is not None and found.type != type_)
     reason += f"; expected {type_ + ' on ' if type_ else ''}{topic}" if wrong else ""
-    hint = "nothing calls publish(): create a timer whose callback publishes, and spin the node"
+    hint = "publish from a timer that runs from the start, and spin the node"
     return not_met(reason, {"topic": found.topic, "type": found.type, "messages": 0}, hint=hint)
 
 

@@ -11,6 +11,7 @@ from grader.judging.checks.sensor import RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.callbacks import CALLBACKS
 from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.diagnosis.comparisons import COMPARISONS
 from grader.judging.diagnosis.construction import CONSTRUCTION
 from grader.judging.diagnosis.crashes import CRASHES
 from grader.judging.diagnosis.endings import ENDINGS
@@ -26,6 +27,7 @@ from grader.judging.diagnosis.sensor import SENSOR
 from grader.judging.diagnosis.silence import SILENCE
 from grader.judging.diagnosis.source import Source, read
 from grader.judging.diagnosis.syntax import SYNTAX
+from grader.judging.diagnosis.waiting import WAITING
 from grader.judging.findings import FAULT_KEY
 from grader.model.exercise import Check, Criterion, Exercise, Outcome
 from grader.model.report import Verdict
@@ -41,6 +43,7 @@ CAUSES: tuple[Cause, ...] = (
     *CRASHES,
     *ENDINGS,
     *SILENCE,
+    *WAITING,
     *RATES,
     *FIELDS,
     *FILES,
@@ -48,6 +51,7 @@ CAUSES: tuple[Cause, ...] = (
     *POSITIONS,
     *SENSOR,
     *LATENESS,
+    *COMPARISONS,
     *FAN,
 )
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)

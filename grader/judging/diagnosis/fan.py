@@ -151,7 +151,9 @@ def _other_threshold(case: Case) -> Clue | None:
     if found is None or not isinstance(found[1], ThresholdResponse):
         return None
     source, check = found
-    others = [s for s in _switches(source) if 0 < abs(s.limit.value - check.threshold) <= 10 and s.limit.value > 1]
+    known = _switches(source)
+    away = [s for s in known if not within(s.limit.value, check.threshold, _EXACT) and s.limit.value > 1]
+    others = [s for s in away if abs(s.limit.value - check.threshold) <= 10 or len(known) == 1]
     wrong = _wrong_inputs(case)
     if len(others) != 1 or not wrong:
         return None

@@ -8,8 +8,12 @@ from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
-from grader.judging.diagnosis.source import Source, chain, first_line, subtree
+from grader.judging.diagnosis.source import Source, chain, first_line, last_name, subtree
 from grader.judging.diagnosis.wiring import made_for, reached, roots
+from grader.judging.wording import number
+
+#: Answers put off by no more than this are prompt enough.
+_PROMPT_S = 0.3
 
 
 def _compared(case: Case) -> tuple[Source, list[ast.Compare]] | None:
@@ -43,6 +47,23 @@ def _stored_late(case: Case) -> Clue | None:
     return None
 
 
+def _put_off(case: Case) -> Clue | None:
+    """The answer is handed to a timer, or the callback sleeps before it answers."""
+    found = _compared(case)
+    if found is None:
+        return None
+    source = found[0]
+    item = made_for(source, "subscription", str(getattr(case.criterion.check, "input", "")))
+    for node in reached(source, roots(source, item.callback)) if item is not None else ():
+        name = last_name(node.func) if isinstance(node, ast.Call) else ""
+        if isinstance(node, ast.Call) and name in ("Timer", "create_timer", "sleep", "call_later"):
+            worth = number_at(source, node.args[0] if node.args else None)
+            if worth is not None and worth > _PROMPT_S:
+                hint = f"{source.code(node, 50)} puts the answer off by {number(worth)} s: answer at once"
+                return Clue(hint, source.place(node), key="late_answer")
+    return None
+
+
 def _oldest(case: Case) -> Clue | None:
     """The oldest of the values that are kept is compared."""
     found = _compared(case)
@@ -63,4 +84,8 @@ def _grows(source: Source, values: ast.expr) -> bool:
     return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in calls)
 
 
-LATENESS = (Cause("stored_late", _stored_late), Cause("oldest_compared", _oldest))
+LATENESS = (
+    Cause("stored_late", _stored_late),
+    Cause("oldest_compared", _oldest),
+    Cause("put_off", _put_off),
+)

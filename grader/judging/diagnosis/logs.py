@@ -10,7 +10,7 @@ from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.sensor import LogsReceived
 from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.constants import constant
+from grader.judging.diagnosis.constants import constant, number_at
 from grader.judging.diagnosis.silence import timer_code
 from grader.judging.diagnosis.source import Source, argument, chain, last_name, text_of
 from grader.judging.diagnosis.wiring import Made, is_flag, is_log, made, made_for, python_loggers, reached, roots
@@ -142,7 +142,8 @@ def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -
     heard = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
     if not heard or argument(call, 99, "throttle_duration_sec") is not None:
         return None
-    counted_by = next((n for n in source.around(call) if isinstance(n, ast.If) and _counts(n.test)), None)
+    inside = [n for m in heard for n in reached(source, roots(source, m.callback)) if isinstance(n, ast.If)]
+    counted_by = next((n for n in inside if _counts(source, n.test) and call in set(reached(source, [n]))), None)
     if counted_by is not None:
         hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of {wanted_s} s"
         return Clue(hint, source.place(counted_by), key="log_pace")
@@ -152,8 +153,13 @@ def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -
     return Clue(hint, source.place(call), key="log_pace")
 
 
-def _counts(test: ast.expr) -> bool:
-    return any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod) for n in ast.walk(test))
+def _counts(source: Source, test: ast.expr) -> bool:
+    """Return whether a condition is `n % 20 == 0`, or compares with a number what is counted up by one."""
+    if any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod) for n in ast.walk(test)):
+        return True
+    counters = {chain(a.target) for a in source.all(ast.AugAssign) if number_at(source, a.value) == 1}
+    limits = [number_at(source, c) for c in test.comparators] if isinstance(test, ast.Compare) else []
+    return isinstance(test, ast.Compare) and chain(test.left) in counters and None not in limits
 
 
 def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: float) -> Clue | None:

@@ -13,6 +13,14 @@ from grader.judging.diagnosis.wiring import is_flag, made, reached, roots
 from grader.model.exercise import Outcome
 
 _POSITION = "msg.pose.pose.position"
+#: What the check found, and the parts of the message that may have been read instead of the position.
+_PARTS = (
+    ("twist", ("twist",)),
+    ("orientation", ("orientation",)),
+    ("constant", ("orientation", "covariance")),
+    ("no_pair", ("orientation",)),
+)
+_MEANING = {"twist": "velocity"}
 
 
 def _found(case: Case, *causes: str) -> Source | None:
@@ -35,13 +43,13 @@ def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
 
 def _other_part(case: Case) -> Clue | None:
     """The velocity or the orientation is read instead of the position."""
-    for name, parts in (("twist", ("twist",)), ("orientation", ("orientation",)), ("constant", ("orientation",))):
+    for name, parts in _PARTS:
         source = _found(case, name)
         reads = _reads(source, *parts) if source is not None else []
-        if source is None or not reads or (name == "constant" and _reads(source, "position")):
+        if source is None or not reads or (name in ("constant", "no_pair") and _reads(source, "position")):
             continue
-        what = "velocity" if name == "twist" else "orientation"
-        hint = f"{source.code(reads[0], 50)} is the {what}: the position is {_POSITION}.x and .y"
+        what = next(part for part in parts if f".{part}." in f"{chain(reads[0])}.")
+        hint = f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_POSITION}.x and .y"
         return Clue(hint, source.place(reads[0]))
     return None
 
@@ -58,6 +66,9 @@ def _swapped(case: Case) -> Clue | None:
         clue = _swapped_pair(source, statement)
         if clue is not None:
             return clue
+    crossed = [k for k in source.all(ast.keyword) if {k.arg, _axis(chain(k.value))} == {"x", "y"}]
+    if crossed:
+        return Clue(f"{source.code(crossed[0])} mixes up x and y", source.place(crossed[0]))
     call = position_log(case)
     if call is None or _order_in(call)[:2] != ["y", "x"]:
         return None
@@ -179,11 +190,24 @@ def _scaled(case: Case) -> Clue | None:
 def _held_up(case: Case) -> Clue | None:
     """A callback that sleeps works through old messages."""
     source = _found(case, "stale")
+    oldest = _oldest_taken(source) if source is not None else None
+    if oldest is not None:
+        return oldest
     for item in made(source, "subscription") if source is not None else ():
         for node in reached(source, roots(source, item.callback)) if source is not None else ():
             if source is not None and isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
                 hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
                 return Clue(hint, source.place(node))
+    return None
+
+
+def _oldest_taken(source: Source) -> Clue | None:
+    """Messages are stored at one end and taken from the other, slower than they come."""
+    for call in source.calls("pop", "popleft"):
+        first = last_name(call.func) == "popleft" or (len(call.args) == 1 and number_at(source, call.args[0]) == 0)
+        if first and isinstance(call.func, ast.Attribute) and any(source.calls("append")):
+            hint = f"{source.code(call, 50)} takes the oldest of what is stored, and more comes than is taken"
+            return Clue(f"{hint}: keep the newest only", source.place(call))
     return None
 
 

@@ -79,8 +79,8 @@ def _period(case: Case) -> Clue | None:
     if worth is None or _same(worth.value, paced.period_s):
         return None
     if worth.value == 0:
-        hint = f"{timer_code(paced.source, timers[0])} never pauses: the period is {number(paced.period_s)} s"
-        return Clue(hint, paced.source.place(worth.origin))
+        hint = f"{timer_code(paced.source, timers[0])} never pauses, its period is 0"
+        return Clue(f"{hint}: {number(paced.period_s)} s is asked for", paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (paced.count <= 2 and _same(worth.value, paced.first_s))
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
 

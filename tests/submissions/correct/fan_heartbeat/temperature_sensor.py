@@ -1,5 +1,5 @@
+import numpy as np
 import rclpy
-from numpy.random import default_rng
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -20,11 +20,11 @@ class Base(Node):
 class Sensor(Base):
     def __init__(self):
         super().__init__('temperature_sensor', 'temperature', 'fan_speed')
-        self.rng = default_rng()
+        self.rng = np.random.default_rng()
         self.create_timer(0.2, self.measure)
 
     def measure(self):
-        self.send(self.rng.uniform(20, 30).round(2))
+        self.send(np.round(self.rng.uniform(20, 30), 2))
 
     def received(self, value):
         self.get_logger().info('fan at {:.0f} percent'.format(value))
