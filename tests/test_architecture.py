@@ -12,7 +12,8 @@ PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
 #: Room -> rooms it may import. Entries are at the top, the vocabulary at the bottom.
 MAY_IMPORT = {
-    "entry": {"entry", "reports", "recording", "judging", "reading", "model"},
+    "entry": {"entry", "commands", "reports", "recording", "judging", "reading", "model"},
+    "commands": {"commands", "entry", "reports", "recording", "judging", "reading", "model"},
     "reports": {"reports", "model"},
     "recording": {"recording", "model"},
     "reading": {"reading", "judging", "model"},

@@ -26,6 +26,8 @@ MIN_MEMORY_BYTES = GIB
 
 _VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
 _CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
+#: Where the kernel shows its settings.
+SETTINGS_FOLDER = Path("/proc/sys")
 _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
 
 
@@ -110,7 +112,7 @@ def _namespaces() -> Fact:
     if not command:
         return Fact("user namespaces", "no setting forbids them")
     name, _, value = command.rpartition(" ")[2].partition("=")
-    now = Path("/proc/sys", *name.split(".")).read_text(encoding="ascii").strip()
+    now = SETTINGS_FOLDER.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
     lasting = f"until the next start; for good: echo {name}={value} | sudo tee {_PERSISTENT}"
     return Fact("user namespaces", f"kept from ordinary users by {name}={now}", remedy=f"{command} ({lasting})")
 

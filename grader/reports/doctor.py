@@ -17,6 +17,7 @@ from grader.reports.escape import json_value, shown
 from grader.reports.page import Page
 
 SCHEMA = "grader/checkup/v1"
+_NARROWEST = 60
 _NAME_WIDTH = 18
 _TIER_WIDTH = 24
 _PROPERTY_WIDTH = 13
@@ -29,10 +30,10 @@ def render_checkup(checkup: Checkup, *, width: int, colour: bool) -> str:
 
     Args:
         checkup: What is shown.
-        width: Columns of the page.
+        width: Columns of the page; at least 60 are used.
         colour: Whether to colour with ANSI sequences; without, the text is the same.
     """
-    page = Page(width=width, colour=colour)
+    page = Page(width=max(width, _NARROWEST), colour=colour)
     _head(page, checkup)
     _title(page, "This machine")
     for fact in checkup.facts:
@@ -118,12 +119,18 @@ def _matrix(page: Page, checkup: Checkup) -> None:
         row = Text(f"  {name + ('*' if name in REQUIRED else ''):{_PROPERTY_WIDTH}}")
         for tier in tried:
             row.append_text(_mark(tier, name))
-        by = next((f.mechanism for t in tried if t.name == checkup.used for f in t.properties if f.name == name), "")
+        by = _mechanism(tried, checkup.used, name)
         page.put(Text(meaning).append(f" ({shown(by)})" if by else "", style=_QUIET), prefix=row, indent=6)
     for tier in tried:
         if tier.name != NO_WALLS:
             for found in _open(tier):
-                page.put(shown(found.found), prefix=f"  {tier.tier} {found.name:{_PROPERTY_WIDTH - 2}}", indent=6)
+                page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
+
+
+def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
+    """Return what gives a property under the tier that is used; empty if nothing does."""
+    found = (found for tier in tiers if tier.name == used for found in tier.properties)
+    return next((one.mechanism for one in found if one.name == name and one.holds), "")
 
 
 def _mark(tier: TierReport, name: str) -> Text:

@@ -1,0 +1,137 @@
+"""A machine is examined by trying it: ROS, messages, sandboxes; `grade doctor` says what was found."""
+
+import json
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+from grader import examining
+from grader.cli import app
+from grader.model.containment import TierReport
+from grader.model.errors import EnvironmentFault, HarnessError
+from grader.recording import machine
+
+BY_ROOT = TierReport("bubblewrap-root", "A2", usable=False, why="not root", remedy="run it with sudo")
+BY_USER = TierReport("bubblewrap", "A1", usable=False, why="none", remedy="install bubblewrap")
+HOLDS = TierReport("landlock", "C", usable=True, why="")
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    """Replace what starts processes; returns what was observed, with which tier."""
+    seen = []
+
+    def observe(request, progress):
+        progress("observing")
+        seen.append((request.isolation, request.files[0].read_text()))
+        return SimpleNamespace(topics=[SimpleNamespace(name="/trial", messages=10)], faults=[])
+
+    monkeypatch.setattr(examining, "find_ros", lambda: None)
+    monkeypatch.setattr(examining, "software", lambda ros: ())
+    monkeypatch.setattr(examining, "observe", observe)
+    monkeypatch.setattr(examining, "is_for_others", lambda name: name == "bubblewrap-root")
+    return seen
+
+
+def examined(monkeypatch, *tiers):
+    monkeypatch.setattr(examining, "find_ros", lambda: "ROS")
+    monkeypatch.setattr(examining, "inspect_tiers", lambda ros: tiers)
+    return examining.examine(lambda step: None)
+
+
+def test_the_strongest_tier_that_holds_is_used(monkeypatch, stand_in):
+    """Messages are exchanged in the sandbox that grading would use."""
+    checkup = examined(monkeypatch, BY_ROOT, BY_USER, HOLDS)
+    assert (checkup.safe, checkup.used, checkup.remedy) == (True, "landlock", "")
+    assert [isolation for isolation, _ in stand_in] == ["landlock"]
+
+
+def test_without_a_sandbox_messages_are_tried_all_the_same(monkeypatch, stand_in):
+    """It is a node of our own; and what helps this user comes before becoming another."""
+    checkup = examined(monkeypatch, BY_ROOT, BY_USER)
+    assert (checkup.safe, checkup.used, checkup.remedy) == (False, "", "install bubblewrap")
+    assert [isolation for isolation, _ in stand_in] == ["none"]
+
+
+def test_a_run_that_fails_is_a_finding(monkeypatch, stand_in):
+    """The checkup goes on, and says what failed."""
+
+    def fail(request, progress):
+        raise HarnessError("the worker died")
+
+    monkeypatch.setattr(examining, "observe", fail)
+    checkup = examined(monkeypatch, HOLDS)
+    assert checkup.exchange.problem == "the worker died"
+    assert not checkup.safe
+
+
+def test_without_ros_the_rest_is_told(monkeypatch):
+    """The remedy is the one that grading would name; no sandbox can be tried."""
+
+    def none():
+        raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", "pip install it")
+
+    monkeypatch.setattr(examining, "find_ros", none)
+    result = CliRunner().invoke(app, ["doctor"])
+    assert result.exit_code == 2
+    assert result.stdout.startswith(
+        "grading is NOT SAFE here\n  ROS 2: expected rclpy, found none in this environment\n"
+    )
+    assert "mend: pip install it\n" in result.stdout
+    assert "  kernel " in result.stdout
+
+
+def test_bubblewrap_that_is_not_there_is_told_with_its_command(monkeypatch):
+    """Other sandboxes may hold, so this alone is no problem."""
+    monkeypatch.setattr(machine.shutil, "which", lambda name: None)
+    fact = next(fact for fact in machine.software(None) if fact.name == "bubblewrap")
+    assert (fact.value, fact.fits) == ("not installed", True)
+    assert fact.remedy.endswith("install -y bubblewrap")
+
+
+def test_a_setting_that_forbids_namespaces_is_told_with_both_commands(monkeypatch, tmp_path):
+    """One for now, as a CI runner wants it, and one for good."""
+    name = "kernel.apparmor_restrict_unprivileged_userns"
+    setting = tmp_path / "kernel" / name.partition(".")[2]
+    setting.parent.mkdir()
+    setting.write_text("1\n")
+    monkeypatch.setattr(machine, "SETTINGS_FOLDER", tmp_path)
+    monkeypatch.setattr(machine, "setting_command", lambda: f"sudo sysctl -w {name}=0")
+    fact = next(fact for fact in machine.system() if fact.name == "user namespaces")
+    assert fact.value == f"kept from ordinary users by {name}=1"
+    assert fact.remedy.startswith(f"sudo sysctl -w {name}=0 (")
+    assert f"echo {name}=0 | sudo tee /etc/sysctl.d/" in fact.remedy
+
+
+@pytest.mark.parametrize(("memory", "space", "fits"), [(1 << 40, 1 << 40, True), (1 << 20, 1 << 20, False)])
+def test_too_little_room_is_told(monkeypatch, memory, space, fits):
+    """Memory and disk below what one scenario needs."""
+    monkeypatch.setattr(machine, "_available_memory", lambda: memory)
+    monkeypatch.setattr(machine.shutil, "disk_usage", lambda folder: SimpleNamespace(free=space))
+    facts = {fact.name: fact for fact in machine.system()}
+    for name in ("memory", "temporary files"):
+        assert facts[name].fits is fits
+        assert bool(facts[name].remedy) is not fits
+
+
+@pytest.mark.ros
+def test_a_real_machine_is_examined():
+    """The real command: versions, ten messages over DDS, all tiers; the exit code is the verdict's."""
+    done = subprocess.run(
+        [sys.executable, "-c", "from grader.cli import main; main()", "doctor", "--json"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    data = json.loads(done.stdout)
+    assert done.returncode == (0 if data["safe"] else 2)
+    assert data["exchange"]["arrived"] == data["exchange"]["expected"] == 10
+    assert [tier["tier"] for tier in data["tiers"]] == ["A2", "A1", "B", "C", "D"]
+    facts = {fact["name"]: fact["value"] for fact in data["facts"]}
+    assert facts["RMW"].startswith("rmw_fastrtps_cpp ")
+    assert "Fast DDS" in facts["RMW"]
+    assert {"grader", "Python", "ROS 2", "rclpy", "bubblewrap", "kernel", "user", "Landlock"} <= set(facts)
