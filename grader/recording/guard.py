@@ -90,6 +90,8 @@ class Guard:
             return f"stopped at {limits.memory_words()}"
         if used.processor_ns > limits.processor_ns:
             return f"stopped at {limits.processor_words()}"
+        if used.halted:
+            return "stopped: a signal had halted it for good"
         if used.threads > limits.processes + WRAPPERS:
             return f"stopped at {limits.processes_words()}"
         return ""

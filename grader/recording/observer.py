@@ -153,13 +153,17 @@ class Observer:
         reader = self._readers.get((topic, interface, reliable))
         return 0 if reader is None else int(reader.get_publisher_count())
 
-    def take(self) -> list[Taken]:
-        """Return the messages that have arrived since the last time, topic by topic; of a flood only the first ones."""
+    def take(self, at_once: int = AT_ONCE) -> list[Taken]:
+        """Return the messages that have arrived since the last time, topic by topic; of a flood only the first ones.
+
+        Args:
+            at_once: How many of one topic at most.
+        """
         taken: list[Taken] = []
         room = AT_ONCE_BYTES
         for (topic, interface, _), reader in sorted(self._readers.items()):
             with reader.handle:
-                for _ in range(AT_ONCE):
+                for _ in range(at_once):
                     if room <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
                         break
                     room -= len(found[0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from grader.model.trace import Trace
 from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.choose import choose_isolation
 from grader.recording.isolation.protocol import Isolation
+from grader.recording.leftovers import scratch_folder
 from grader.recording.recorder import Job, Recorder
 from grader.recording.ros_installation import RosInstallation, find_ros
 
@@ -99,8 +99,7 @@ def open_studio(isolation: str) -> Iterator[Studio]:
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
     workers = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
-    with tempfile.TemporaryDirectory(prefix="grade-") as name:
-        folder = Path(name)
+    with scratch_folder() as folder:
         folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
             recorder.warm_up(1)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from grader.model.quantities import NS_PER_S
 
 NS_PER_TICK = NS_PER_S // os.sysconf("SC_CLK_TCK")
+#: State in /proc/PID/stat of a process that a signal has halted.
+HALTED = b"T"
 #: Kinds of memory that belong to a process and cannot be read again from a file; in /proc/PID/status, in KiB.
 OWN_MEMORY = (b"RssAnon:", b"RssShmem:", b"VmSwap:")
 #: Places in /proc/PID/stat after the name in parentheses, which may hold anything; proc(5) counts from 1, and the
@@ -18,23 +20,29 @@ PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What some processes use together; processor time includes that of children that have ended."""
+    """What some processes use together; processor time includes that of children that have ended.
+
+    `halted` is whether a signal has halted one of them, so that it will never run by itself again.
+    """
 
     memory_bytes: int = 0
     processor_ns: int = 0
     threads: int = 0
+    halted: bool = False
 
 
 def usage(pids: Iterable[int]) -> Usage:
     """Return what processes use; one that has ended uses nothing."""
     memory_kib = ticks = threads = 0
+    halted = False
     for pid in pids:
         own_kib, own_threads = _status(pid)
         memory_kib += own_kib
         threads += own_threads
         fields = _stat(pid)
+        halted = halted or fields[:1] == [HALTED]
         ticks += sum(int(field) for field in fields[USER_TIME : CHILDREN_SYSTEM_TIME + 1])
-    return Usage(memory_kib << 10, ticks * NS_PER_TICK, threads)
+    return Usage(memory_kib << 10, ticks * NS_PER_TICK, threads, halted)
 
 
 def families(roots: Collection[int]) -> dict[int, set[int]]:

@@ -20,6 +20,8 @@ from grader.recording.stimuli import Due, number_message, numeric_field, schedul
 from grader.recording.student import Student
 from grader.recording.tape import Tape
 
+#: How much of a flood is taken in one look, so as not to hold up the reference: messages of a topic, pieces of output.
+MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
 #: How often the conductor looks, and how long it may be held up at most before the run says nothing.
 LOOK_S = 0.001
 HELD_UP_NS = 150 * NS_PER_MS
@@ -91,14 +93,14 @@ class WallConductor:
             self._observer.withdraw(self._leaving.pop(0)[1])
         for student in self._students:
             self._hear(student, now_ns)
-        for taken in self._observer.take():
+        for taken in self._observer.take(MESSAGES_A_LOOK):
             self._record(now_ns, taken)
         if now_ns >= self._next_graph_ns:
             self._look_at_graph(now_ns)
             self._next_graph_ns = now_ns + GRAPH_EVERY_NS
 
     def _hear(self, student: Student, now_ns: int) -> None:
-        student.drain()
+        student.drain(READS_A_LOOK)
         reports = [] if student.ended else student.reports()
         for report in reports:
             if report is None:

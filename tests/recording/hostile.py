@@ -14,7 +14,7 @@ from grader.recording.studio import Studio
 MS = 1_000_000
 
 #: The beginning of every program: a right velocity publisher, which does its harm beside its work.
-PUBLISHER = '''
+PUBLISHER = """
 import os, socket, sys, threading, time
 import rclpy
 from rclpy.node import Node
@@ -47,7 +47,7 @@ class Publisher(Node):
 def main(kind=Publisher):
     rclpy.init()
     rclpy.spin(kind())
-'''
+"""
 
 
 def hostile(harm: str = "", later: str = "", before: str = "") -> str:

@@ -157,7 +157,7 @@ class ScriptedStudent:
         """Take a note."""
         self.notes.append(text)
 
-    def drain(self) -> None:
+    def drain(self, reads: int = 1) -> None:
         """Read what has been written: it has been."""
 
     def death(self, t_ns: int) -> Fault:
@@ -210,7 +210,7 @@ class ScriptedObserver:
         claims = [c for claims in self._world.claims.values() for c in claims]
         return sum((c["kind"], c["name"], c["type"]) == ("publisher", topic, interface) for c in claims)
 
-    def take(self) -> list[Taken]:
+    def take(self, at_once: int = 1000) -> list[Taken]:
         """Return what flies."""
         taken, self._world.flying = self._world.flying, []
         return taken

@@ -1,0 +1,125 @@
+"""Folders and files that a run leaves on the machine: none of its own, and none of a run that was killed before."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PREFIX = "grade-run-"
+#: As `tempfile` makes names.
+NAME = re.compile(re.escape(PREFIX) + r"[a-z0-9_]{8}")
+#: An empty folder younger than this may be one that is being made.
+FRESH_S = 60.0
+#: Where a tracer's library, which ROS loads, leaves files for every program of a user.
+SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - not ours: looked at only
+TRACER_FILES = "lttng-ust-wait-*"
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Make a folder that is gone afterwards, and remove those that killed runs of this user left behind.
+
+    The folder is locked for as long as this process lives: that is how a later run knows that nobody uses it any more.
+    """
+    place = Path(tempfile.gettempdir())
+    sweep(place)
+    with tempfile.TemporaryDirectory(prefix=PREFIX, dir=place) as name:
+        lock = os.open(name, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            with _without_tracer_files():
+                yield Path(name)
+        finally:
+            os.close(lock)
+
+
+def sweep(place: Path) -> list[str]:
+    """Remove the folders of dead runs from a place, and return their names.
+
+    One is removed only if it has our name, is a folder of this user's and not a link, and is locked by nobody.
+    """
+    removed = []
+    for name in sorted(_names(place)):
+        if NAME.fullmatch(name) and _is_dead(place / name):
+            _remove(place / name)
+            removed.append(name)
+    return removed
+
+
+def _is_dead(folder: Path) -> bool:
+    try:
+        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return False
+    try:
+        if os.fstat(lock).st_uid != os.geteuid():
+            return False
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # Somebody may have made it a moment ago and not have locked it yet: then it is empty.
+        return bool(os.listdir(lock)) or time.time() - os.fstat(lock).st_mtime > FRESH_S  # noqa: PTH208
+    except OSError:
+        return False
+    finally:
+        os.close(lock)
+
+
+def _remove(folder: Path) -> None:
+    """Delete a folder and what is in it, never what a link in it leads to."""
+    for parent, folders, _ in os.walk(folder):
+        for name in ("", *folders):
+            path = Path(parent, name)
+            if not path.is_symlink():
+                with contextlib.suppress(OSError):
+                    path.chmod(0o700)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _without_tracer_files() -> Iterator[None]:
+    """Remove the tracer's files that appear meanwhile, unless a program of somebody else's uses them."""
+    before = _tracer_files()
+    try:
+        yield
+    finally:
+        for path in _tracer_files() - before:
+            with contextlib.suppress(OSError):
+                if path.lstat().st_uid == os.geteuid() and not _in_use(path):
+                    path.unlink()
+
+
+def _tracer_files() -> set[Path]:
+    return {path for path in SHARED_MEMORY.glob(TRACER_FILES) if _is_plain(path)}
+
+
+def _is_plain(path: Path) -> bool:
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:
+        return False
+
+
+def _in_use(path: Path) -> bool:
+    """Return whether a process that may be looked at has a file in its memory."""
+    wanted = os.fsencode(path)
+    for pid in _names(Path("/proc")):
+        if pid.isdecimal():
+            with contextlib.suppress(OSError):
+                if wanted in Path("/proc", pid, "maps").read_bytes():
+                    return True
+    return False
+
+
+def _names(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder)  # noqa: PTH208 - names only
+    except OSError:
+        return []
