@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +34,8 @@ ILLUSTRATED = frozenset({"html"})
 ENDINGS = {"json": ".json", "html": ".html", "markdown": ".md", "junit": ".xml", "text": ".txt", "github": ".txt"}
 #: Fewer submissions than this are judged in this process.
 WORTH_A_POOL = 16
+#: Thresholds of Python's collector while many recordings are read.
+COLLECTING = (200_000, 20, 20)
 _WIDTH = 100
 
 
@@ -137,7 +141,8 @@ def rejudge_class(
     """
     workers = min(jobs or len(os.sched_getaffinity(0)), max(1, len(named) // WORTH_A_POOL))
     if workers == 1:
-        return [_result(name, folder, how, wanted) for name, folder in named]
+        with _little_collecting():
+            return [_result(name, folder, how, wanted) for name, folder in named]
     with ProcessPoolExecutor(workers, initializer=_prepare, initargs=(how, wanted)) as pool:
         return list(pool.map(_result_there, named, chunksize=max(1, min(32, len(named) // (4 * workers)))))
 
@@ -148,6 +153,21 @@ _task: list[tuple[Judgement, Wanted]] = []
 
 def _prepare(how: Judgement, wanted: Wanted) -> None:
     _task[:] = [(how, wanted)]
+    gc.freeze()
+    gc.set_threshold(*COLLECTING)
+
+
+@contextmanager
+def _little_collecting() -> Iterator[None]:
+    """Look for cyclic garbage seldom: reading a recording makes many objects and few cycles."""
+    usual = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(*COLLECTING)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+        gc.unfreeze()
 
 
 def _result_there(named: tuple[str, Path]) -> Result:
