@@ -109,7 +109,9 @@ def _is_plain(path: Path) -> bool:
 
 def _in_use(path: Path) -> bool:
     """Return whether a process that may be looked at has a file in its memory."""
-    wanted = os.fsencode(path)
+    status = path.lstat()
+    device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
+    wanted = f" {device} {status.st_ino} ".encode()  # as in /proc/PID/maps; the name alone may be another file's
     for pid in _names(Path("/proc")):
         if pid.isdecimal():
             with contextlib.suppress(OSError):
