@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from grader.options import EVIDENCE, PATH, exit_code, parse_outputs, parse_percent
-from grader.reports.delivery import Output, deliver, prepared
-from grader.reports.escape import encoded
+from grader.reports.delivery import Output, deliver, prepared, show
 from grader.reports.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -110,9 +108,7 @@ def _class(  # noqa: PLR0913  as above
     wanted = rejudging.Wanted(tuple(outputs), reports=as_json and not show_changes, min_score=min_score)
     results = rejudging.rejudge_class(rejudging.named_evidence(evidence), how, wanted, jobs=jobs)
     if as_json:
-        text = results_to_json(results, changes=show_changes)
+        show(lambda _: results_to_json(results, changes=show_changes), for_people=False)
     else:
-        text = render_changes(results) if show_changes else render_results(results)
-    sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))
-    sys.stdout.flush()
+        show(lambda _: render_changes(results) if show_changes else render_results(results), for_people=True)
     return next(rejudging.codes(results))

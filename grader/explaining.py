@@ -1,0 +1,131 @@
+"""Finds what `grade explain` is asked about: criteria and checks by name, with what their rubrics and manuals say."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, fields
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from grader.judging.asking import check_name
+from grader.judging.checks import CHECKS
+from grader.model.errors import GraderError
+from grader.model.exercise import Criterion, Exercise
+from grader.model.explanation import CheckExplanation, CriterionExplanation, Parameter
+from grader.model.quantities import Unit, duration
+from grader.model.scenario import NumberStream, Scenario, Stimulus
+from grader.reading.manuals import Manual, manual_of
+from grader.reading.units import format_quantity
+from grader.session import Request, read_exercises
+
+#: Names offered where none is known.
+OFFERED = 3
+
+
+def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what a name stands for: a criterion id, `exercise/criterion`, or the name of a check.
+
+    Args:
+        name: As typed.
+        rubrics: Where criteria are looked for; empty for the built-in rubrics.
+
+    Raises:
+        GraderError: Nothing has that name.
+        RubricError: A rubric cannot be used.
+    """
+    exercises = read_exercises(Request("", rubrics=rubrics))
+    pairs = [(e, c) for e in exercises for c in e.criteria]
+    found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
+    if found:
+        return list(found)
+    if name in CHECKS:
+        return [_check(name, [f"{e.id}/{c.id}" for e, c in pairs if check_name(c.check) == name])]
+    raise _unknown(name, [c.id for _, c in pairs])
+
+
+def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
+    scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    name = check_name(criterion.check)
+    manual = manual_of(type(criterion.check))
+    return CriterionExplanation(
+        id=criterion.id,
+        title=criterion.title,
+        exercise=f"{exercise.number}, {exercise.title} ({exercise.id})",
+        points=criterion.points,
+        chapter=criterion.chapter,
+        needs=criterion.needs,
+        hint=criterion.hint,
+        situation=_situation(scenario),
+        check=name,
+        asks=manual.summary,
+        details=manual.details,
+        parameters=tuple(_parameter(f, type(criterion.check), manual, criterion.check) for f in _fields(criterion)),
+    )
+
+
+def _check(name: str, used_by: Sequence[str]) -> CheckExplanation:
+    kind = CHECKS[name]
+    manual = manual_of(kind)
+    parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
+    return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
+
+
+def _fields(criterion: Criterion) -> tuple[Field[Any], ...]:
+    return fields(criterion.check)  # type: ignore[arg-type]  # checks are dataclasses
+
+
+def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | None) -> Parameter:
+    """Return a parameter with its value in a check, or with its default if there is none."""
+    annotation = get_type_hints(kind, include_extras=True)[field.name]
+    value = field.default if check is None else getattr(check, field.name)
+    text = "" if value is MISSING else _written(value, annotation)
+    return Parameter(field.name, text, manual.parameters.get(field.name, ""), value is MISSING)
+
+
+def _written(value: Any, annotation: Any) -> str:
+    """Return a value as a rubric writes it."""
+    unit = _unit(annotation)
+    if value is None:
+        return "none"
+    if unit is not None:
+        return format_quantity(value, unit)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {_written(inner, None)}" for key, inner in value.items())
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _unit(annotation: Any) -> Unit | None:
+    """Return the unit of an annotation, also where `None` may stand instead of a quantity."""
+    for part in (annotation, *get_args(annotation)):
+        for mark in getattr(part, "__metadata__", ()):
+            if isinstance(mark, Unit):
+                return mark
+    return None
+
+
+def _situation(scenario: Scenario) -> str:
+    """Return in a sentence what runs, for how long, and what the grader publishes meanwhile."""
+    span = scenario.span
+    text = f"{' and '.join(scenario.processes)} observed for {duration(span.duration_ns)}"
+    if span.after_first_message_on:
+        text += f" from the first message on {span.after_first_message_on} on"
+        text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
+    return "; ".join([text, *map(_stimulus, scenario.stimuli)])
+
+
+def _stimulus(stimulus: Stimulus) -> str:
+    if isinstance(stimulus, NumberStream):
+        pace = f"one every {duration(stimulus.period_ns)}, each value for {duration(stimulus.hold_ns)}"
+        return f"the grader publishes {len(stimulus.values)} values on {stimulus.topic}, {pace}"
+    played = f"from {duration(stimulus.start_ns)} on for {duration(stimulus.duration_ns)}"
+    return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
+
+
+def _unknown(name: str, criteria: Sequence[str]) -> GraderError:
+    known = list(dict.fromkeys([*criteria, *CHECKS]))
+    near = difflib.get_close_matches(name, known, n=OFFERED, cutoff=0.4)
+    parts = [k for k in known if name.casefold() in k and k not in near] if len(name) > 2 else []
+    offered = [*near, *parts][:OFFERED]
+    hint = f"the nearest are {', '.join(offered)}" if offered else f"there are {', '.join(known)}"
+    return GraderError(f"explain {name}: expected the id of a criterion or the name of a check, found neither", hint)
