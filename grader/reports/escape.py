@@ -1,8 +1,8 @@
 """Makes text that a student controls harmless wherever it is shown: one small function for each place.
 
-Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`. Markdown: `markdown`,
-`markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`.
-JSON: `json_value`.
+Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`, `obeyed_by_none`.
+Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML:
+`xml_text`. CSV: `csv_cell`. JSON: `json_value`.
 """
 
 from __future__ import annotations
@@ -123,7 +123,12 @@ def log_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
         text: Whole lines, with all that is to stand before foreign text in them.
         limit: Most characters of the text that are shown.
     """
-    return _COMMAND.sub(r"\g<0>\\", shown_lines(text, limit=limit))
+    return obeyed_by_none(shown_lines(text, limit=limit))
+
+
+def obeyed_by_none(text: str) -> str:
+    """Return lines, safe otherwise, none of which is a command for a GitHub job that they are printed in."""
+    return _COMMAND.sub(r"\g<0>\\", text)
 
 
 def markdown(text: str, *, limit: int = LIMIT) -> str:

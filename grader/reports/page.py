@@ -8,6 +8,8 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
+from grader.reports.escape import obeyed_by_none
+
 #: Narrowest page; below it nothing can be laid out.
 NARROWEST = 20
 # A column narrower than this is harder to read than a new line.
@@ -35,8 +37,8 @@ class Page:
         )
 
     def text(self) -> str:
-        """Return what was written so far."""
-        return self._out.getvalue()
+        """Return what was written so far, fit for the log of a GitHub job: a line break may have made a command."""
+        return obeyed_by_none(self._out.getvalue())
 
     def blank(self) -> None:
         """Leave a line free, unless the page is empty."""

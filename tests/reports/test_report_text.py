@@ -110,6 +110,14 @@ def test_a_terminal_cannot_be_steered():
     assert "[bold red]pwned[/]" in text
 
 
+@pytest.mark.parametrize("command", ["::error::x", "::add-mask::x", "##[error]x"])
+def test_no_line_is_a_command_for_the_job_that_prints_it(command):
+    """Neither a name at the beginning of the text nor a word that wrapping brought to the beginning of a line."""
+    failed = criterion("c", "C", 1, Outcome.NOT_MET, reason=f"{'word ' * 20}{command} " * 5)
+    out = render(replace(report(exercise("e", "1", "E", failed)), name=command))
+    assert not [line for line in out.splitlines() if line.lstrip().startswith("::") or "##[" in line]
+
+
 @given(st.text(alphabet=st.characters(), max_size=120), st.integers(min_value=40, max_value=120))
 def test_no_text_of_a_student_is_lost_or_breaks_the_layout(text, width):
     """Wrapped as it may be, every printable character is there, in order, within the width."""
