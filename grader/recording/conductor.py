@@ -186,7 +186,8 @@ class Conductor:
         student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
         for channel, count in _counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
-            self._tape.note(f"{student.name}: {count:,} messages on {where} were overwritten before they were read")
+            some = "a message" if count == 1 else f"{count:,} messages"
+            self._tape.note(f"{student.name}: {some} on {where} did not arrive in time")
         sent = _counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._forward(student, sent)
