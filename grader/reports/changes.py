@@ -57,6 +57,11 @@ class Change:
         """Points won; negative for points lost."""
         return round(self.after - self.before, 6)
 
+    @property
+    def share_gain(self) -> float:
+        """Share of the points won, in [-1, 1]: what counts where the rubric gives other points than before."""
+        return round(_share(self.after, self.after_max) - _share(self.before, self.before_max), 9)
+
 
 def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Change:
     """Return what changed between two reports as JSON, of the exercises that the second one has.
@@ -76,8 +81,8 @@ def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Ch
 
 
 def dropped_first(changes: Sequence[Change]) -> list[Change]:
-    """Return those with any difference: the greatest loss first, the greatest gain last."""
-    return sorted((c for c in changes if c.criteria), key=lambda c: (c.gain, c.name))
+    """Return those with any difference: the greatest loss first, by the share of the points, the greatest gain last."""
+    return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
 
 
 def _standings(report: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], Standing]]:
@@ -94,3 +99,7 @@ def _mark(standing: Standing | None) -> tuple[str, float, float] | None:
 def _sums(standings: Any) -> tuple[float, float]:
     rows = list(standings)
     return round(sum(r.score for r in rows), 6), round(sum(r.max_score for r in rows), 6)
+
+
+def _share(score: float, max_score: float) -> float:
+    return score / max_score if max_score else 0.0

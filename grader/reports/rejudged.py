@@ -71,10 +71,11 @@ def results_to_json(results: Sequence[Result], *, changes: bool) -> str:
 
 
 def _change(change: Change) -> Iterator[str]:
-    of = _points(change.after_max)
+    of, said = _points(change.after_max), f"{_signed(change.gain)} points"
     if change.before_max != change.after_max:
         of += f" (of {_points(change.before_max)} before)"
-    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}, {_signed(change.gain)}"
+        said += f", {_signed(100 * change.share_gain)} % of all"
+    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {said}"
     for row in change.criteria:
         yield f"    {shown(row.exercise)}/{shown(row.criterion)}: {_row(row)}"
 

@@ -24,6 +24,8 @@ from grader.recording.evidence.recording_file import recording_bytes, trace_of
 
 #: A longer recording is none that the grader wrote.
 MOST_BYTES = 512 << 20
+#: Digits of a digest that a message shows, with what comes before them.
+_SHOWN = len("sha256:") + 12
 #: Where a submission lies that nobody will run.
 _NOWHERE = Path()
 
@@ -179,7 +181,8 @@ def _trace(
     try:
         found = kept.sha256(data)
         if found != recording.digest:
-            raise EvidenceError(f"expected the recording {recording.digest}, found {found}")
+            kept_digest = recording.digest or "none"
+            raise EvidenceError(f"expected the recording {kept_digest[:_SHOWN]}, found one of {found[:_SHOWN]}")
         trace = trace_of(data, wire=verify)
         if verify:
             _compare(data, trace, evidence, owner)
