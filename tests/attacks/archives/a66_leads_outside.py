@@ -15,7 +15,7 @@ def build(outside):
         "absolute": "/" + marker,
         "middle": "a/../" * 3 + "../" * 12 + marker,
         "backslash": "..\\" * 12 + marker.replace("/", "\\"),
-        "drive": "C:\\marker-a66",
+        "drive": "C:" + "\\marker-a66",
         "newline": "velocity\n_publisher.py",
         "reserved": "CON.py",
         "control": "velocity_\x1b[2Jpublisher.py",
