@@ -29,6 +29,7 @@ MAX_UNPACKED_BYTES = 64 << 20
 #: Most bytes that one byte of an archive may become, once more than `RATIO_FREE_BYTES` have come of it.
 MAX_RATIO = 200
 RATIO_FREE_BYTES = 4 << 20
+_RATIO = f"{MAX_RATIO} times the size of the archive"
 
 #: Bytes of a file that tell what kind of archive it is.
 HEAD_BYTES = BLOCK
@@ -100,7 +101,9 @@ def _members(data: bytes) -> list[Member]:
     if kind == "zip":
         return zip_members(data, most=MAX_ENTRIES)
     if kind != "tar":
-        data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, _allowed(len(data))))
+        allowed = _allowed(len(data))
+        limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
+        data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, allowed), limit=limit)
         if not is_tar(data[:HEAD_BYTES]):
             raise UnusableArchiveError(
                 f"expected a tar archive inside the {kind}, found another kind of file", HAND_IN_ZIP
@@ -175,6 +178,5 @@ def _contents(members: Sequence[tuple[str, Member]], packed: int, left: LeftOut)
         if total > MAX_TOTAL_BYTES:
             raise UnusableArchiveError(f"expected at most {MAX_TOTAL_BYTES >> 20} MiB in all, found more", FEWER)
         if total > _allowed(packed):
-            problem = f"expected at most {MAX_RATIO} times the size of the archive, found more"
-            raise UnusableArchiveError(problem, FEWER)
+            raise UnusableArchiveError(f"expected at most {_RATIO}, found more", FEWER)
         yield name, content

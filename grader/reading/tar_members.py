@@ -58,13 +58,14 @@ def is_tar(head: bytes) -> bool:
     return True
 
 
-def unpacked(data: bytes, compression: str, *, most: int) -> bytes:
+def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
     """Return what compressed data holds.
 
     Args:
         data: The whole compressed file.
         compression: `gzip`, `bzip2` or `xz`.
         most: Most bytes of the result; nothing is computed beyond.
+        limit: The same in words.
 
     Raises:
         UnusableArchiveError: The data is damaged or cut off, or holds more.
@@ -77,8 +78,7 @@ def unpacked(data: bytes, compression: str, *, most: int) -> bytes:
         except (zlib.error, OSError, lzma.LZMAError, EOFError, ValueError):
             raise _damaged() from None
         if len(whole) > most:
-            problem = f"expected at most {most >> 20} MiB unpacked, found more"
-            raise UnusableArchiveError(problem, FEWER)
+            raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
         if not stream.eof:
             raise _damaged()
         data = stream.unused_data.lstrip(b"\0")

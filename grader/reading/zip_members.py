@@ -36,6 +36,9 @@ def zip_members(data: bytes, *, most: int) -> list[Member]:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _DAMAGE:
         raise _damaged() from None
+    # Members that share their bytes could be unpacked for hours, however little comes out.
+    if sum(info.compress_size for info in archive.infolist()) > len(data):
+        raise _damaged()
     return [_member(archive, info) for info in archive.infolist()]
 
 

@@ -296,10 +296,19 @@ def test_bombs_are_refused_after_little_work(tmp_path):
     zeros = bytes(7 << 20)
     assert "200 times" in refusal(tmp_path / "1", zipped({"a.py": zeros}))[0]
     assert "200 times" in refusal(tmp_path / "2", zipped({f"{n}.py": zeros for n in range(10)}))[0]
-    assert "MiB unpacked" in refusal(tmp_path / "3", gzip.compress(bytes(200 << 20)))[0]
-    assert "MiB unpacked" in refusal(tmp_path / "4", bz2.compress(bytes(100 << 20)))[0]
-    assert "MiB unpacked" in refusal(tmp_path / "5", lzma.compress(bytes(100 << 20)))[0]
+    for number, compress in enumerate((gzip.compress, bz2.compress, lzma.compress)):
+        assert "200 times" in refusal(tmp_path / f"3{number}", compress(bytes(64 << 20)))[0]
+    assert "64 MiB unpacked" in refusal(tmp_path / "4", lzma.compress(os.urandom(500 << 10) * 135, preset=1))[0]
     assert "compressed parts" in refusal(tmp_path / "6", gzip.compress(b"") * 5_000)[0]
+
+
+def test_members_that_share_their_bytes_are_refused(tmp_path):
+    """A thousand names for one content could be unpacked for hours, however little comes out."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("velocity_publisher.py", os.urandom(1 << 20))
+        archive.filelist += archive.filelist * 99
+    assert "damaged or incomplete" in refusal(tmp_path, buffer.getvalue())[0]
 
 
 def test_a_declared_size_is_not_believed(tmp_path):
