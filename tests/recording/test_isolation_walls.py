@@ -17,6 +17,7 @@ from grader.model.errors import EnvironmentFault, HarnessError
 from grader.recording.isolation import seccomp_flat
 from grader.recording.isolation.landlock import Landlock
 from grader.recording.isolation.protocol import Limits, StudentProcess
+from grader.recording.isolation.start import SPARE
 from grader.recording.ros_installation import RosInstallation, find_ros
 
 MIB = 1 << 20
@@ -262,7 +263,7 @@ time.sleep(600)
 
 
 def test_a_fork_bomb_is_bounded(sandbox):
-    """Every process more than allowed is refused; what else the user runs is not counted against it."""
+    """What else the user runs is not counted against it, but some room is left for it."""
     code = """
 import os
 here, there = os.pipe()
@@ -276,8 +277,9 @@ except BlockingIOError:
     pass
 print(count)
 """
-    # An ordinary user's other processes come and go between counting them and starting.
-    assert 0 < int(sandbox.run(code, limits=Limits(processes=20)).stdout) < 60
+    allowed = 20 + (SPARE if sandbox.start_as else 0)
+    # An ordinary user's other processes may come and go between counting them and starting.
+    assert 0 < int(sandbox.run(code, limits=Limits(processes=20)).stdout) < allowed + 40
 
 
 def test_a_student_has_no_privilege_over_files_that_it_needs_none_for(sandbox):

@@ -30,6 +30,7 @@ from grader.recording.ros_installation import RosInstallation
 TRIAL_S = 25.0
 PACKAGE = Path(grader.__file__).resolve().parent
 STAGED = "probe.txt"
+ANSWERED = {"achieved", "outgrown", "said"}
 #: Folders that a student never writes to.
 CLOSED = ("/", "/dev", "/etc", "/usr/lib", "/proc")
 SIOCGIFADDR = 0x8915  # linux/sockios.h
@@ -66,7 +67,7 @@ def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
     letter = TIERS[isolation.name]
     with laid_bait() as bait:
         answer, why = trial(isolation, ros, bait)
-        if not answer.get("achieved"):
+        if set(answer.get("achieved", ())) != set(PROPERTIES):
             why = why or str(answer.get("said") or "the probe did not answer")
             return TierReport(isolation.name, letter, usable=False, why=f"no process runs in it: {why}")
         achieved: dict[str, list[str]] = answer["achieved"]
@@ -128,7 +129,9 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
         for descriptor in command.opened_fds:
             os.close(descriptor)
     with contextlib.suppress(ValueError):
-        return dict(json.loads(done.stdout)), ""
+        answer = json.loads(done.stdout)
+        if isinstance(answer, dict) and answer.keys() >= ANSWERED:
+            return answer, ""
     said = done.stderr.decode("utf-8", "replace").strip().splitlines()
     return {}, said[-1][:300] if said else f"the self-test ended with code {done.returncode}"
 

@@ -51,6 +51,8 @@ KNOWN_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 1
 
 #: In a filter, stands for the number of the process that it is loaded into.
 OWN_PROCESS = 0x7FFFFF01
+#: A user's other programs may start so many threads meanwhile, before a student's process feels it.
+SPARE = 256
 #: Seconds between two looks at the size of a scratch folder, and how many files a look counts at most.
 LOOK_S, MOST_FILES = 0.05, 10_000
 
@@ -68,7 +70,7 @@ def main(arguments: list[str]) -> None:
     for name, value in request["limits"].items():
         limit(getattr(resource, name), value)
     if request["processes"]:
-        limit(resource.RLIMIT_NPROC, request["processes"] + (0 if request["user"] else running()))
+        limit(resource.RLIMIT_NPROC, request["processes"] + (0 if request["user"] else running() + SPARE))
     walls = request["walls"]
     rules = ruleset(system, walls, request["folder"]) if walls else -1
     if request["user"]:

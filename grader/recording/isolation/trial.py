@@ -22,6 +22,7 @@ from grader.model.limits import Limits
 from grader.recording.isolation import probe
 from grader.recording.isolation.environment import quick_discovery
 from grader.recording.isolation.protocol import Command, StudentProcess, runtime_from_json
+from grader.recording.isolation.start import SPARE
 from grader.recording.isolation.starting import HOST
 from grader.recording.isolation.tiers import isolation_from_name
 
@@ -95,7 +96,7 @@ def probe_command(request: dict[str, Any], segment: str) -> Command:
         "shared": isolation.shares_network,
         "segments": [*request["probe"]["segments"], segment],
         "memory": LIMITS.address_space_bytes,
-        "processes": LIMITS.processes,
+        "threads": 2 * (LIMITS.processes + SPARE),
         "scratch": LIMITS.scratch_bytes,
     }
     seen_at = isolation.submission_seen_at or request["submission"]
