@@ -1,0 +1,106 @@
+"""The guard: which limit ends a process, what is said of it, and when the machine is to blame."""
+
+from __future__ import annotations
+
+import os
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from grader.model.limits import Limits
+from grader.model.quantities import MIB, NS_PER_S
+from grader.model.trace import ClockKind, Trace
+from grader.recording import guard as module
+from grader.recording.guard import Guard
+from grader.recording.usage import Usage
+
+TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
+
+
+class Watched:
+    """Stands in for a student's process that never runs."""
+
+    def __init__(self, pid: int = 4_000_000) -> None:
+        self.process = SimpleNamespace(pid=pid)
+        self.ended = False
+        self.stopped = ""
+        self.measured_ns = self.most_bytes = self.most_threads = 0
+        self.held = threading.Event()
+
+    def stop(self, why, family=()):
+        self.stopped = why
+        self.held.set()
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    """What the system says of processes; the worker itself uses nothing unless a test says so."""
+    told: dict[int, Usage] = {}
+    monkeypatch.setattr(module, "LOOK_S", 0.001)
+    monkeypatch.setattr(module, "families", lambda pids: {pid: {pid} for pid in pids})
+    monkeypatch.setattr(module, "usage", lambda pids: next((told[pid] for pid in pids if pid in told), Usage()))
+    return told
+
+
+def watch(student: Watched, **limits: int) -> Guard:
+    """Watch until a limit is reached."""
+    with Guard([student], Limits(**limits)) as guard:
+        student.held.wait(30)
+    return guard
+
+
+@pytest.mark.parametrize(
+    ("used", "limits", "said"),
+    [
+        (Usage(memory_bytes=201 * MIB), {"memory_bytes": 200 * MIB}, "stopped at 200 MiB of memory"),
+        (Usage(processor_ns=7 * NS_PER_S), {"processor_ns": 6 * NS_PER_S}, "stopped at 6 s of processor time"),
+        (Usage(threads=300), {"processes": 200}, "stopped at 200 processes and threads"),
+        (Usage(halted=True), {}, "stopped: a signal had halted it for good"),
+        (Usage(), {"wall_ns": NS_PER_S // 2}, "stopped after 0.5 s of real time"),
+    ],
+)
+def test_each_limit_is_told_in_words(machine, used, limits, said):
+    """With the number that the rubric has."""
+    student = Watched()
+    machine[student.process.pid] = used
+    watch(student, **limits)
+    assert student.stopped == said
+
+
+def test_within_its_limits_nobody_is_ended(machine):
+    """Exactly the limit is not beyond it; what was used is kept for others to see."""
+    student = Watched()
+    machine[student.process.pid] = Usage(200 * MIB, 6 * NS_PER_S, 20)
+    with Guard([student], Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
+        while not student.most_threads:
+            os.sched_yield()
+    assert not student.stopped
+    assert (student.most_bytes, student.measured_ns, student.most_threads) == (200 * MIB, 6 * NS_PER_S, 20)
+
+
+def test_messages_that_fill_the_worker_end_the_nodes(machine):
+    """The grader's own memory is not the student's to fill."""
+    students = [Watched(4_000_000), Watched(4_000_001)]
+    with Guard(students, Limits()):
+        machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
+        for student in students:
+            student.held.wait(30)
+    assert {s.stopped for s in students} == {"stopped at 512 MiB of messages that were under way at once"}
+
+
+@pytest.mark.parametrize(("waited_share", "undecided"), [(0.1, False), (0.9, True)])
+def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waited_share, undecided):
+    """Out of time because there was no processor to be had: a problem of the machine's, never a mark."""
+    wall_ns = NS_PER_S // 20
+    monkeypatch.setattr(module, "starved_ns", lambda pids: int(waited_share * wall_ns))
+    guard = watch(Watched(), wall_ns=wall_ns)
+    assert bool(guard.reviewed(TRACE).harness_problem) is undecided
+
+
+def test_the_guard_ends_with_its_block(machine):
+    """No thread stays."""
+    before = threading.active_count()
+    with Guard([Watched()], Limits()):
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before
