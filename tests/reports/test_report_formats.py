@@ -16,6 +16,7 @@ from grader.reports.classroom50 import render_classroom50
 from grader.reports.formats import FORMATS, Layout
 from grader.reports.github import render_github
 from grader.reports.gradescope import render_gradescope
+from grader.reports.html.render import render_html
 from grader.reports.json_report import dumps
 from grader.reports.junit import render_junit
 from grader.reports.markdown import render_markdown
@@ -26,6 +27,7 @@ GOLDEN = Path(__file__).parent / "golden"
 RENDERERS = {
     "text": lambda report: render_text(report, width=100, colour=False),
     "json": dumps,
+    "html": lambda report: render_html(report, assets="."),
     "markdown": render_markdown,
     "junit": lambda report: render_junit(report, folder="homework"),
     "github": lambda report: render_github(report, folder="homework"),
@@ -36,7 +38,7 @@ RENDERERS = {
 }
 ENDINGS = {"markdown": "md", "junit": "junit.xml", "github": "github.txt"}
 #: How many lines name the run: its path, or how long it took.
-RUN_LINES = {"text": 1, "json": 2, "markdown": 1, "junit": 1, "gradescope": 2, "prairielearn": 1}
+RUN_LINES = {"text": 1, "html": 1, "json": 2, "markdown": 1, "junit": 1, "gradescope": 2, "prairielearn": 1}
 
 
 @pytest.mark.parametrize("name", ENDINGS)
@@ -106,5 +108,6 @@ def test_the_table_of_formats_names_the_right_renderer(name, monkeypatch):
         "github": lambda report: render_github(report, folder=None),
         "junit": lambda report: render_junit(report, folder=None),
         "classroom": render_classroom,
+        "html": render_html,
     }.get(name, RENDERERS[name])
     assert FORMATS[name](sample, Layout(100, colour=False)) == expected(sample)

@@ -31,6 +31,8 @@ def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]
         return []
     if len(exercise.scenarios) > 1:
         return [Stage(scenario.id.replace("_", " "), max(reversed(graphs), key=_size))]
+    if graphs[0] == graphs[-1]:
+        return [Stage("from the start to the end", graphs[0])]
     return [Stage("at the start", graphs[0]), Stage("at the end", graphs[-1])]
 
 

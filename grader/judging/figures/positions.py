@@ -39,8 +39,8 @@ def path_chart(check: LogsPosition, trace: Trace) -> Chart | None:
     shown = [pair for pair in pairs if _near(pair.point, track)]
     path = [(p.at(X), p.at(Y)) for p in track.poses]
     lines = [series(f"path on {check.topic}", path, tone=Tone.FAINT, texts=[moment(p.t_ns) for p in track.poses])]
-    lines += _dots("logged position that agrees", [p for p in shown if p.right], Tone.GOOD)
-    lines += _dots("logged position that does not", [p for p in shown if not p.right], Tone.BAD)
+    lines += _dots("logged, agrees", [p for p in shown if p.right], Tone.GOOD)
+    lines += _dots("logged, does not agree", [p for p in shown if not p.right], Tone.BAD)
     return Chart(
         id=f"path {check.topic}",
         title=f"The path on {check.topic} and the logged positions",

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from grader.model.exercise import Location, Outcome
 from grader.model.figure import Excerpt, Figure
-from grader.model.report import ExerciseReport, Report, Verdict
+from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind
 from grader.reports import wording
 from grader.reports.escape import script_json, shown
@@ -59,6 +59,7 @@ def _templates() -> Environment:
         "open_at_first": _open_at_first,
         "percent": _percent,
         "excerpt_at": _excerpt_at,
+        "excerpts_left": _excerpts_left,
         "figures_for": _figures_for,
         "code_line": _code_line,
         "segments": _segments,
@@ -83,6 +84,14 @@ def _excerpt_at(exercise: ExerciseReport, place: Location | None) -> Excerpt | N
     if place is None:
         return None
     return next((e for e in exercise.excerpts if (e.file, e.line) == (place.file, place.line)), None)
+
+
+def _excerpts_left(exercise: ExerciseReport, fault: ReportedFault) -> list[Excerpt]:
+    """Return the source around a fault, unless a criterion shows it already."""
+    shown_above = {verdict.location for verdict in exercise.verdicts}
+    place = Location(fault.file, fault.line)
+    excerpt = _excerpt_at(exercise, place)
+    return [excerpt] if excerpt and place not in shown_above else []
 
 
 def _figures_for(exercise: ExerciseReport, criterion: str) -> list[Figure]:

@@ -2,7 +2,7 @@
 const Charts = (() => {
   const colour = (tone) => `var(--c-${tone})`;
   const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect" };
-  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER] = [52, 150, 210, 44, 26, 16, 44, 34];
+  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER] = [52, 150, 210, 48, 34, 20, 40, 26];
   const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
 
   function number(value) {
@@ -23,8 +23,9 @@ const Charts = (() => {
     const power = 10 ** Math.floor(Math.log10(raw));
     const interval = [1, 2, 2.5, 5, 10].map((f) => f * power).find((step) => step >= raw * 0.999);
     const room = (high - low) * 0.04;
+    const min = Math.floor((low - room) / interval) * interval;
     return {
-      min: Math.floor((low - room) / interval) * interval,
+      min: low >= 0 ? Math.max(min, 0) : min,
       max: Math.ceil((high + room) / interval) * interval,
       interval,
     };
@@ -42,7 +43,8 @@ const Charts = (() => {
   function extentX(figure) {
     const points = figure.panels.flatMap((panel) => panel.series.flatMap((series) => series.points));
     const [low, high] = extent([...points.map((p) => p[0]), ...figure.moments.map((m) => m.x)]);
-    return figure.square ? [low, high] : [Math.min(0, low), high > 0 ? high : 1];
+    if (figure.square) return [low, high];
+    return [Math.min(0, low), high > 0 ? high * 1.01 : 1];
   }
 
   function extentY(panel) {
@@ -102,21 +104,22 @@ const Charts = (() => {
       gridIndex: index,
       name: panel.unit ? `${panel.title} (${panel.unit})` : panel.title,
       nameLocation: "end",
-      nameGap: 8,
+      nameGap: 12,
       nameTextStyle: { ...FONT, align: "left", padding: [0, 0, 0, -SIDE + 8], fontWeight: 600 },
-      axisLine: { show: false },
+      axisLine: { show: false, onZero: false },
       axisTick: { show: false },
       axisPointer: { show: false },
       splitLine: { show: true, lineStyle: { color: colour("grid") } },
     };
     if (panel.lanes.length) {
       // The axis starts at the bottom, rows at the top; its name must stay above either way.
-      const label = { ...FONT, inside: true, margin: 4, verticalAlign: "bottom", padding: [0, 0, 6, 0] };
+      const label = { ...FONT, inside: true, margin: 4, verticalAlign: "bottom", padding: [0, 0, 9, 0] };
       const data = [...panel.lanes].reverse();
       return { ...shared, type: "category", data, axisLabel: label, z: 4 };
     }
     const round = ends ? { min: ends[0], max: ends[1] } : niceAxis(...extentY(panel));
-    return { ...shared, type: "value", ...round, axisLabel: { ...FONT, formatter: number } };
+    const label = { ...FONT, formatter: number, showMinLabel: !ends, showMaxLabel: !ends };
+    return { ...shared, type: "value", ...round, axisLabel: label };
   }
 
   function row(panel, y) {
@@ -138,7 +141,7 @@ const Charts = (() => {
       z: series.tone === "faint" ? 2 : 3,
     };
     if (series.look === "dots") {
-      const size = data.length > 250 ? 4 : panel.lanes.length ? 9 : 7;
+      const size = data.length > 120 ? 5 : panel.lanes.length ? 9 : 7;
       return { ...common, type: "scatter", symbolSize: series.tone === "bad" ? size + 3 : size };
     }
     return {
@@ -160,9 +163,15 @@ const Charts = (() => {
     return lines;
   }
 
+  // Words at the edge of a chart stay inside it.
+  function alignment(x, ends) {
+    const share = (x - ends[0]) / (ends[1] - ends[0]);
+    return share > 0.88 ? "right" : share < 0.12 ? "left" : "center";
+  }
+
   // Bands, thresholds and moments: what is drawn behind the points.
   function background(figure, panel, index, ends) {
-    const label = { ...FONT, fontSize: 11 };
+    const label = { ...FONT, fontSize: 11, textBorderColor: "var(--card)", textBorderWidth: 3 };
     const levels = panel.levels.map((level) => ({
       yAxis: level.value,
       lineStyle: { color: colour("third"), type: "dashed", width: 1.5 },
@@ -171,8 +180,8 @@ const Charts = (() => {
     const moments = figure.moments.map((moment) => ({
       xAxis: moment.x,
       lineStyle: { color: colour(moment.tone), type: "dotted", width: 1.5 },
-      label: { ...label, show: index === 0, position: "end", distance: panel.title ? 18 : 2, formatter: () => moment.label,
-        align: moment.x > ends[0] + (ends[1] - ends[0]) * 0.9 ? "right" : "center" },
+      label: { ...label, show: index === 0, position: "end", distance: panel.title ? 28 : 2, formatter: () => moment.label,
+        align: alignment(moment.x, ends) },
     }));
     const grid = panel.grid ? gridLines(panel, ends) : [];
     const bands = panel.bands.map((band) => [
@@ -365,6 +374,11 @@ const Charts = (() => {
       chart.dispatchAction({ type: "hideTip" });
     }
 
+    // The library takes every turn of the wheel for itself; without ctrl it is the page's.
+    for (const name of ["wheel", "mousewheel"]) {
+      const pass = (event) => { if (!event.ctrlKey) event.stopPropagation(); };
+      element.addEventListener(name, pass, { capture: true, passive: true });
+    }
     paint(element.clientWidth || 640);
     return { zoom, pan, step, hide, paint, reset: () => show(0, 100), width: () => element.clientWidth };
   }

@@ -23,6 +23,20 @@ const Graphs = (() => {
     return graph;
   }
 
+  // Where the line from an ellipse's centre towards a point leaves it; the layout knows rectangles only.
+  function onEdge(place, toward) {
+    const [dx, dy] = [toward.x - place.x, toward.y - place.y];
+    const length = Math.hypot(dx / (place.width / 2), dy / (place.height / 2)) || 1;
+    return { x: place.x + dx / length, y: place.y + dy / length };
+  }
+
+  function touching(graph, key, points) {
+    const ends = [...points];
+    if (key.v.startsWith("n")) ends[0] = onEdge(graph.node(key.v), points[1]);
+    if (key.w.startsWith("n")) ends[ends.length - 1] = onEdge(graph.node(key.w), points[points.length - 2]);
+    return ends;
+  }
+
   function curve(points) {
     const at = (p) => `${p.x.toFixed(1)} ${p.y.toFixed(1)}`;
     let path = `M${at(points[0])}`;
@@ -66,9 +80,11 @@ const Graphs = (() => {
     canvas.className = "canvas";
     const graph = arranged(stage, width < NARROW);
     const size = graph.graph();
+    section.style.flex = `1 1 ${Math.min(Math.ceil(size.width) + 2, width)}px`;
     const picture = make(canvas, "svg", { viewBox: `0 0 ${size.width} ${size.height}`, role: "group", "aria-label": stage.title });
     const edges = graph.edges().map((key) => {
-      const { points, text } = graph.edge(key);
+      const { text, points: laid } = graph.edge(key);
+      const points = touching(graph, key, laid);
       const group = make(picture, "g", { class: "edge", "data-from": key.v, "data-to": key.w });
       make(group, "title", {}, text);
       make(group, "path", { class: "arrow", d: curve(points) });
@@ -110,8 +126,7 @@ const Graphs = (() => {
       element.replaceChildren();
       const stages = element.appendChild(document.createElement("div"));
       stages.className = "stages";
-      const each = figure.stages.length > 1 && width > 2 * NARROW ? width / 2 : width;
-      sizers = figure.stages.map((stage) => drawStage(stages, stage, each, said));
+      sizers = figure.stages.map((stage) => drawStage(stages, stage, width, said));
       sizers.forEach((size) => size(scale));
     }
     function rescale(value) {

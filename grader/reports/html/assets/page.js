@@ -76,6 +76,11 @@
     }
   }
 
+  function fill(place, figure) {
+    (figure.kind === "graph" ? graphTables : chartTables)(place, figure);
+    if (!place.hasChildNodes()) place.textContent = "There is nothing in it.";
+  }
+
   function graphTables(parent, figure) {
     for (const stage of figure.stages) table(parent, stage.title, ["connection"], stage.edges.map((edge) => [edge.text]));
   }
@@ -118,7 +123,7 @@
     const details = element.querySelector(".table");
     details.addEventListener("toggle", () => {
       const place = details.querySelector(".scroll");
-      if (details.open && !place.hasChildNodes()) (graph ? graphTables : chartTables)(place, figure);
+      if (details.open && !place.hasChildNodes()) fill(place, figure);
     });
     drawn.push(picture);
     watch(drawing, picture);

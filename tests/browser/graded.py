@@ -1,0 +1,84 @@
+"""Reports of whole runs, made by the real judging from traces built in code, with every kind of figure in them."""
+
+from pathlib import Path
+
+from report_samples import report
+from tracing import FLOAT32, Recording, held_at, position_logs, scripted, velocity
+
+from grader.judging.figures.pictures import illustrated
+from grader.judging.judge import judge_exercise
+from grader.model.submission import StudentFile, Submission
+from grader.model.trace import FaultKind
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+
+SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"
+SOURCE = "import rclpy\n\n\ndef main():\n    rclpy.init()\n    raise ValueError('no')\n\n\nmain()\n"
+
+
+def perfect():
+    """Return a report in which everything is met."""
+    return _report(velocity().log(1, "publishing"), position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}"), "/fan_speed")
+
+
+def wrong():
+    """Return a report with a slow publisher, wrong positions and a controller that talks to nobody."""
+    return _report(
+        velocity(rate=10).log(1, "publishing", "WARN"), position_logs(lambda x, y: f"x={y:.3f} y={x:.3f}"), "/fan"
+    )
+
+
+def crashed(text="ValueError: no"):
+    """Return a report of nodes that raised; the text of the exception is given."""
+    first = velocity(stop_s=4).fault(
+        3,
+        FaultKind.EXCEPTION,
+        text,
+        line=6,
+        process="velocity_publisher.py",
+        frames=("velocity_publisher.py:6 in main",),
+    )
+    second = Recording(24, process="odom_subscriber.py").log(1, text, "ERROR").crashed(5, text, line=6)
+    return _report(first, second, "/fan_speed", name=text)
+
+
+def _report(first, second, speed, name="ada"):
+    rubrics = [read_rubric(path) for path in builtin_rubrics().values()]
+    recordings = {"alone": first, "waiting_then_driving": second, **_conversation(speed)}
+    traces = {name_: recording.trace(name_) for name_, recording in recordings.items()}
+    return report(*(_graded(exercise, traces) for exercise in rubrics), name=name)
+
+
+def _graded(exercise, traces):
+    own = {s.id: traces[s.id] for s in exercise.scenarios}
+    submission = Submission(
+        "ada", "./ada", Path(), "sha256:" + "0" * 64, {f: StudentFile(f, f) for f in exercise.files}
+    )
+    sources = dict.fromkeys(exercise.files, SOURCE)
+    judged = judge_exercise(exercise, own, submission, sources)
+    return illustrated(judged, exercise, own, submission, sources)
+
+
+def _conversation(speed):
+    """Return exercise 3's scenarios; the sensor's values are fixed but look drawn."""
+    sensor = Recording(12, process="temperature_sensor.py").endpoint("publisher", "/temperature", FLOAT32, SENSOR)
+    sensor.endpoint("subscription", "/fan_speed", FLOAT32, SENSOR)
+    both = Recording(20, process="temperature_sensor.py").endpoint("publisher", "/temperature", FLOAT32, SENSOR)
+    both.endpoint("subscription", "/fan_speed", FLOAT32, SENSOR)
+    both.endpoint("subscription", "/temperature", FLOAT32, CONTROLLER, 2)
+    both.endpoint("publisher", speed, FLOAT32, CONTROLLER, 2)
+    for k in range(60):
+        sensor.number(0.2 * k, "/temperature", _drawn(k)).deliver(
+            0.2 * k, "/fan_speed", {"data": 100.0 * (k // 10 % 2)}
+        )
+        sensor.log(0.2 * k, f"fan {100.0 * (k // 10 % 2)}")
+    for k in range(99):
+        both.number(0.2 * k, "/temperature", _drawn(k)).number(0.2 * k + 0.01, speed, 100.0 * (_drawn(k) > 25))
+    alone = scripted().endpoint("subscription", "/temperature", FLOAT32, CONTROLLER)
+    alone.endpoint("publisher", speed, FLOAT32, CONTROLLER)
+    for k in range(80):
+        alone.number(0.51 + 0.2 * k, speed, 100.0 * (held_at(0.5 + 0.2 * k) > 25))
+    return {"sensor_alone": sensor, "controller_alone": alone, "together": both}
+
+
+def _drawn(k):
+    return 20 + (k * k * 7919 + 104729 * k) % 1000 / 100

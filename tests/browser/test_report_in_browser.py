@@ -1,0 +1,275 @@
+"""The HTML report in a real browser: every picture is drawn, nothing is loaded, and hostile text stays text."""
+
+from itertools import pairwise
+
+import graded
+import pytest
+
+from grader.reports.html.bundle import shared_assets
+from grader.reports.html.render import render_html
+
+MADE = {"perfect": graded.perfect, "wrong": graded.wrong, "crashed": graded.crashed}
+ATTACKS = (
+    "<img src=http://198.51.100.1/x onerror=document.title='owned'>",
+    "</script><script>document.title='owned'</script>",
+    "<svg onload=document.title='owned'>",
+    "{{constructor.constructor('document.title=1')()}}",
+)
+
+
+@pytest.fixture
+def visit(browser, tmp_path):
+    """Return a function that opens a report and gives the page, what its console said and what it asked for."""
+    contexts = []
+
+    def opened(html, **options):
+        file = tmp_path / "report.html"
+        file.write_text(html, encoding="utf-8")
+        context = browser.new_context(**{"viewport": {"width": 1100, "height": 900}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        said, asked = [], []
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(file.as_uri())
+        page.wait_for_selector("html[data-ready=yes]", timeout=20_000)
+        return page, said, asked
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+def drawings(page):
+    """Return (figure id, whether it has a picture of some size with something in it)."""
+    return page.evaluate(
+        """() => [...document.querySelectorAll("[data-figure]")].map((figure) => {
+            const pictures = [...figure.querySelectorAll(".drawing svg")];
+            const drawn = (svg) => svg.getBoundingClientRect().height > 30 && svg.querySelector("path, rect");
+            return [figure.id, pictures.length > 0 && pictures.every(drawn)];
+        })"""
+    )
+
+
+@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit, name, scheme):
+    """The console is silent, and the page itself is all that was ever asked for."""
+    page, said, asked = visit(render_html(MADE[name]()), color_scheme=scheme)
+    drawn = drawings(page)
+    assert len(drawn) >= 10
+    assert [id_ for id_, there in drawn if not there] == []
+    assert said == []
+    assert [url for url in asked if not url.endswith("/report.html")] == []
+
+
+def test_shared_files_beside_the_report_draw_the_same(visit, tmp_path):
+    """A class keeps one copy of the scripts."""
+    (tmp_path / "assets").mkdir()
+    for name, content in shared_assets().items():
+        (tmp_path / "assets" / name).write_bytes(content)
+    page, said, asked = visit(render_html(graded.perfect(), assets="assets"))
+    assert all(there for _, there in drawings(page))
+    assert said == []
+    assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *shared_assets()}
+
+
+@pytest.mark.parametrize("text", ATTACKS)
+def test_hostile_text_stays_text_wherever_it_is_shown(visit, text):
+    """In the page, in tooltips, in tables, in the legend and inside the charts."""
+    page, said, asked = visit(render_html(graded.crashed(text)))
+    for summary in page.query_selector_all("figure .table > summary"):
+        summary.click()
+    for drawing in page.query_selector_all(".drawing"):
+        drawing.focus()
+        page.keyboard.press("ArrowRight")
+    assert page.evaluate("document.querySelectorAll('img, iframe, object, embed, [onload], [onerror]').length") == 0
+    assert page.evaluate("document.scripts.length") == 2
+    assert "owned" not in page.title().replace(text, "")
+    assert text in page.inner_text("h1")
+    assert said == []
+    assert len(asked) == 1
+
+
+def test_a_pointer_over_a_chart_is_told_the_value(visit):
+    """The tooltip shows the time and the value of what is under it."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    chart = page.locator("[data-figure=velocity_publisher-1] .drawing")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
+    tip = chart.locator(".tip")
+    tip.wait_for(state="visible")
+    assert "time" in tip.inner_text()
+    assert "20 Hz" in tip.inner_text()
+    assert said == []
+
+
+def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit):
+    """Arrow keys go from point to point; the words go to a live region."""
+    page, _, _ = visit(render_html(graded.perfect()))
+    chart = page.locator("[data-figure=velocity_publisher-1]")
+    chart.locator(".drawing").focus()
+    page.keyboard.press("ArrowRight")
+    first = chart.locator("[data-said]").text_content()
+    page.keyboard.press("ArrowRight")
+    assert first.startswith("time ")
+    assert chart.locator("[data-said]").text_content() != first
+
+
+def window_of(page, figure):
+    """Return which part of a chart is shown, in percent."""
+    return page.evaluate(
+        """(id) => {
+            const element = document.querySelector(`[data-figure=${id}] .drawing`);
+            const { start, end } = echarts.getInstanceByDom(element).getOption().dataZoom[0];
+            return [start, end];
+        }""",
+        figure,
+    )
+
+
+def test_buttons_keys_and_the_wheel_zoom(visit):
+    """In, out, along and back to all of it."""
+    # waiting for a condition inside the page takes eval, which its own policy forbids
+    page, said, _ = visit(render_html(graded.perfect()), bypass_csp=True)
+    figure = "velocity_publisher-1"
+    tools = page.locator(f"[data-figure={figure}] .tools")
+    assert window_of(page, figure) == [0, 100]
+    tools.get_by_label("Zoom in").click()
+    assert window_of(page, figure) == [25, 75]
+    tools.get_by_label("Later").click()
+    assert window_of(page, figure) == [50, 100]
+    tools.get_by_label("Show all").click()
+    assert window_of(page, figure) == [0, 100]
+    drawing = page.locator(f"[data-figure={figure}] .drawing")
+    drawing.focus()
+    page.keyboard.press("+")
+    assert window_of(page, figure) == [25, 75]
+    page.keyboard.press("0")
+    box = drawing.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -400)
+    page.keyboard.up("Control")
+    page.wait_for_function(
+        f"echarts.getInstanceByDom(document.querySelector('[data-figure={figure}] .drawing'))"
+        ".getOption().dataZoom[0].start > 0"
+    )
+    assert said == []
+
+
+def test_the_wheel_alone_scrolls_the_page(visit):
+    """A chart under the pointer is no trap."""
+    page, _, _ = visit(render_html(graded.perfect()), bypass_csp=True)
+    drawing = page.locator("[data-figure=velocity_publisher-1] .drawing")
+    drawing.scroll_into_view_if_needed()
+    box, before = drawing.bounding_box(), page.evaluate("scrollY")
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
+    page.mouse.wheel(0, 300)
+    page.wait_for_function(f"scrollY > {before}")
+    assert window_of(page, "velocity_publisher-1") == [0, 100]
+
+
+def test_the_graph_lights_up_and_grows(visit):
+    """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    figure = page.locator("[data-figure]", has=page.locator(".stages")).last
+    node = figure.locator("[data-box]").first
+    node.focus()
+    assert figure.locator(".edge.lit").count() > 0
+    assert "publishes" in figure.locator("[data-said]").text_content()
+    width = figure.locator("svg[viewBox]:not(.fold)").first.bounding_box()["width"]
+    figure.get_by_label("Zoom in").click()
+    assert figure.locator(".stage svg").first.bounding_box()["width"] > 1.5 * width
+    assert said == []
+
+
+def test_both_directions_are_in_the_graph(visit):
+    """The last situation shows temperature going one way and the fan speed the other."""
+    page, _, _ = visit(render_html(graded.perfect()))
+    stage = page.locator("#two_node_communication .stage").last
+    names = dict(
+        stage.evaluate(
+            "(s) => [...s.querySelectorAll('[data-box]')].map((b) => [b.dataset.box, b.lastChild.textContent])"
+        )
+    )
+    edges = stage.evaluate("(s) => [...s.querySelectorAll('.edge')].map((e) => [e.dataset.from, e.dataset.to])")
+    assert {(names[a], names[b]) for a, b in edges} == {
+        (graded.SENSOR, "/temperature"),
+        ("/temperature", graded.CONTROLLER),
+        (graded.CONTROLLER, "/fan_speed"),
+        ("/fan_speed", graded.SENSOR),
+    }
+
+
+def test_every_chart_can_be_read_as_a_table(visit):
+    """All its numbers, with headings."""
+    page, _, _ = visit(render_html(graded.perfect()))
+    for figure in page.query_selector_all("[data-figure]"):
+        figure.query_selector(".table > summary").click()
+        assert figure.wait_for_selector(".scroll:not(:empty)").inner_text()
+    rows = page.locator("[data-figure=velocity_publisher-1] tbody tr")
+    assert rows.count() > 300
+
+
+@pytest.mark.parametrize("width", [320, 390])
+def test_nothing_sticks_out_on_a_phone(visit, width):
+    """The page scrolls downwards only."""
+    page, said, _ = visit(
+        render_html(graded.wrong()), viewport={"width": width, "height": 700}, is_mobile=True, has_touch=True
+    )
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert all(there for _, there in drawings(page))
+    assert said == []
+
+
+def test_a_print_shows_every_criterion_and_every_chart(visit):
+    """What is folded on the screen is unfolded on paper, and charts fit the sheet; afterwards all is as before."""
+    page, said, _ = visit(render_html(graded.wrong()), color_scheme="dark")
+    folded = page.locator("details.criterion:not([open])").count()
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert folded > 0
+    assert page.locator("details.criterion:not([open])").count() == 0
+    assert max(page.evaluate("[...document.querySelectorAll('.drawing > div > svg')].map((s) => s.clientWidth)")) <= 700
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.locator("details.criterion:not([open])").count() == folded
+    assert len(page.pdf(format="A4")) > 20_000
+    assert said == []
+
+
+def test_a_link_to_a_folded_criterion_unfolds_it(visit):
+    """A colleague can be sent to the very place."""
+    page, _, _ = visit(render_html(graded.perfect()))
+    page.evaluate("location.hash = '#velocity_publisher-rate'")
+    page.wait_for_selector("#velocity_publisher-rate[open]")
+
+
+def test_headings_landmarks_and_names_are_there(visit):
+    """For whoever listens to the page: one h1, no level left out, every control and picture named."""
+    page, _, _ = visit(render_html(graded.wrong()))
+    levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3, h4, h5')].map((h) => Number(h.tagName[1]))")
+    assert levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in pairwise(levels))
+    for landmark in ("header", "main", "nav", "footer"):
+        assert page.locator(landmark).count() == 1
+    unnamed = page.evaluate(
+        "[...document.querySelectorAll('button, [tabindex=\"0\"]')].filter((e) => !e.getAttribute('aria-label')"
+        " && !e.getAttribute('aria-labelledby') && !e.textContent.trim()).length"
+    )
+    assert unnamed == 0
+
+
+def test_without_scripts_the_report_is_there_in_words(visit, browser, tmp_path):
+    """Mail programs and wary people switch them off."""
+    file = tmp_path / "plain.html"
+    file.write_text(render_html(graded.wrong()), encoding="utf-8")
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(file.as_uri())
+    text = page.inner_text("body")
+    context.close()
+    assert "Publishes at 20 Hz" in text
+    assert "messages on /cmd_vel within" in text
+    assert "need JavaScript" in text
