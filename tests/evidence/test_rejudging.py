@@ -1,0 +1,196 @@
+"""Judging kept evidence again: the same rubric, the same report; another rubric, and what it changes for whom."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from kept_runs import RUBRICS, kept_run, velocity_exercise, velocity_run, velocity_trace
+
+from grader import cli, rejudging
+from grader.judging.whole import judge_run
+from grader.reading.rubric_file import read_rubric
+from grader.recording.evidence.store import open_evidence
+from grader.reports.json_report import dumps
+
+
+def grade(*words: str | Path):
+    return CliRunner().invoke(cli.app, ["rejudge", *map(str, words)])
+
+
+def changed_rubric(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "changed.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def kept_class(folder: Path) -> Path:
+    """A right one, one at half the rate, one without its file."""
+    runs = {"ada": velocity_trace(), "bob": velocity_trace(rate_hz=10), "cyd": None}
+    for name, trace in runs.items():
+        kept_run(folder / name / "evidence", velocity_run(trace, name=name))
+    return folder
+
+
+@pytest.mark.parametrize("rate_hz", [20, 10])
+@pytest.mark.parametrize("pictures", [False, True])
+def test_the_same_rubric_gives_the_same_report(tmp_path, rate_hz, pictures):
+    """Every value of it; only the command comes from the command line and not from the recording."""
+    run = velocity_run(velocity_trace(rate_hz=rate_hz), source="import rclpy\nperiod = 0.1\n")
+    first = judge_run([velocity_exercise()], run, pictures=pictures)
+    kept_run(tmp_path, run)
+    how = rejudging.judgement((), (), pictures=pictures)
+    again = rejudging.rejudge(open_evidence(tmp_path), how)
+    assert again.reproduce.command == ("grade", "class/ada", "--seed", "7")
+    assert dataclasses.replace(again, reproduce=first.reproduce) == first
+
+
+def test_the_report_is_printed_and_written_as_by_grading(tmp_path):
+    """Text by default, JSON alone where asked for, files beside it, and the exit codes of grading."""
+    run = velocity_run(velocity_trace(rate_hz=10))
+    kept_run(tmp_path / "e", run)
+    text = grade(tmp_path / "e")
+    assert (text.exit_code, "20 of 30 points" in text.output) == (1, True)
+    shown = grade(tmp_path / "e", "--json", "-o", f"text={tmp_path / 'r.txt'}", "--min-score", 60)
+    report = rejudging.rejudge(open_evidence(tmp_path / "e"), rejudging.judgement((), ()))
+    assert (shown.exit_code, shown.stdout) == (0, dumps(report))
+    assert "20 of 30 points" in (tmp_path / "r.txt").read_text(encoding="utf-8")
+
+
+def test_a_changed_rubric_gives_other_scores(tmp_path):
+    """Points, tolerances and checks; the report names the new rubric's digest and the command that gives it."""
+    kept_run(tmp_path / "e", velocity_run(velocity_trace(rate_hz=18)))
+    path = changed_rubric(tmp_path, ("tolerance: 1 Hz, partly", "tolerance: 2 Hz, partly"), ("points: 5", "points: 7"))
+    report = json.loads(grade(tmp_path / "e", "--json", "--rubric", path).stdout)
+    assert (report["score"], report["max_score"]) == (34, 34)
+    assert report["reproduce"]["rubrics"] == {"velocity_publisher": read_rubric(path).digest}
+    assert f"--rubric {path}" in report["reproduce"]["command"]
+
+
+def test_a_class_is_judged_and_the_rest_goes_on(tmp_path):
+    """What is damaged is refused by name, and the exit code says so."""
+    kept_class(tmp_path)
+    right = grade(tmp_path)
+    assert (right.exit_code, right.output.splitlines()) == (1, ["ada  30/30", "bob  20/30", "cyd  0/30", "judged: 3"])
+    (tmp_path / "bob/evidence/velocity_publisher.alone/velocity_publisher.alone_0.mcap").write_bytes(b"x")
+    damaged = grade(tmp_path)
+    assert damaged.exit_code == 2
+    assert damaged.output.splitlines()[:2] == ["ada  30/30", "cyd  0/30"]
+    assert damaged.output.splitlines()[2].startswith("refused: bob: ")
+    assert damaged.output.splitlines()[3] == "judged: 2, refused: 1"
+
+
+def test_changes_are_told_with_dropped_marks_first(tmp_path):
+    """By the share of the points, with the old and the new standing of each criterion that changed."""
+    kept_class(tmp_path)
+    assert grade("--diff", tmp_path).output == "unchanged: 3 of 3\n"
+    path = changed_rubric(
+        tmp_path, ("linear.x: 0.5", "linear.x: 0.6"), ("partly_tolerance: 2 Hz", "partly_tolerance: 12 Hz")
+    )
+    lines = grade("--diff", tmp_path, "--rubric", path).output.splitlines()
+    assert lines[0] == "ada: 30 -> 25 of 30: -5 points"
+    assert lines[1].startswith("    velocity_publisher/linear_velocity: was met 5/5, is not met 0/5: t = 0.000 s")
+    assert lines[2] == "bob: 20 -> 20 of 30: 0 points"
+    assert lines[3].startswith("    velocity_publisher/rate: was not met 0/10, is partly 5/10: ")
+    assert lines[-1] == "unchanged: 1 of 3"
+
+
+def test_changes_can_be_read_by_programs(tmp_path):
+    """The same order, every number, and who was refused or could not be compared."""
+    kept_class(tmp_path)
+    (tmp_path / "cyd/evidence/report.json").unlink()
+    (tmp_path / "dan").mkdir()
+    (tmp_path / "dan/evidence.json").write_text("{}")
+    path = changed_rubric(tmp_path, ("linear.x: 0.5", "linear.x: 0.6"))
+    found = json.loads(grade("--diff", "--json", tmp_path, "--rubric", path).stdout)
+    assert [(c["name"], c["before"], c["after"], c["gain"]) for c in found["changed"]] == [
+        ("ada", 30, 25, -5),
+        ("bob", 20, 15, -5),
+    ]
+    assert found["unchanged"] == []
+    assert found["not_compared"] == ["cyd"]
+    assert [row["name"] for row in found["refused"]] == ["dan"]
+
+
+def test_added_and_removed_criteria_are_changes(tmp_path):
+    """A criterion that is asked no more took its points along."""
+    kept_run(tmp_path / "e", velocity_run(velocity_trace()))
+    text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
+    (tmp_path / "less.yaml").write_text(text[: text.index("  - id: logging")], encoding="utf-8")
+    (tmp_path / "other.yaml").write_text(text.replace("id: logging", "id: logs"), encoding="utf-8")
+    less = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "less.yaml").output
+    assert "velocity_publisher/logging: was met 4/4, is asked no more" in less
+    other = grade("--diff", tmp_path / "e", "--rubric", tmp_path / "other.yaml").output
+    assert "velocity_publisher/logs: was not asked, is met 4/4" in other
+
+
+def test_reports_of_a_class_are_files_in_a_folder(tmp_path):
+    """One a submission and format, and the whole class as JSON on standard output."""
+    kept_class(tmp_path / "class")
+    out = tmp_path / "out"
+    done = grade(tmp_path / "class", "--json", "-o", f"json={out}", "-o", f"text={out}", "--jobs", 1)
+    assert sorted(p.name for p in out.iterdir()) == [f"{n}.{e}" for n in ("ada", "bob", "cyd") for e in ("json", "txt")]
+    found = json.loads(done.stdout)
+    assert [row["report"] for row in found["submissions"]] == [
+        json.loads((out / f"{row['name']}.json").read_text()) for row in found["submissions"]
+    ]
+
+
+def test_many_processes_give_what_one_gives(tmp_path):
+    """In the same order; enough submissions for a pool."""
+    for number in range(rejudging.WORTH_A_POOL * 2):
+        kept_run(tmp_path / f"{number:03}", velocity_run(velocity_trace(rate_hz=10) if number % 3 else None))
+    named = rejudging.named_evidence([tmp_path])
+    how, wanted = rejudging.judgement((), ()), rejudging.Wanted(reports=True)
+    several = rejudging.rejudge_class(named, how, wanted, jobs=2)
+    assert several == rejudging.rejudge_class(named, how, wanted, jobs=1)
+    assert [r.name for r in several] == [f"{number:03}" for number in range(rejudging.WORTH_A_POOL * 2)]
+
+
+def test_equal_names_are_told_apart(tmp_path):
+    """Two classes may each have an ada."""
+    for name in ("one", "two"):
+        kept_run(tmp_path / name / "ada", velocity_run(velocity_trace()))
+    named = rejudging.named_evidence([tmp_path / "one", tmp_path / "two", tmp_path / "one"])
+    assert [name for name, _ in named] == ["ada", "ada (2)"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "expected kept evidence, found none"),
+        (("--exercise", "odom_subscriber"), "expected the exercise odom_subscriber, found velocity_publisher"),
+        (("--rubric", RUBRICS / "exercise_2.yaml"), "expected a rubric for velocity_publisher, found one for odom_sub"),
+        (("--exercise", "velocity"), "expected one of velocity_publisher"),
+        (("-o", "evidence=x"), "evidence is kept while grading"),
+    ],
+    ids=["none", "exercise", "rubric", "unknown", "output"],
+)
+def test_what_cannot_be_judged_is_told(tmp_path, words, said):
+    """Exit code 2 and one line."""
+    (tmp_path / "none").mkdir()
+    kept_run(tmp_path / "e", velocity_run(velocity_trace()))
+    done = grade(tmp_path / ("e" if words else "none"), *words)
+    assert done.exit_code == 2
+    assert said in done.output
+
+
+def test_hostile_names_stay_text(tmp_path):
+    """A folder's name comes from a student; on a terminal it does nothing."""
+    kept_run(tmp_path / "a\x1b[31m\n::error::x" / "evidence", velocity_run(None))
+    shown = grade(tmp_path).output
+    assert "\x1b" not in shown
+    assert not any(line.startswith("::") for line in shown.splitlines())
+
+
+def test_verifying_says_the_same_of_sound_evidence(tmp_path):
+    """Slower, and no other result."""
+    kept_class(tmp_path)
+    assert grade("--verify", tmp_path).output == grade(tmp_path).output
