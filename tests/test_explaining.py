@@ -1,0 +1,123 @@
+"""Explanations of criteria and checks: complete, in the words of rubric and manual, with help for mistyped names."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import pytest
+from click.testing import CliRunner
+
+from grader import cli
+from grader.explaining import explain
+from grader.judging.checks import CHECKS
+from grader.model.errors import GraderError
+from grader.reading.manuals import manual_of
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+
+CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
+
+
+def grade(*words: str):
+    return CliRunner().invoke(cli.app, ["explain", *words])
+
+
+@pytest.mark.parametrize(("exercise", "criterion"), CRITERIA, ids=[c for _, c in CRITERIA])
+def test_every_criterion_is_explained(exercise, criterion):
+    """What is asked, how it is measured, every parameter's value and meaning, and where the chapter asks for it."""
+    (found,) = explain(f"{exercise}/{criterion}")
+    assert found.asks
+    assert found.situation
+    assert found.chapter.startswith("Exercise ")
+    assert all(p.value and p.meaning for p in found.parameters)
+    shown = grade(criterion)
+    assert shown.exit_code == 0
+    assert found.chapter in shown.output
+    assert max(map(len, shown.output.splitlines())) <= 120
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_every_check_is_explained(name):
+    """Its manual holds a sentence, and one for each parameter; who uses it is told."""
+    found = explain(name)[0]
+    assert found.asks.endswith(".")
+    assert all(parameter.meaning for parameter in found.parameters)
+    assert grade(name).exit_code == 0
+
+
+def test_the_tolerance_is_that_of_the_rubric(tmp_path):
+    """With its unit, and from the rubric that is named."""
+    assert "tolerance: 1 Hz" in grade("rate").output
+    text = next(iter(builtin_rubrics().values())).read_text(encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(text.replace("tolerance: 1 Hz", "tolerance: 1.5 Hz"), encoding="utf-8")
+    assert "tolerance: 1.5 Hz" in grade("rate", "--rubric", str(tmp_path / "mine.yaml")).output
+
+
+def test_a_check_shows_what_a_rubric_has_to_give():
+    """Parameters with a default show it, the others that there is none."""
+    found = {p.name: (p.value, p.required) for p in explain("log_period")[0].parameters if p.name != "topic"}
+    assert found["tolerance"] == ("0.1", False)
+    (check,) = explain("topic_rate")
+    assert {p.name: p.required for p in check.parameters} == {
+        "topic": True,
+        "rate": True,
+        "tolerance": True,
+        "window": True,
+        "partly_tolerance": False,
+    }
+    assert check.used_by == ("velocity_publisher/rate", "two_node_communication/temperature_rate")
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("rte", "rate"),
+        ("log_periode", "log_period"),
+        ("fan", "fan_on_above_25"),
+        ("Rate", "rate"),
+        ("xyzzy", "publishes"),
+    ],
+)
+def test_an_unknown_name_is_answered_with_the_nearest(typed, offered):
+    """Exit code 2; where nothing is near, all names are told."""
+    with pytest.raises(GraderError) as error:
+        explain(typed)
+    assert offered in error.value.hint
+    assert grade(typed).exit_code == 2
+
+
+def test_programs_can_read_it():
+    """The same, as JSON and nothing else."""
+    found = json.loads(grade("rate", "--json").stdout)
+    (row,) = found["explanations"]
+    assert (row["kind"], row["id"], row["points"], row["check"]) == ("criterion", "rate", 10, "topic_rate")
+
+
+@dataclass(frozen=True)
+class Manual:
+    """One sentence.
+
+    More of it.
+
+    And more.
+
+    Attributes:
+        first: What it is,
+            on two lines.
+        second: Another.
+
+    Returns:
+        nothing: of ours.
+    """
+
+    first: int
+    second: int
+
+
+def test_a_manual_is_read_from_the_docstring():
+    """Paragraphs become lines; only attributes become parameters."""
+    manual = manual_of(Manual)
+    assert (manual.summary, manual.details) == ("One sentence.", "More of it.\nAnd more.")
+    assert manual.parameters["first"] == "What it is, on two lines."
+    assert manual.parameters["second"] == "Another."
+    assert manual_of(type("Bare", (), {})).summary == ""
