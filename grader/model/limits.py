@@ -15,22 +15,22 @@ class Limits:
     """What one scenario may use. Reaching a limit is told to the student, and what was recorded before is judged.
 
     The first group is of each student process with everything it starts, the second of each file or folder, the third
-    of the scenario. The defaults leave room above what the right programs of our test set need at most, in brackets,
-    measured over ten seconds on two processors.
+    of the scenario. The defaults leave room above what any of the 170 right programs of our test set needed, in
+    brackets: each by itself, for ten seconds of virtual time, on two processors.
 
     Attributes:
         memory_bytes: Memory filled, without what is read from files such as libraries (45 MiB).
         processor_ns: Processor time, all threads together (6.3 s, of a loop that only looks at the clock).
-        processes: Processes and threads (13).
-        output_bytes: Output that is kept, of standard output and of standard error; more is read and dropped (50 KiB).
-        lines: Log records and lines of output that are kept (1,000).
-        open_files: Descriptors of one process (14).
+        processes: Processes and threads (16).
+        output_bytes: Output that is kept, of standard output and of standard error; more is read and dropped.
+        lines: Log records and lines of output that are kept (200).
+        open_files: Descriptors of one process (16).
         file_bytes: Size of one file.
         scratch_bytes: All files in one of the folders that the process may write to.
-        wall_ns: Real time of the recording, whichever clock the nodes run on.
-        messages: Messages on one topic; more end the recording (1,000).
-        message_bytes: Size of a message whose content is kept; of a larger one only time and topic are (720 bytes).
-        traffic_bytes: Size of all messages kept; more end the recording (50 KiB).
+        wall_ns: Real time of the recording; on the wall clock our longest scenario takes up to 80 s.
+        messages: Messages on one topic; more end the recording (400).
+        message_bytes: Size of a message whose content is kept (76 bytes); of a larger one only time and topic are.
+        traffic_bytes: Size of all messages kept; more end the recording (25 KiB).
         participants: DDS participants, of which a process has one for each ROS context; more end the recording.
     """
 
