@@ -9,7 +9,7 @@ from dataclasses import dataclass
 PROPERTIES = {
     "fs_read": "reads no file but its own and what Python and ROS need",
     "fs_write": "writes to its scratch folders only",
-    "procs": "learns nothing of other processes",
+    "procs": "reads nothing of other processes",
     "signals": "stops, traces and limits no other process",
     "net_egress": "sends nothing beyond this machine's loopback",
     "vsock": "opens no socket to the hypervisor",
