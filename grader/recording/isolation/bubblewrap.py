@@ -143,8 +143,11 @@ class Bubblewrap:
     def _files(self, process: StudentProcess, limits: Limits) -> list[str]:
         view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
         size = str(limits.scratch_bytes)
+        # The first process is bubblewrap, without the filter of system calls: its memory must be out of reach.
+        first = "/proc/1"
+        options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
+        options += ["--dev", "/dev"]
         # Scratch first: a mount on /tmp would hide what had been bound below it.
-        options = ["--proc", "/proc", "--dev", "/dev"]
         for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
