@@ -5,6 +5,7 @@
       ├─ SubmissionError   the student, or whoever named the path
       ├─ RecordingError    whoever named the /odom recording
       ├─ EvidenceError     whoever named the evidence
+      ├─ ClassError        whoever describes a class: its submissions, roster, late days, places for results
       ├─ EnvironmentFault  whoever set up this machine (ROS, sandbox)
       └─ HarnessError      us or the machine, during a run
 
@@ -40,6 +41,10 @@ class RecordingError(GraderError):
 
 class EvidenceError(GraderError):
     """Kept evidence cannot be used; whoever named it must act."""
+
+
+class ClassError(GraderError):
+    """What describes a class, or the place for its results, cannot be used; whoever named it must act."""
 
 
 class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here
