@@ -65,11 +65,13 @@ class Wanted:
     Attributes:
         files: Formats, each with the folder that its files go to.
         reports: Whether results hold the report as JSON.
+        changes: Whether results hold what changed.
         min_score: See `exit_code`.
     """
 
     files: tuple[Output, ...] = ()
     reports: bool = False
+    changes: bool = False
     min_score: Fraction | None = None
 
 
@@ -188,7 +190,7 @@ def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Result:
         score=float(report.score),
         max_score=float(report.max_score),
         code=exit_code(report, wanted.min_score),
-        change=what_changed(name, evidence, report),
+        change=what_changed(name, evidence, report) if wanted.changes else None,
         report=dumps(report) if wanted.reports else "",
     )
 

@@ -105,7 +105,8 @@ def _class(  # noqa: PLR0913  as above
 
     if any(output.path is None for output in outputs):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
-    wanted = rejudging.Wanted(tuple(outputs), reports=as_json and not show_changes, min_score=min_score)
+    reports = as_json and not show_changes
+    wanted = rejudging.Wanted(tuple(outputs), reports=reports, changes=show_changes, min_score=min_score)
     results = rejudging.rejudge_class(rejudging.named_evidence(evidence), how, wanted, jobs=jobs)
     if as_json:
         show(lambda _: results_to_json(results, changes=show_changes), for_people=False)

@@ -24,7 +24,7 @@ class Result:
         score: Points earned.
         max_score: Points to be had.
         code: Exit code that this submission alone would have.
-        change: What changed since its first report; None if there is none to compare with.
+        change: What changed since its first report; None if nobody asked, or there is none to compare with.
         report: The new report as JSON text; empty if nobody asked for it.
     """
 
@@ -41,7 +41,7 @@ def render_results(results: Sequence[Result]) -> str:
     """Return one line for each submission, in the order given, and what was refused."""
     judged = [r for r in results if not r.problem]
     width = max((len(_name(r.name)) for r in judged), default=0)
-    lines = [f"{_name(r.name):<{width}}  {_points(r.score)}/{_points(r.max_score)}{_since(r)}" for r in judged]
+    lines = [f"{_name(r.name):<{width}}  {_points(r.score)}/{_points(r.max_score)}" for r in judged]
     return "\n".join([*lines, *_refused(results), _count(results)]) + "\n"
 
 
@@ -102,11 +102,6 @@ def _count(results: Sequence[Result]) -> str:
     refused = sum(bool(r.problem) for r in results)
     judged = len(results) - refused
     return f"judged: {judged}" + (f", refused: {refused}" if refused else "")
-
-
-def _since(result: Result) -> str:
-    change = result.change
-    return f"  {_signed(change.gain)}" if change is not None and change.gain else ""
 
 
 def _signed(points: float) -> str:

@@ -32,7 +32,15 @@ class Pose:
     @classmethod
     def of(cls, delivery: Delivery) -> Pose:
         """Return the pose that a message carries."""
-        return cls(delivery.t_ns, _number(delivery.value, X), _number(delivery.value, Y), delivery.value)
+        fields = delivery.value
+        try:
+            position = fields["pose"]["pose"]["position"]
+            x, y = position["x"], position["y"]
+        except (KeyError, TypeError):
+            x = y = None
+        if type(x) is float and type(y) is float:  # nearly always, and there are many
+            return cls(delivery.t_ns, x, y, fields)
+        return cls(delivery.t_ns, _number(fields, X), _number(fields, Y), fields)
 
     def at(self, path: str) -> float:
         """Return a number of the message; NaN, which matches nothing, if it has none there."""

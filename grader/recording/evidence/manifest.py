@@ -69,11 +69,15 @@ class KeptRecording(_Strict, frozen=True):
         scenario: Scenario id.
         asked: Digest of the scenario as the rubric described it.
         digest: `sha256:` of the file; None if the scenario could not be recorded for want of a file.
+        at: Where in the file the trace begins that judging takes, in bytes.
+        size: How long it is there.
     """
 
     scenario: str
     asked: str
-    digest: str | None
+    digest: str | None = None
+    at: int = 0
+    size: int = 0
 
 
 class KeptExercise(_Strict, frozen=True):

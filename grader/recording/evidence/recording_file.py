@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -83,6 +84,28 @@ def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[
     return stream.getvalue(), _yaml({"rosbag2_bagfile_information": information}).encode()
 
 
+def place_of_trace(recording: bytes) -> tuple[int, int]:
+    """Return where the packed trace begins in a recording, and its size; raises EvidenceError if there is none."""
+    with _reading():
+        summary = make_reader(io.BytesIO(recording)).get_summary()
+        index = next((i for i in (summary.attachment_indexes if summary else ()) if i.name == TRACE), None)
+    if index is None:
+        raise EvidenceError(f"expected a recording that holds {TRACE}, found none in it")
+    # the attachment ends with its data and a checksum of four bytes
+    return index.offset + index.length - 4 - index.data_size, index.data_size
+
+
+def trace_at(recording: bytes, at: int, size: int) -> Trace:
+    """Return the trace at a place in a recording, without the bytes of messages, which judging does not read.
+
+    Raises:
+        EvidenceError: There is none at that place.
+    """
+    with _reading():
+        data = _unpressed(recording[at : at + size])
+    return unpack(data)
+
+
 def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
     """Return the trace that a recording holds.
 
@@ -93,20 +116,33 @@ def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
     Raises:
         EvidenceError: This is no recording with a trace in it.
     """
-    try:
-        reader = make_reader(io.BytesIO(recording))
-        packed = next((a.data for a in reader.iter_attachments() if a.name == TRACE), None)
+    data = _unpressed_trace(recording)
+    if not wire:
+        return unpack(data)
+    with _reading():
+        messages = make_reader(io.BytesIO(recording)).iter_messages(log_time_order=False)
+        cdrs = [message.data for _, _, message in messages]
+    return unpack_exactly(data, cdrs[1:])
+
+
+def _unpressed_trace(recording: bytes) -> bytes:
+    with _reading():
+        attachments = make_reader(io.BytesIO(recording)).iter_attachments()
+        packed = next((a.data for a in attachments if a.name == TRACE), None)
         if packed is None:
             raise EvidenceError(f"expected a recording that holds {TRACE}, found none in it")
-        data = _unpressed(packed)
-        if not wire:
-            return unpack(data)
-        messages = [m.data for _, _, m in reader.iter_messages(log_time_order=False)]
+        return _unpressed(packed)
+
+
+@contextmanager
+def _reading() -> Iterator[None]:
+    """Turn whatever damaged bytes make the parsers raise into an EvidenceError."""
+    try:
+        yield
     except EvidenceError:
         raise
-    except Exception as error:  # damaged bytes make the parser raise nearly anything
+    except Exception as error:  # damaged bytes make them raise nearly anything
         raise EvidenceError(f"expected a complete MCAP file, found a damaged one ({type(error).__name__})") from error
-    return unpack_exactly(data, messages[1:])
 
 
 def _unpressed(packed: bytes) -> bytes:

@@ -16,11 +16,12 @@ from grader.model.errors import EvidenceError
 from grader.model.exercise import Exercise
 from grader.model.report import Environment, Reproduction
 from grader.model.run import Run
+from grader.model.scenario import Scenario
 from grader.model.submission import StudentFile, Submission
 from grader.model.trace import ClockKind, Trace
 from grader.recording.evidence import folder as files
 from grader.recording.evidence import manifest as kept
-from grader.recording.evidence.recording_file import recording_bytes, trace_of
+from grader.recording.evidence.recording_file import place_of_trace, recording_bytes, trace_at, trace_of
 
 #: A longer recording is none that the grader wrote.
 MOST_BYTES = 512 << 20
@@ -73,18 +74,18 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
         EvidenceError: A file cannot be written, or is not ours to replace.
     """
     written: dict[str, bytes] = {}
-    digests: dict[tuple[str, str], str] = {}
+    recordings: dict[tuple[str, str], bytes] = {}
     for (exercise, scenario), trace in run.traces.items():
         name = files.recording_name(exercise, scenario)
         recording, metadata = recording_bytes(trace, _facts(run, exercise), Path(name).name)
         written[name] = recording
         written[files.metadata_name(exercise, scenario)] = metadata
-        digests[exercise, scenario] = kept.sha256(recording)
+        recordings[exercise, scenario] = recording
     written[files.REPORT] = report
     names = tuple(sorted({*written, files.MANIFEST}))
     old = _own(folder)
     files.refuse_foreign(folder, names, old)
-    manifest = _manifest(run, exercises, digests, request=request, names=names)
+    manifest = _manifest(run, exercises, recordings, request=request, names=names)
     unfinished = msgspec.structs.replace(manifest, complete=False, files=tuple(sorted({*names, *old})))
     files.write(folder, {files.MANIFEST: kept.dump(unfinished), **written})
     files.remove(folder, set(old) - set(names))
@@ -183,19 +184,23 @@ def _trace(
         if found != recording.digest:
             kept_digest = recording.digest or "none"
             raise EvidenceError(f"expected the recording {kept_digest[:_SHOWN]}, found one of {found[:_SHOWN]}")
-        trace = trace_of(data, wire=verify)
-        if verify:
-            _compare(data, trace, evidence, owner)
+        if not verify:
+            return trace_at(data, recording.at, recording.size)
+        trace = trace_of(data, wire=True)
+        _compare(data, trace, evidence, owner, recording)
     except EvidenceError as error:
         raise EvidenceError(f"{path}: {error.message}", "the file was changed or damaged; grade again") from error
     return trace
 
 
-def _compare(data: bytes, trace: Trace, evidence: Evidence, owner: kept.KeptExercise) -> None:
+def _compare(
+    data: bytes, trace: Trace, evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording
+) -> None:
     """Raise EvidenceError if a recording shows anything else than what is judged."""
     facts = _kept_facts(evidence.manifest, owner)
     name = Path(files.recording_name(owner.id, trace.scenario)).name
-    if recording_bytes(trace, facts, name)[0] != data:
+    same = recording_bytes(trace, facts, name)[0] == data
+    if not same or place_of_trace(data) != (recording.at, recording.size):
         raise EvidenceError("expected a recording that shows what is judged, found one that shows something else")
 
 
@@ -238,7 +243,7 @@ def _as_facts(  # noqa: PLR0913  each comes from another place
 def _manifest(
     run: Run,
     exercises: Sequence[Exercise],
-    digests: Mapping[tuple[str, str], str],
+    recordings: Mapping[tuple[str, str], bytes],
     *,
     request: Mapping[str, Any],
     names: tuple[str, ...],
@@ -260,14 +265,19 @@ def _manifest(
             kept.KeptExercise(
                 e.id,
                 e.digest,
-                tuple(
-                    kept.KeptRecording(s.id, kept.scenario_digest(s), digests.get((e.id, s.id))) for s in e.scenarios
-                ),
+                tuple(_kept(s, recordings.get((e.id, s.id))) for s in e.scenarios),
             )
             for e in exercises
         ),
         sources=dict(run.sources),
     )
+
+
+def _kept(scenario: Scenario, recording: bytes | None) -> kept.KeptRecording:
+    asked = kept.scenario_digest(scenario)
+    if recording is None:
+        return kept.KeptRecording(scenario.id, asked)
+    return kept.KeptRecording(scenario.id, asked, kept.sha256(recording), *place_of_trace(recording))
 
 
 def _submission(manifest: kept.Manifest) -> Submission:
