@@ -8,6 +8,7 @@ from typing import Any
 from grader.model.limits import Limits
 from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind
+from grader.recording.isolation.start import OUTGROWN
 
 KINDS = {kind.value: kind for kind in FaultKind}
 TEXT_CHARACTERS, PLACE_CHARACTERS, FRAMES = 500, 300, 20
@@ -54,6 +55,8 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limi
         return f"stopped at {limits.processor_words()}"
     if signal == "SIGXFSZ":
         return f"stopped at {size(limits.file_bytes)} in one file"
+    if signal == OUTGROWN.name:
+        return f"stopped at {size(limits.scratch_bytes)} in one folder"
     if signal == "SIGABRT" and NO_MEMORY in last_words:
         return f"ended by {signal}: it found no more memory (the limit is {limits.memory_words()})"
     if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:

@@ -41,6 +41,7 @@ def test_other_errors_stay_as_they_are():
     [
         ("SIGXCPU", b"", 1, "stopped at 120 s of processor time"),
         ("SIGXFSZ", b"", 1, "stopped at 3 MiB in one file"),
+        ("SIGPWR", b"", 1, "in one folder"),
         ("SIGABRT", b"terminate called after throwing an instance of 'std::bad_alloc'", 1, "200 MiB of memory"),
         ("SIGABRT", b"", 49, "ended by SIGABRT (the limit is 50 processes and threads)"),
         ("SIGABRT", b"", 20, ""),

@@ -53,6 +53,8 @@ KNOWN_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 1
 OWN_PROCESS = 0x7FFFFF01
 #: A user's other programs may start so many threads meanwhile, before a student's process feels it.
 SPARE = 256
+#: Ends a process whose scratch folder outgrew its size: a signal that nobody else sends, and that Python leaves alone.
+OUTGROWN = signal.SIGPWR
 #: Seconds between two looks at the size of a scratch folder, and how many files a look counts at most.
 LOOK_S, MOST_FILES = 0.05, 10_000
 
@@ -139,6 +141,10 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
     os.closerange(1, os.sysconf("SC_OPEN_MAX"))
     while not select.select([0], [], [], LOOK_S if scratch else None)[0]:
         if outgrown(folder, scratch):
+            # Told apart from every other end; a program that catches it gains nothing.
+            with contextlib.suppress(OSError):
+                os.kill(process, OUTGROWN)
+            select.select([0], [], [], LOOK_S)
             end_group(process)
     end_group(process)
     shutil.rmtree(folder, ignore_errors=True)
