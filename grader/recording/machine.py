@@ -110,7 +110,8 @@ def _namespaces() -> Fact:
     """Say whether ordinary users may make namespaces; root may in any case."""
     command = setting_command()
     if not command:
-        return Fact("user namespaces", "no setting forbids them")
+        filtered = ", but a filter of system calls may" if confined() else ""
+        return Fact("user namespaces", f"no setting forbids them{filtered}")
     name, _, value = command.rpartition(" ")[2].partition("=")
     now = SETTINGS_FOLDER.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
     lasting = f"until the next start; for good: echo {name}={value} | sudo tee {_PERSISTENT}"
