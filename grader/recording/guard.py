@@ -16,6 +16,7 @@ from dataclasses import replace
 from grader.model.limits import Limits
 from grader.model.quantities import MIB, size
 from grader.model.trace import Trace
+from grader.recording.scratch import scratch_names
 from grader.recording.student import Student
 from grader.recording.usage import Usage, families, starved_ns, usage
 
@@ -24,6 +25,8 @@ LOOK_S = 0.025
 SEARCH_EVERY = 10
 #: Processes of the sandbox around a student's, which the system does not count, and some more: it should be first.
 WRAPPERS = 16
+#: Files and folders in one scratch folder; log files and caches of an ordinary node are a dozen.
+MOST_NAMES = 10_000
 #: What the worker itself may fill beyond its size at the start: messages that have come and were not yet taken.
 UNREAD_BYTES = 512 * MIB
 #: Out of real time with this share of it spent waiting for a processor, a run says nothing about the nodes.
@@ -68,6 +71,7 @@ class Guard:
         while not self._over.wait(LOOK_S):
             if looks % SEARCH_EVERY == 0:
                 self._families = families([s.process.pid for s in self._students])
+                self._look_for_names()
             looks += 1
             self._look()
 
@@ -82,6 +86,11 @@ class Guard:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
         if time.monotonic_ns() > self._deadline_ns:
             self._end_time()
+
+    def _look_for_names(self) -> None:
+        for student in self._students:
+            if scratch_names(self._families.get(student.process.pid, ())) > MOST_NAMES:
+                self._hold(student, f"stopped at {MOST_NAMES:,} files in one folder")
 
     def _reached(self, used: Usage) -> str:
         """Return which limit was reached, in words; empty if none was."""

@@ -33,7 +33,7 @@ def controller_rubric(name: str) -> str:
 
 
 def _window(topic: str) -> dict[str, str]:
-    return {"duration": WINDOW, "after_first_message_on": topic, "wait_at_most": "5 s"}
+    return {"duration": WINDOW, "after_first_message_on": topic, "wait_at_most": "20 s"}
 
 
 def _publisher(name: str) -> list[dict[str, Any]]:

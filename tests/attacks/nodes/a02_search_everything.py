@@ -8,10 +8,16 @@ from attempts import attempt, holds_canary, run
 LIBRARIES = (sys.prefix, sys.base_prefix, "/usr", "/lib", "/opt", "/proc", "/sys")
 
 
+FILES = []
+
+
 def files():
-    for folder, _, names in os.walk("/"):
-        if not folder.startswith("/proc/"):
-            yield from (os.path.join(folder, name) for name in names)
+    """Return every file, walked through once."""
+    for folder, folders, names in os.walk("/") if not FILES else ():
+        FILES.extend(os.path.join(folder, name) for name in names)
+        if folder in ("/proc", "/sys"):
+            folders.clear()
+    return FILES
 
 
 @attempt

@@ -10,9 +10,17 @@ from planted import BYSTANDER
 
 def around():
     """Return the processes to be harmed; the first one only if it is the sandbox's own, never the machine's."""
-    with open("/proc/1/comm") as file:
-        sandboxed = file.read().strip() == "bwrap"
-    return {BYSTANDER, *([1] if sandboxed else []), *([os.getppid()] if os.getppid() > 1 else [])}
+    return {BYSTANDER, *([1] if sandboxed() else []), *([os.getppid()] if os.getppid() > 1 else [])}
+
+
+def sandboxed():
+    try:
+        with open("/proc/1/comm") as file:
+            return file.read().strip() == "bwrap"
+    except FileNotFoundError:  # hidden: only a sandbox does that
+        return True
+    except OSError:
+        return False
 
 
 @attempt
