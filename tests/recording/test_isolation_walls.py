@@ -1,5 +1,6 @@
 """What Landlock and the wider filter hold back, without namespaces around the student."""
 
+import contextlib
 import json
 import os
 import secrets
@@ -250,6 +251,22 @@ time.sleep(600)
     assert _soon(lambda: not _living(marker)), _living(marker)
 
 
+def test_nobody_outlives_a_killed_worker_by_choice(sandbox):
+    """The system's own signal to orphans can be declined; that is not what it rests on."""
+    marker = f"left-{secrets.token_hex(8)}"
+    code = (
+        "import ctypes, time; ctypes.CDLL(None).prctl(1, 0); print('ready', flush=True); time.sleep(600)  # " + marker
+    )
+    student = sandbox.student(code)
+    # The relay's own command line holds the code as well, with quotes around it.
+    with start(sandbox.around(student)) as process:
+        assert process.stdout.readline() == "ready\n"
+        assert code in _lines(marker)
+        process.kill()
+    close(student)
+    assert _soon(lambda: not _lines(marker)), _lines(marker)
+
+
 def test_a_scratch_folder_that_outgrows_its_size_ends_its_owner(sandbox):
     """However many files it is spread over, and whatever their names."""
     code = f"""
@@ -311,16 +328,18 @@ def test_the_wider_filter_refuses_what_the_other_does():
     assert {rule.call for rule in seccomp.ARGUMENT_RULES} < kept
 
 
-def _living(marker: str) -> list[str]:
+def _lines(marker: str) -> list[str]:
+    """Return the arguments, of all processes, that hold a marker."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            line = path.read_bytes().split(b"\0")
-        except OSError:
-            continue
-        if marker.encode() in line:
-            found.append(path.parent.name)
-    return found
+        with contextlib.suppress(OSError):
+            found += path.read_text(encoding="utf-8", errors="replace").split("\0")
+    return [argument for argument in found if marker in argument]
+
+
+def _living(marker: str) -> list[str]:
+    """Return the arguments of all processes that are the marker."""
+    return [argument for argument in _lines(marker) if argument == marker]
 
 
 def _soon(true, seconds: float = 10.0) -> bool:

@@ -123,28 +123,31 @@ def running() -> int:
 def clean_up_after_end(folder: str, scratch: int) -> None:
     """Leave a small process behind that ends what this one started and deletes the folder, however this one ends.
 
-    Until then it sees to it that the folder does not outgrow its size, where that is not 0.
+    It also ends this one after its parent, whatever the program thinks of that, and where the folder outgrows its size
+    if that is not 0.
     """
     process = os.getpid()
-    this = os.pidfd_open(process)
+    watched = [os.pidfd_open(process), os.pidfd_open(os.getppid())]
     middle = os.fork()
     if middle:
         os.waitpid(middle, 0)
-        os.close(this)
+        for descriptor in watched:
+            os.close(descriptor)
         return
     # Nobody's child and in nobody's session: what kills the others must not keep the folder from being deleted.
     os.setsid()
     if os.fork():
         os._exit(0)
     os.chdir("/")
-    os.dup2(this, 0)
-    os.closerange(1, os.sysconf("SC_OPEN_MAX"))
-    while not select.select([0], [], [], LOOK_S if scratch else None)[0]:
+    os.dup2(os.dup(watched[0]), 0)
+    os.dup2(os.dup(watched[1]), 1)
+    os.closerange(2, os.sysconf("SC_OPEN_MAX"))
+    while not select.select([0, 1], [], [], LOOK_S if scratch else None)[0]:
         if outgrown(folder, scratch):
             # Told apart from every other end; a program that catches it gains nothing.
             with contextlib.suppress(OSError):
                 os.kill(process, OUTGROWN)
-            select.select([0], [], [], LOOK_S)
+            select.select([0, 1], [], [], LOOK_S)
             end_group(process)
     end_group(process)
     shutil.rmtree(folder, ignore_errors=True)
