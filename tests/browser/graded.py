@@ -12,7 +12,16 @@ from grader.model.trace import FaultKind
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 
 SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"
-SOURCE = "import rclpy\n\n\ndef main():\n    rclpy.init()\n    raise ValueError('no')\n\n\nmain()\n"
+SOURCE = """import rclpy
+
+
+def main():
+    rclpy.init()
+    raise ValueError("a line that is longer than a telephone is wide, and longer still, and then some more of it")
+
+
+main()
+"""
 
 
 def perfect():

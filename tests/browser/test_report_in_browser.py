@@ -106,6 +106,29 @@ def test_a_pointer_over_a_chart_is_told_the_value(visit):
     assert said == []
 
 
+def test_a_pointer_over_answers_is_told_what_was_expected(visit):
+    """What was said long ago and still holds is in the tooltip as well."""
+    page, _, _ = visit(render_html(graded.perfect()))
+    figure = page.locator("figure", has=page.get_by_role("heading", name="Answers on /fan_speed"))
+    figure.locator(".drawing").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    said = figure.locator("[data-said]").text_content()
+    assert {part.split(" ")[1] for part in said.split(";")} == {"0.7", "temperature", "expected", "fan"}
+
+
+def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit):
+    """The text of the record, as it was written."""
+    page, said, _ = visit(render_html(graded.perfect()))
+    chart = page.locator("#odom_subscriber figure").last.locator(".drawing")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 55)
+    chart.locator(".tip .text").wait_for(state="visible")
+    assert chart.locator(".tip .text").inner_text().startswith("x=")
+    assert said == []
+
+
 def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit):
     """Arrow keys go from point to point; the words go to a live region."""
     page, _, _ = visit(render_html(graded.perfect()))
@@ -215,10 +238,11 @@ def test_every_chart_can_be_read_as_a_table(visit):
 
 
 @pytest.mark.parametrize("width", [320, 390])
-def test_nothing_sticks_out_on_a_phone(visit, width):
+@pytest.mark.parametrize("name", MADE)
+def test_nothing_sticks_out_on_a_phone(visit, name, width):
     """The page scrolls downwards only."""
     page, said, _ = visit(
-        render_html(graded.wrong()), viewport={"width": width, "height": 700}, is_mobile=True, has_touch=True
+        render_html(MADE[name]()), viewport={"width": width, "height": 700}, is_mobile=True, has_touch=True
     )
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert all(there for _, there in drawings(page))

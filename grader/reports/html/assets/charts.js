@@ -205,9 +205,21 @@ const Charts = (() => {
     };
   }
 
+  // What holds at a moment counts there too, however long ago it was said.
+  function holding(list, known) {
+    const x = list[0].data[0];
+    const named = new Set(list.map((one) => one.seriesIndex));
+    return Object.entries(known).flatMap(([index, { panel, series }]) => {
+      if (series.look !== "step" || panel.lanes.length || named.has(Number(index))) return [];
+      const dataIndex = series.points.filter((point) => point[0] <= x).length - 1;
+      return dataIndex < 0 ? [] : [{ seriesIndex: Number(index), dataIndex, data: series.points[dataIndex] }];
+    });
+  }
+
   function tooltip(figure, known, said) {
     return (params) => {
       const list = (Array.isArray(params) ? params : [params]).filter((p) => known[p.seriesIndex]);
+      if (list.length && !figure.square) list.push(...holding(list, known));
       const box = document.createElement("div");
       box.className = "tip";
       if (!list.length) return box;
@@ -302,6 +314,7 @@ const Charts = (() => {
         dataZoom: zooms(figure, figure.panels.length, window),
         tooltip: {
           trigger: figure.square ? "item" : "axis",
+          axisPointer: { axis: "x" },
           confine: true,
           transitionDuration: 0,
           backgroundColor: "var(--card)",
