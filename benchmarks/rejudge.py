@@ -3,7 +3,8 @@
 Usage: python benchmarks/rejudge.py [COPIES] [EVIDENCE...]
 
 Copies evidence until there are COPIES folders (200): of the named folders in turn, or of the reference solutions, which
-are then graded first. Judges all of them in one process, then as `grade rejudge` does over all cores.
+are then graded first. Judges all of them in one process, then as `grade rejudge` does over all cores. Run it on
+an idle machine: on a busy one the least time says most.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import cProfile
 import os
 import pstats
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -43,17 +45,25 @@ def main() -> None:
         measure(members)
 
 
+def processor_s(one: tuple[str, Path], how: rejudging.Judgement, wanted: rejudging.Wanted) -> float:
+    """Return the processor time that one submission takes, start-up left out."""
+    started = time.process_time()
+    rejudging.rejudge_class([one], how, wanted, jobs=1)
+    return time.process_time() - started
+
+
 def measure(members: Path) -> None:
     """Judge a class in several ways."""
     named = rejudging.named_evidence([members])
     how = rejudging.judgement((), ())
     wanted = rejudging.Wanted()
     rejudging.rejudge_class(named[:5], how, wanted, jobs=1)
-    cores = len(os.sched_getaffinity(0))
-    for jobs in dict.fromkeys((1, cores)):
-        started, used = time.perf_counter(), time.process_time()
+    used = [processor_s(one, how, wanted) for one in named]
+    print(f"processor time of one: median {1e3 * statistics.median(used):.1f} ms, least {1e3 * min(used):.1f} ms")
+    for jobs in dict.fromkeys((1, len(os.sched_getaffinity(0)))):
+        started, before = time.perf_counter(), time.process_time()
         results = rejudging.rejudge_class(named, how, wanted, jobs=jobs)
-        took, processor = time.perf_counter() - started, time.process_time() - used
+        took, processor = time.perf_counter() - started, time.process_time() - before
         assert not any(result.problem for result in results), results
         print(f"{jobs} process(es): {len(named) / took:.0f} submissions/s", end="")
         print(f", {len(named) / processor:.0f} per second of processor time" if jobs == 1 else "")

@@ -7,10 +7,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from grader.model.quantities import NS_PER_MS
 from grader.model.trace import ClockKind, Delivery, Message, Trace
+
+T = TypeVar("T")
 
 #: How far two clock readings of one moment may lie apart.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
@@ -33,6 +35,19 @@ class Held:
     start_ns: int
     stop_ns: int
     value: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Same(Generic[T]):
+    """A value as itself, for caches: checks ask the same of a trace again, and traces are too long to be compared."""
+
+    value: T
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
 
 
 def as_number(value: object) -> float | None:

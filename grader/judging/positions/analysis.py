@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from grader.judging.output import printed_lines, student_records
 from grader.judging.positions.matching import Entry, Group, Text, blocks, grouped, matched, single_texts
 from grader.judging.positions.track import STALE_NS, Track
+from grader.judging.values import Same
 from grader.model.quantities import NS_PER_S
 from grader.model.trace import ClockKind, LogRecord, OutputLine, Trace
 
@@ -47,7 +49,12 @@ class Analysis:
 
 def logged_positions(trace: Trace, process: str, track: Track) -> Analysis:
     """Return the positions that a process wrote through its logger."""
-    return _analysed(student_records(trace, process), track, trace.clock)
+    return _logged(Same(trace), process, Same(track))
+
+
+@lru_cache(maxsize=1)
+def _logged(trace: Same[Trace], process: str, track: Same[Track]) -> Analysis:
+    return _analysed(student_records(trace.value, process), track.value, trace.value.clock)
 
 
 def printed_positions(trace: Trace, process: str, track: Track) -> Analysis:

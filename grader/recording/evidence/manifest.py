@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -134,6 +135,7 @@ def parse(data: bytes) -> Manifest:
         raise EvidenceError(f"expected {FORMAT}, found something else ({type(error).__name__})") from error
 
 
+@lru_cache(maxsize=256)
 def scenario_digest(scenario: Scenario) -> str:
     """Return a digest of everything that shapes a recording; fields at their defaults do not count."""
     return sha256(json.dumps(_plainly(scenario), sort_keys=True).encode())
