@@ -188,10 +188,10 @@ class Arena:
             name for name in (*_names("/"), *_names(Path.cwd())) if name == "core" or name.startswith("core.")
         ]:
             yield Finding(f"a core dump was left: {cores[0]}", 10)
-        if processes := self._processes_left():
+        if processes := self.processes_left():
             yield Finding(f"processes were left: {', '.join(processes[:5])}", None)
 
-    def _processes_left(self) -> list[str]:
+    def processes_left(self) -> list[str]:
         """Return the command lines of processes that nobody waits for any more; they get a moment to be ended."""
         deadline = time.monotonic() + 5.0
         while processes := self._orphans():

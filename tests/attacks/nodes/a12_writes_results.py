@@ -7,6 +7,7 @@ from attempts import attempt, run
 from planted import OUTSIDE, REPORT
 
 RESULT = json.dumps({"score": 100, "max_score": 100, "final": True, "tests": [{"score": 100, "status": "passed"}]})
+SCRATCH = os.path.dirname(os.environ["HOME"])
 PLACES = (REPORT, "/results.json", "/autograder/results/results.json", "/submission/results.json", "/result.xml",
           OUTSIDE + "/results.json", "../results.json", "../../report.json", "/grader_host/results.json")
 
@@ -21,10 +22,9 @@ def writes_where_it_should_not(node):
                 file.write(RESULT)
         except OSError:
             continue
-        if not os.path.abspath(place).startswith(("/tmp/work/", "/tmp/results", "/tmp/home", "/tmp/report.json")):
-            written.append(place)
-    # In its own /tmp it may write what it likes; whether anything arrived outside is for others to say.
-    return [place for place in written if not place.startswith("/tmp/")]
+        written.append(os.path.abspath(place))
+    # In its own scratch folders it may write what it likes; whether anything arrived outside is for others to say.
+    return [place for place in written if not place.startswith(("/tmp/", SCRATCH))]
 
 
 run(rate_hz=5)

@@ -30,7 +30,8 @@ def limits_those_around_it(node):
 
 @attempt
 def lowers_a_bystander(node):
-    return works(os.setpriority, os.PRIO_PROCESS, BYSTANDER, 19)
+    os.setpriority(os.PRIO_PROCESS, BYSTANDER, 19)
+    return os.getpriority(os.PRIO_PROCESS, BYSTANDER) == 19  # what was refused may say that it was done
 
 
 @attempt

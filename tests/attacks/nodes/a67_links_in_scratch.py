@@ -25,7 +25,7 @@ def replaces_the_log_folder(node):
     folder = os.environ["ROS_LOG_DIR"]
     shutil.rmtree(folder, ignore_errors=True)
     os.symlink(OUTSIDE, folder)
-    return os.path.exists(folder)
+    return os.listdir(folder) or open(os.path.join(folder, "marker-a67"), "w")
 
 
 @attempt
