@@ -402,7 +402,12 @@ class Conductor:
     def _hopeless(self) -> bool:
         """Return whether it is clear already that virtual time hides how much processor time a node needs."""
         busiest_ns = max(s.used_ns for s in self._students)
-        return busiest_ns > BUSY_SHARE * self._end_ns + HOPELESS_NS
+        return busiest_ns > BUSY_SHARE * self._end_ns + HOPELESS_NS or self._hides_work(self._end_ns)
+
+    def _hides_work(self, virtual_ns: int) -> bool:
+        """Return whether a process has used much more processor time than it says."""
+        hidden_ns = max((s.measured_ns - s.ready_ns - s.used_ns for s in self._students), default=0)
+        return hidden_ns > HIDDEN_SHARE * virtual_ns + HIDDEN_NS
 
     def _unfit(self) -> str:
         """Say why virtual time does not do these nodes justice, if it does not."""
@@ -413,8 +418,7 @@ class Conductor:
             return ""
         virtual_ns = max(self._now_ns, NS_PER_S)
         busiest_ns = max((s.used_ns for s in self._students), default=0)
-        hidden_ns = max((s.measured_ns - s.ready_ns - s.used_ns for s in self._students), default=0)
-        if busiest_ns > BUSY_SHARE * virtual_ns or hidden_ns > HIDDEN_SHARE * virtual_ns + HIDDEN_NS:
+        if busiest_ns > BUSY_SHARE * virtual_ns or self._hides_work(virtual_ns):
             return "the node needs so much processor time that virtual time would hide it"
         return ""
 
