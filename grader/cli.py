@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 import grader
-from grader.commands import doctor, explain, rejudge
+from grader.commands import batch, doctor, explain, rejudge
 from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
@@ -191,6 +191,7 @@ app = CommandLine(_grade, name="grade", context_settings={"help_option_names": [
 _grade.context_settings = app.context_settings
 app.add_command(_observe)
 app.add_command(rejudge.command)
+app.add_command(batch.command)
 app.add_command(explain.command)
 app.add_command(doctor.command)
 

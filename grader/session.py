@@ -45,6 +45,7 @@ class Request:
         odom_bag: An /odom recording to play instead of the project's own.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
+        workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
     """
 
     submission: str
@@ -54,6 +55,7 @@ class Request:
     odom_bag: Path | None = None
     clock: str = "auto"
     isolation: str = "auto"
+    workers: int | None = None
 
 
 class Progress(Protocol):
@@ -82,7 +84,7 @@ def grade(
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    with open_studio(request.isolation) as studio:
+    with open_studio(request.isolation, request.workers) as studio:
         progress("reading the submission")
         exercises = read_exercises(request)
         root = studio.folder / "submission"

@@ -85,11 +85,12 @@ def _unfit(trace: Trace, clock: str) -> bool:
 
 
 @contextmanager
-def open_studio(isolation: str) -> Iterator[Studio]:
+def open_studio(isolation: str, workers: int | None = None) -> Iterator[Studio]:
     """Set a studio up, and take it down.
 
     Args:
         isolation: `auto`, `none` or the name of a tier.
+        workers: How many scenarios are recorded side by side; None for as many as is of use here.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the tier asked for.
@@ -98,7 +99,7 @@ def open_studio(isolation: str) -> Iterator[Studio]:
     choice = choose_isolation(isolation, ros)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
-    workers = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+    workers = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     with scratch_folder() as folder:
         folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:

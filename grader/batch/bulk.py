@@ -1,0 +1,169 @@
+"""Unpacks the download of a whole class into a folder of ours; what is bad in one student's part spoils that alone."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import shutil
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.model.errors import ClassError, HarnessError
+from grader.reading.archive_members import FILE, FOLDER, Member, UnusableArchiveError
+from grader.reading.archives import HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind
+from grader.reading.member_names import collision, objection, passed_over
+from grader.reading.quoting import shown
+from grader.reading.tar_members import is_tar, tar_members, unpacked
+from grader.reading.zip_members import zip_members
+from grader.reports.destination import write_whole
+
+#: Largest download, most that it unpacks to, and most entries in it.
+MAX_DOWNLOAD_BYTES = 1 << 30
+MAX_UNPACKED_BYTES = 4 << 30
+MAX_ENTRIES = 300_000
+#: Most that one student's part of it unpacks to; what it may hold in the end is for grading to say.
+MAX_PART_BYTES = 2 * MAX_ARCHIVE_BYTES
+
+_READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
+
+
+@dataclass(slots=True)
+class Unpacked:
+    """A download that lies in a folder now.
+
+    Attributes:
+        folder: Where.
+        refused: First part of a path -> why nothing below it was unpacked.
+        strays: Names that lead nowhere in the download, and why.
+    """
+
+    folder: Path
+    refused: dict[str, str] = field(default_factory=dict)
+    strays: list[str] = field(default_factory=list)
+
+
+def unpack_download(archive: Path, into: Path) -> Unpacked:
+    """Unpack a download, unless the same one was unpacked before.
+
+    Args:
+        archive: A zip or tar file, compressed or not.
+        into: The folder for the copy, which is ours and need not exist; a note is kept beside it.
+
+    Raises:
+        ClassError: The archive cannot be read as a whole.
+        HarnessError: The copy cannot be written.
+    """
+    data = _read(archive)
+    found = Unpacked(into)
+    note = into.with_name(f".{into.name}.json")
+    digest = hashlib.sha256(data).hexdigest()
+    known = _known(note, digest) if into.is_dir() else None
+    if known is not None:
+        return Unpacked(into, *known)
+    try:
+        into.parent.mkdir(parents=True, exist_ok=True)
+        fresh = into.with_name(f".{into.name}.{secrets.token_hex(4)}.tmp")
+        _unpack(_members(archive, data), fresh, found)
+        note.unlink(missing_ok=True)
+        shutil.rmtree(into, ignore_errors=True)
+        fresh.rename(into)
+        kept = {"digest": digest, "refused": found.refused, "strays": found.strays}
+        write_whole(note, json.dumps(kept).encode())
+    except OSError as error:
+        raise HarnessError(f"{into}: the download cannot be unpacked: {error.strerror}", "free some space") from None
+    return found
+
+
+def _read(archive: Path) -> bytes:
+    try:
+        if archive.stat().st_size > MAX_DOWNLOAD_BYTES:
+            hint = "unpack it yourself and name the folder"
+            raise ClassError(f"{archive}: expected at most {MAX_DOWNLOAD_BYTES >> 30} GiB, found more", hint)
+        return archive.read_bytes()
+    except OSError as error:
+        raise ClassError(f"{archive}: the download cannot be read: {error.strerror}") from None
+
+
+def _known(note: Path, digest: str) -> tuple[dict[str, str], list[str]] | None:
+    try:
+        kept = json.loads(note.read_bytes())
+        return (dict(kept["refused"]), list(kept["strays"])) if kept["digest"] == digest else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _members(archive: Path, data: bytes) -> list[Member]:
+    kind = archive_kind(data[:HEAD_BYTES])
+    try:
+        if kind not in _READABLE:
+            raise UnusableArchiveError(f"expected a zip or tar archive, found {kind or 'another kind of file'}")
+        if kind == "zip":
+            return zip_members(data, most=MAX_ENTRIES)
+        if kind != "tar":
+            limit = f"{MAX_UNPACKED_BYTES >> 30} GiB unpacked"
+            data = unpacked(data, kind, most=MAX_UNPACKED_BYTES, limit=limit)
+            if not is_tar(data[:HEAD_BYTES]):
+                raise UnusableArchiveError(f"expected a tar archive inside the {kind}, found another kind of file")
+        return tar_members(data, most=MAX_ENTRIES)
+    except UnusableArchiveError as error:
+        raise ClassError(f"{archive}: {error.problem}", "download it again, or name the unpacked folder") from None
+
+
+def _unpack(members: Iterable[Member], into: Path, found: Unpacked) -> None:
+    into.mkdir()
+    by_part: dict[str, list[tuple[str, Member]]] = {}
+    for member in members:
+        name = member.name.removeprefix("./")
+        if name in ("", "."):
+            continue
+        part = name.split("/", 1)[0]
+        if objection(part):
+            found.strays.append(f"{shown(name)} ({objection(part)})")
+        elif not passed_over(name if member.kind != FOLDER else f"{name}/x"):
+            by_part.setdefault(part, []).append((name, member))
+    total = 0
+    for part, inside in by_part.items():
+        problem, size = _write_part(inside, into, MAX_UNPACKED_BYTES - total)
+        total += size
+        if problem:
+            found.refused[part] = problem
+            shutil.rmtree(into / part, ignore_errors=True)
+            (into / part).unlink(missing_ok=True)
+
+
+def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tuple[str, int]:
+    """Write what belongs to one student; return why it cannot be used, if so, and how many bytes were read."""
+    problem = _objection(inside)
+    if problem:
+        return problem, 0
+    total = 0
+    for name, member in inside:
+        if member.kind == FOLDER:
+            (into / name).mkdir(parents=True, exist_ok=True)
+            continue
+        try:
+            content = member.read(MAX_ARCHIVE_BYTES + 1)
+        except UnusableArchiveError as error:
+            return error.problem, total
+        total += len(content)
+        if len(content) > MAX_ARCHIVE_BYTES or total > min(MAX_PART_BYTES, left):
+            return f"expected at most {MAX_ARCHIVE_BYTES >> 20} MiB a file and {MAX_PART_BYTES >> 20} in all", total
+        (into / name).parent.mkdir(parents=True, exist_ok=True)
+        (into / name).write_bytes(content)
+    return "", total
+
+
+def _objection(inside: list[tuple[str, Member]]) -> str:
+    for name, member in inside:
+        problem = objection(name)
+        if problem:
+            return f"expected plain relative names, found {problem}: {shown(name)}"
+        if member.kind not in (FILE, FOLDER):
+            return f"expected plain files, found {member.kind}: {shown(name)}"
+    names = [name for name, member in inside if member.kind == FILE]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    twins = (twice[0], twice[0]) if twice else collision(names)
+    return f"expected different names, found {shown(twins[0])} and {shown(twins[1])}" if twins else ""

@@ -1,0 +1,49 @@
+"""Which submissions are graded now: what is new or changed, and what was asked for besides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.batch.intake import Entry
+from grader.batch.keys import Conditions, unusable_digest
+from grader.batch.standing import State
+from grader.batch.store import Kept
+from grader.model.errors import GraderError, SubmissionError
+from grader.reading.submission import stage_submission
+
+CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
+#: What `--rerun` takes; each of the others includes what is new or changed.
+RERUNS = (CHANGED, FAILED, UNDECIDED, ALL)
+
+
+def key_of(entry: Entry, conditions: Conditions, scratch: Path) -> str:
+    """Return the key that a result of a submission has if it is made now; empty if that cannot be known.
+
+    Args:
+        entry: The submission.
+        conditions: What it is graded with.
+        scratch: An empty folder, to copy it into.
+    """
+    try:
+        return conditions.key(stage_submission(str(entry.path), (), scratch).digest)
+    except SubmissionError as error:
+        return conditions.key(unusable_digest(error))
+    except (GraderError, OSError, MemoryError, RecursionError):
+        return ""  # grading it, in a process of its own, will say why
+
+
+def is_due(kept: Kept, key: str, rerun: str) -> bool:
+    """Return whether a submission is to be graded.
+
+    Args:
+        kept: What lies in the folder for results.
+        key: The key of a result made now; empty if it is not known.
+        rerun: One of `RERUNS`.
+    """
+    result, last = kept.result, kept.last
+    if rerun == ALL or result is None or result.state is State.FAILED or not key or result.key != key:
+        return True
+    assert last is not None
+    if rerun == UNDECIDED:
+        return State.UNDECIDED in (result.state, last.state)
+    return rerun == FAILED and bool({result.state, last.state} & {State.FAILED, State.REFUSED})

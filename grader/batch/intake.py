@@ -1,0 +1,230 @@
+"""Finds the submissions of a class in folders and downloads; whatever is none of them is named."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.batch.bulk import unpack_download
+from grader.batch.layouts import AUTO, PATTERNS, Layout, Named, layout_of
+from grader.batch.naming import distinct_names
+from grader.model.errors import ClassError, HarnessError
+from grader.reading.archives import ARCHIVE_SUFFIXES
+from grader.reading.member_names import objection, passed_over_file, passed_over_folder
+from grader.reading.quoting import shown
+from grader.reading.staging import read_start
+
+#: Largest file of a student that lies beside those of others.
+MAX_FILE_BYTES = 64 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One submission of a class.
+
+    Attributes:
+        name: Safe in paths and different from all others; results lie under it.
+        label: As the source calls it.
+        path: What is graded.
+        identity: What the name says of the student: `user`, `id`, `email`, `name`.
+        late: Whether the platform marked it as late.
+        recognised: Whether the layout knows names like this one.
+        problem: Why it cannot be graded at all; empty if it can.
+    """
+
+    name: str
+    label: str
+    path: Path
+    identity: Mapping[str, str] = field(default_factory=dict)
+    late: bool = False
+    recognised: bool = True
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Intake:
+    """What was found in the sources.
+
+    Attributes:
+        entries: The submissions, ordered by name.
+        layouts: Source and layout of each, as text.
+        strays: What is no submission, and why; one line each.
+    """
+
+    entries: tuple[Entry, ...]
+    layouts: tuple[tuple[str, str], ...]
+    strays: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Found:
+    """A submission before it has a name of its own; several files may belong to it."""
+
+    own: str
+    label: str
+    wish: str
+    path: Path
+    named: Named
+    problem: str = ""
+    files: list[tuple[str, Path]] = field(default_factory=list)
+
+
+def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
+    """Find all submissions.
+
+    Args:
+        sources: Folders of submissions, or downloads.
+        results: The folder for results; downloads are unpacked in it.
+        layout: How submissions are named, one of `LAYOUTS`.
+        pattern: A regular expression for the names, instead.
+
+    Raises:
+        ClassError: A source cannot be used, or holds no submission.
+    """
+    found: list[_Found] = []
+    strays: list[str] = []
+    layouts: list[tuple[str, str]] = []
+    called = distinct_names([(source.resolve().name, str(source)) for source in sources])
+    for source, own in zip(sources, called, strict=True):
+        top, refused = _opened(source, results / "unpacked" / own, strays)
+        used, here = _submissions(top, own, layout, pattern, strays)
+        layouts.append((str(source), used.name))
+        found += here
+        found += [_refused(name, problem, used, top, own) for name, problem in refused.items()]
+        if not here and not refused:
+            hint = "name the folder that holds one folder or archive for each student"
+            raise ClassError(f"{source}: expected submissions, found none", hint)
+    names = distinct_names([(one.wish, one.own) for one in found])
+    entries = [_entry(one, name, results) for one, name in zip(found, names, strict=True)]
+    return Intake(tuple(sorted(entries, key=lambda entry: entry.name)), tuple(layouts), tuple(strays))
+
+
+def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[str, str]]:
+    """Return the folder that holds the submissions of a source, and what of it had to be refused."""
+    if source.is_dir():
+        return source, {}
+    if not source.is_file():
+        raise ClassError(f"{source}: expected a folder of submissions or a download, found nothing there")
+    unpacked = unpack_download(source, into)
+    strays += [f"{source}: {stray}" for stray in unpacked.strays]
+    return _inner(unpacked.folder), unpacked.refused
+
+
+def _inner(folder: Path) -> Path:
+    """Return the only folder in a download, if that holds several submissions; else the folder itself."""
+    children = list(_children(folder))
+    if len(children) != 1 or not children[0].is_dir():
+        return folder
+    inside = list(_children(children[0]))
+    several = sum(child.is_dir() or _is_archive(child) for child in inside) > 1
+    return children[0] if several and not any(child.suffix == ".py" for child in inside) else folder
+
+
+def _submissions(top: Path, own: str, wanted: str, pattern: str, strays: list[str]) -> tuple[Layout, list[_Found]]:
+    children = list(_children(top))
+    names = [child.name for child in children if child.is_dir() or _is_archive(child)]
+    layout = layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
+    found: dict[tuple[str, ...], _Found] = {}
+    for child in children:
+        if child.is_symlink():
+            strays.append(f"{shown(str(child), 200)}: a link, which is not followed")
+            continue
+        named, label = _read(layout, child)
+        if not child.is_dir() and not _is_archive(child) and not named.file:
+            strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
+            continue
+        _add(found, child, own, label, named, merge=layout.name in PATTERNS)
+    return layout, list(found.values())
+
+
+def _read(layout: Layout, child: Path) -> tuple[Named, str]:
+    """Return what a name says, with or without the ending of an archive, and the name without it."""
+    whole = layout.read(child.name)
+    label = child.name if child.is_dir() else _stem(child.name)
+    if whole.recognised and (whole.file or child.is_dir()):
+        return whole, label
+    return layout.read(label), label
+
+
+def _add(  # noqa: PLR0913  all that is known of it
+    found: dict[tuple[str, ...], _Found], child: Path, own: str, label: str, named: Named, *, merge: bool
+) -> None:
+    """Take note of a folder or file; what says that it is of the same student may belong together."""
+    who = tuple(f"{key}={value}" for key, value in sorted(named.identity.items()))
+    key = who if who and (merge or named.file) else ("", child.name)
+    if key not in found:
+        files = [(named.file, child)] if named.file else []
+        found[key] = _Found(
+            f"{own}/{child.name}", label, "-".join(named.identity.values()) or label, child, named, files=files
+        )
+        return
+    first = found[key]
+    if not first.files:
+        first.files.append(("", first.path))
+    first.files.append((named.file, child))
+
+
+def _refused(name: str, problem: str, layout: Layout, top: Path, own: str) -> _Found:
+    named = layout.read(name)
+    wish = "-".join(named.identity.values()) or name
+    return _Found(f"{own}/{name}", name, wish, top / name, named, problem)
+
+
+def _entry(one: _Found, name: str, results: Path) -> Entry:
+    path, problem = one.path, one.problem
+    if one.files and not problem:
+        path = results / "unpacked" / "together" / name
+        problem = _put_together(one.files, path)
+    return Entry(name, one.label, path, one.named.identity, one.named.late, one.named.recognised, problem)
+
+
+def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
+    """Copy the files of one student into a folder under their own names; return why that cannot be, if so."""
+    counted = Counter(name for name, _ in files if name)
+    wrong = next((f"found {objection(name)}: {shown(name)}" for name, _ in files if name and objection(name)), "")
+    twice = next((f"found {shown(name)} twice" for name, count in counted.items() if count > 1), "")
+    if wrong or twice:
+        return f"expected files with different plain names, {wrong or twice}"
+    try:
+        shutil.rmtree(into, ignore_errors=True)
+        into.mkdir(parents=True)
+        for name, path in files:
+            if path.is_dir():
+                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True)
+            else:
+                target = into / (name or path.name)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(read_start(path, MAX_FILE_BYTES, where=shown(str(path), 200)))
+    except OSError as error:
+        raise HarnessError(f"{into}: the submission cannot be copied: {error.strerror}", "free some space") from None
+    return ""
+
+
+def _children(folder: Path) -> Iterator[Path]:
+    """Yield what lies in a folder in the order of names, without what systems and tools leave there."""
+    try:
+        names = sorted(os.listdir(folder), key=os.fsencode)  # noqa: PTH208  names, in the order of their bytes
+    except OSError as error:
+        raise ClassError(f"{folder}: the folder cannot be read: {error.strerror}") from None
+    for name in names:
+        path = folder / name
+        if not (passed_over_folder(name) if path.is_dir() else passed_over_file(name) or name.startswith(".")):
+            yield path
+
+
+def _is_archive(path: Path) -> bool:
+    return path.is_file() and path.name.casefold().endswith(ARCHIVE_SUFFIXES)
+
+
+def _stem(name: str) -> str:
+    """Return a file name without the endings of archives."""
+    stem = name
+    while True:
+        ending = next((end for end in ARCHIVE_SUFFIXES if stem.casefold().endswith(end) and len(stem) > len(end)), "")
+        if not ending:
+            return stem
+        stem = stem[: -len(ending)]

@@ -1,0 +1,40 @@
+"""What a result depends on, as one digest: the same key means that nothing has to be run again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+
+from grader.model.errors import GraderError
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """All that a class is graded with, besides what the students handed in.
+
+    Attributes:
+        grader: Version of the grader.
+        rubrics: Exercise id and digest of its rubric, in the order graded.
+        recording: Digest of the /odom recording; empty if none is played.
+        seed: The seed that was asked for; None if it follows from the files handed in.
+        clock: The clock that was asked for.
+        isolation: The sandbox that was asked for.
+    """
+
+    grader: str
+    rubrics: tuple[tuple[str, str], ...]
+    recording: str
+    seed: int | None
+    clock: str
+    isolation: str
+
+    def key(self, submission: str) -> str:
+        """Return the key of the result of a submission, by its digest."""
+        text = json.dumps({**asdict(self), "submission": submission}, sort_keys=True)
+        return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def unusable_digest(error: GraderError) -> str:
+    """Return what stands for the digest of a submission that cannot be used: it is new when the reason is."""
+    return f"unusable:{hashlib.sha256(error.message.encode('utf-8', 'surrogatepass')).hexdigest()}"

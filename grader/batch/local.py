@@ -1,0 +1,149 @@
+"""The scheduler of this machine: one process for each submission that is being graded."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from grader.batch import standing as kept
+from grader.batch.standing import Standing, State
+from grader.batch.tasks import Attempt, Hear, Task
+
+#: Longest line that a process may say.
+_LINE_BYTES = 1 << 20
+WORKER = (sys.executable, "-s", "-m", "grader.batch.worker")
+
+
+class LocalScheduler:
+    """Grades on this machine.
+
+    Args:
+        jobs: Submissions at a time.
+        command: What grades one; another one only in tests.
+    """
+
+    def __init__(self, jobs: int, command: Sequence[str] = WORKER) -> None:
+        self._jobs = jobs
+        self._command = command
+        self._lock = threading.Lock()
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._closed = False
+
+    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
+        """Yield what comes of each task; see `Scheduler`."""
+        # The system ends a process with the thread that started it: these threads live until all is done.
+        pool = ThreadPoolExecutor(self._jobs, thread_name_prefix="batch")
+        try:
+            for future in as_completed([pool.submit(self._one, task, hear) for task in tasks]):
+                yield future.result()
+        finally:
+            self._close()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _one(self, task: Task, hear: Hear) -> Attempt:
+        hear(task.name, "starting")
+        try:
+            process = self._start()
+        except OSError as error:
+            return _failed(task, f"the grader cannot be started: {error.strerror}")
+        overdue = threading.Event()
+
+        def give_up() -> None:
+            overdue.set()
+            _kill(process)
+
+        timer = threading.Timer(task.deadline_s, give_up)
+        timer.daemon = True
+        timer.start()
+        try:
+            standing = self._listen(process, task, hear)
+        finally:
+            timer.cancel()
+            self._end(process)
+        if standing is not None:
+            return Attempt(task, standing)
+        if overdue.is_set():
+            return _failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return _failed(task, f"the grader ended without a result (exit code {process.returncode})")
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        root = str(Path(__file__).resolve().parents[2])
+        paths = [root, *filter(None, [os.environ.get("PYTHONPATH", "")])]
+        with self._lock:
+            if self._closed:
+                raise InterruptedError(0, "interrupted")
+            process = subprocess.Popen(
+                self._command,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+                cwd="/",  # Python imports from here first, and where the user is may lie a student's `json.py`
+                start_new_session=True,
+            )
+            self._running.add(process)
+        return process
+
+    def _listen(self, process: subprocess.Popen[bytes], task: Task, hear: Hear) -> Standing | None:
+        """Return what a process says of its task at last; None if it ends before."""
+        assert process.stdin is not None
+        assert process.stdout is not None
+        request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(Path.cwd()), "parent": os.getpid()}
+        with suppress(OSError):
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.close()
+        while line := process.stdout.readline(_LINE_BYTES):
+            said = _message(line)
+            if "done" in said:
+                return kept.load(json.dumps(said["done"]).encode())
+            if "step" in said:
+                hear(task.name, str(said["step"]))
+        return None
+
+    def _end(self, process: subprocess.Popen[bytes]) -> None:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=10)  # it has said all it had to say, and takes down what it set up
+        _kill(process)
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            if stream is not None:
+                with suppress(OSError):
+                    stream.close()
+        with self._lock:
+            self._running.discard(process)
+
+    def _close(self) -> None:
+        with self._lock:
+            self._closed = True
+            running = list(self._running)
+        for process in running:
+            _kill(process)
+
+
+def _message(line: bytes) -> dict[str, Any]:
+    try:
+        said = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def _failed(task: Task, problem: str) -> Attempt:
+    return Attempt(task, Standing(State.FAILED, "", "", task.label, problem, "run the same command again"))

@@ -1,0 +1,66 @@
+"""What is written for the whole class: the gradebook, the class as JSON, and files for the platforms asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.batch.classbook import Classbook
+from grader.batch.gradebook import render_gradebook
+from grader.batch.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
+
+GRADEBOOK, CLASS = "gradebook.csv", "batch.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Platforms:
+    """The platforms that are to be told.
+
+    Attributes:
+        canvas: Number of the assignment in Canvas; empty if Canvas is not asked for.
+        canvas_gradebook: The gradebook that Canvas exported; None if the roster has Canvas' numbers.
+        moodle: The users that Moodle exported; None if Moodle is not asked for.
+        gradescope: Whether Gradescope is asked for.
+    """
+
+    canvas: str = ""
+    canvas_gradebook: Users | None = None
+    moodle: Users | None = None
+    gradescope: bool = False
+
+
+def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *, gradescope: bool) -> Platforms:
+    """Return what the platforms need, read; raises ClassError for a table that cannot be used."""
+    return Platforms(
+        canvas,
+        None if canvas_gradebook is None else read_users(canvas_gradebook),
+        None if moodle is None else read_users(moodle),
+        gradescope,
+    )
+
+
+def exports(book: Classbook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
+    """Return platform -> its files; raises ClassError for what a platform could not take.
+
+    Args:
+        book: The class.
+        wanted: The platforms.
+        results: Name of an entry -> Gradescope's results.json of its report.
+    """
+    made: dict[str, Export] = {}
+    if wanted.canvas:
+        made["canvas"] = export_canvas(book, wanted.canvas, wanted.canvas_gradebook)
+    if wanted.moodle is not None:
+        made["moodle"] = export_moodle(book, wanted.moodle)
+    if wanted.gradescope:
+        made["gradescope"] = export_gradescope(book, results)
+    return made
+
+
+def class_files(book: Classbook, made: Mapping[str, Export]) -> dict[str, str]:
+    """Return name below the folder for results -> content, of all that is made for the class."""
+    files = {GRADEBOOK: render_gradebook(book)}
+    for export in made.values():
+        files.update(export.files)
+    return files

@@ -1,0 +1,175 @@
+"""The folder for results: each result appears whole or not at all, and a good one is never replaced by a worse one."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.batch import standing as kept
+from grader.batch.standing import Standing, State
+from grader.model.errors import ClassError, HarnessError
+from grader.reports.destination import write_whole
+
+RESULT, ATTEMPT = "result.json", "attempt.json"
+_FRESH, _OLD = ".new", ".old"
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What lies in the folder for one submission.
+
+    Attributes:
+        result: The best result so far; None if there is none.
+        attempt: A later attempt that came to less, so that it did not replace the result; None if there was none.
+    """
+
+    result: Standing | None = None
+    attempt: Standing | None = None
+
+    @property
+    def last(self) -> Standing | None:
+        """What was tried last."""
+        return self.attempt or self.result
+
+
+class Store:
+    """The results of a class in a folder; at most one process uses it.
+
+    Args:
+        folder: Where they lie.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._students = folder / "students"
+
+    def place(self, name: str) -> Path:
+        """Return the folder of one submission's result."""
+        return self._students / name
+
+    def fresh(self, name: str) -> Path:
+        """Return an empty place for a new result, on the same disk as the old one; it is not there yet."""
+        return self._students / f".{name}.{secrets.token_hex(4)}{_FRESH}"
+
+    def kept(self, name: str) -> Kept:
+        """Return what lies there for a submission."""
+        return Kept(_read(self.place(name) / RESULT), _read(self.place(name) / ATTEMPT))
+
+    def names(self) -> list[str]:
+        """Return the names of all results, in order."""
+        return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
+
+    def commit(self, name: str, fresh: Path, standing: Standing) -> bool:
+        """Take in a new result; return whether it is the result now.
+
+        Args:
+            name: Name of the submission.
+            fresh: Folder that holds the new result, complete but for `standing`; it is gone afterwards.
+            standing: What the attempt came to.
+
+        Raises:
+            HarnessError: It cannot be written; what was there before still is.
+        """
+        place = self.place(name)
+        try:
+            before = self.kept(name).result
+            if before is not None and before.state.worth > standing.state.worth:
+                write_whole(place / ATTEMPT, kept.dump(standing))
+                shutil.rmtree(fresh, ignore_errors=True)
+                return False
+            fresh.mkdir(exist_ok=True)
+            write_whole(fresh / RESULT, kept.dump(standing))
+            _sync(fresh)
+            self._swap(fresh, place)
+        except OSError as error:
+            shutil.rmtree(fresh, ignore_errors=True)
+            why = f"{place}: the result cannot be written: {error.strerror}"
+            raise HarnessError(why, "free some space; the same command goes on where it was") from None
+        return True
+
+    def write(self, name: str, data: bytes) -> Path:
+        """Write a file for the whole class, and return where; raises HarnessError if that cannot be done."""
+        path = self.folder / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, data)
+        except OSError as error:
+            raise HarnessError(f"{path}: cannot be written: {error.strerror}", "free some space") from None
+        return path
+
+    def _swap(self, fresh: Path, place: Path) -> None:
+        """Put a folder in the place of another; whenever the machine stops, one of the two is found again."""
+        old = self._students / f".{place.name}{_OLD}"
+        if place.exists():
+            shutil.rmtree(old, ignore_errors=True)
+            place.rename(old)
+        fresh.rename(place)
+        _sync(self._students)
+        shutil.rmtree(old, ignore_errors=True)
+
+    def recover(self) -> None:
+        """Mend what a killed run left behind: put back results that were being replaced, remove unfinished ones."""
+        for path in self._students.glob(f".*{_OLD}"):
+            place = self.place(path.name.removeprefix(".").removesuffix(_OLD))
+            if (place / RESULT).is_file():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                shutil.rmtree(place, ignore_errors=True)
+                path.rename(place)
+        for path in self._students.glob(f".*{_FRESH}"):
+            shutil.rmtree(path, ignore_errors=True)
+
+    @property
+    def free_bytes(self) -> int:
+        """Room that is left for results."""
+        return shutil.disk_usage(self.folder).free
+
+
+@contextmanager
+def open_store(folder: Path) -> Iterator[Store]:
+    """Open the folder for results, and keep others from writing into it.
+
+    Raises:
+        ClassError: It cannot be used, or another process grades into it.
+    """
+    store = Store(folder)
+    try:
+        (folder / "students").mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
+    except OSError as error:
+        raise ClassError(f"{folder}: expected a folder for results, found: {error.strerror}", "name another") from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise ClassError(f"{folder}: another process grades into this folder", "wait for it, or stop it") from None
+    try:
+        store.recover()
+        yield store
+    finally:
+        os.close(lock)
+
+
+def _read(path: Path) -> Standing | None:
+    with suppress(OSError):
+        return kept.load(path.read_bytes())
+    return None
+
+
+def _sync(folder: Path) -> None:
+    """Make the names in a folder, and below it, survive a power failure."""
+    for root, _, _ in os.walk(folder):
+        descriptor = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+__all__ = ["ATTEMPT", "RESULT", "Kept", "State", "Store", "open_store"]

@@ -1,0 +1,127 @@
+"""The process that grades one submission of a class: reads a task, leaves results in a folder, says how it ended."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from grader.batch import standing as kept
+from grader.batch.keys import unusable_digest
+from grader.batch.standing import Standing, State
+from grader.batch.tasks import Task
+from grader.keeping import Keeper
+from grader.model.errors import GraderError, SubmissionError
+from grader.model.report import Report
+from grader.reports.destination import write_whole
+from grader.reports.gradescope import render_gradescope
+from grader.reports.html.render import render_html
+from grader.reports.json_report import dumps
+from grader.session import Progress, Request, grade
+
+REPORT, PAGE, GRADESCOPE, EVIDENCE = "report.json", "report.html", "gradescope.json", "evidence"
+#: Where a page in `students/NAME/` finds the files that all pages share.
+ASSETS = "../../assets"
+_SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
+
+
+def main() -> None:
+    """Grade the task on standard input; one JSON object a line on standard output tells steps, the last one the end."""
+    ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    request = json.loads(sys.stdin.buffer.readline())
+    if os.getppid() != request["parent"]:  # it ended before the system was asked to tell
+        return
+    os.chdir(request["folder"])
+    task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
+    standing = attempt(task, _step)
+    _say({"done": json.loads(kept.dump(standing))})
+
+
+def attempt(task: Task, progress: Progress) -> Standing:
+    """Grade a submission, write what came of it, and return how it stands; never raises for anything in it."""
+    started = time.perf_counter()
+    try:
+        standing = _graded(task, progress)
+    except SubmissionError as error:
+        standing = _without_report(task, State.REFUSED, error.message, error.hint, unusable_digest(error))
+    except GraderError as error:
+        standing = _without_report(task, State.FAILED, error.message, error.hint)
+    except OSError as error:
+        standing = _without_report(task, State.FAILED, f"the result cannot be written: {error.strerror}")
+    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+        standing = _without_report(task, State.FAILED, f"the grader failed: {type(error).__name__}: {error}")
+    return replace(standing, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
+
+
+def _graded(task: Task, progress: Progress) -> Standing:
+    conditions = task.conditions
+    request = Request(
+        submission=str(task.submission),
+        exercises=task.exercises,
+        rubrics=task.rubrics,
+        seed=conditions.seed,
+        odom_bag=task.odom_bag,
+        clock=conditions.clock,
+        isolation=conditions.isolation,
+        workers=task.workers,
+    )
+    task.into.mkdir()
+    keeper = Keeper([task.into / EVIDENCE], request)
+    report = grade(request, progress, keeper.hear)
+    progress("writing the results")
+    for name, text in _files(report, task).items():
+        write_whole(task.into / name, text.encode())
+    keeper.write(report)
+    given = report.reproduce
+    key = replace(conditions, rubrics=given.rubrics, recording=given.recording).key(report.digest)
+    return Standing(
+        state=State.GRADED if report.final else State.UNDECIDED,
+        key=key,
+        digest=report.digest,
+        label=task.label,
+        score=float(report.score),
+        max_score=float(report.max_score),
+    )
+
+
+def _files(report: Report, task: Task) -> Mapping[str, str]:
+    return {
+        REPORT: dumps(report),
+        PAGE: render_html(report, assets=None if task.standalone else ASSETS),
+        GRADESCOPE: render_gradescope(report),
+    }
+
+
+def _without_report(task: Task, state: State, problem: str, hint: str = "", digest: str = "") -> Standing:
+    return Standing(state, task.conditions.key(digest) if digest else "", digest, task.label, problem, hint)
+
+
+def _usage() -> dict[str, float]:
+    """Return what this process and all that it started have cost so far."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
+        "peak_bytes": 1024 * max(u.ru_maxrss for u in used),
+    }
+
+
+def _step(step: str) -> None:
+    _say({"step": step})
+
+
+def _say(message: Mapping[str, Any]) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

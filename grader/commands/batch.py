@@ -1,0 +1,119 @@
+"""The command `grade batch`: grade a whole class."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from grader.options import ALL_MET, NOT_ALL_MET, PATH, UNDECIDED
+from grader.reports.escape import encoded, shown
+
+if TYPE_CHECKING:
+    from grader.batch.summary import Graded
+
+_LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
+_RERUNS = ("changed", "failed", "undecided", "all")
+
+
+@click.command(name="batch")
+@click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
+@click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
+@click.option("--pattern", default="", metavar="REGEX", help="Names, with groups name, user, email, id, late, file.")
+@click.option("--roster", type=PATH, metavar="CSV", help="The people of the class, as any platform exports them.")
+@click.option("--adjust", "adjustments", type=PATH, metavar="YAML", help="Late days, other scores, what to ignore.")
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
+@click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
+@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from each digest.")
+@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
+@click.option("--isolation", default="auto", help="As for one submission.")
+@click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
+@click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
+@click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
+@click.option("--moodle", type=PATH, metavar="CSV", help="Write moodle.csv for the users in this export of Moodle.")
+@click.option("--gradescope", is_flag=True, help="Write gradescope.csv, and results.json for each submission.")
+@click.option("--json", "as_json", is_flag=True, help="Print the class as JSON, and nothing else.")
+@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+def command(  # noqa: PLR0913  one parameter an option
+    *,
+    sources: tuple[Path, ...],
+    results: Path,
+    layout: str,
+    pattern: str,
+    roster: Path | None,
+    adjustments: Path | None,
+    jobs: int | None,
+    rerun: str,
+    exercises: tuple[str, ...],
+    rubrics: tuple[Path, ...],
+    seed: int | None,
+    odom_bag: Path | None,
+    clock: str,
+    isolation: str,
+    standalone: bool,
+    canvas: str | None,
+    canvas_gradebook: Path | None,
+    moodle: Path | None,
+    gradescope: bool,
+    as_json: bool,
+    no_progress: bool,
+) -> int:
+    """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
+
+    The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
+    what was undecided, or all.
+
+    Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
+    used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
+    """
+    from grader.batch.course import Course, grade_class  # noqa: PLC0415  the rest of the grader
+    from grader.batch.outputs import platforms  # noqa: PLC0415  as above
+    from grader.batch.watching import shown_watcher  # noqa: PLC0415  as above
+    from grader.session import Request  # noqa: PLC0415  as above
+
+    if canvas_gradebook is not None and canvas is None:
+        raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
+    course = Course(
+        sources=sources,
+        results=results,
+        layout=layout,
+        pattern=pattern,
+        roster=roster,
+        adjustments=adjustments,
+        grading=Request("", tuple(dict.fromkeys(exercises)), rubrics, seed, odom_bag, clock, isolation),
+        jobs=jobs,
+        rerun=rerun,
+        standalone=standalone,
+        platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
+    )
+    with shown_watcher(wanted=not no_progress) as watcher:
+        graded = grade_class(course, watcher, _warn)
+    _print(graded, as_json=as_json)
+    return _code(graded)
+
+
+def _print(graded: Graded, *, as_json: bool) -> None:
+    from grader.batch.summary import render_summary, summary_json  # noqa: PLC0415  as above
+
+    text = summary_json(graded) if as_json else render_summary(graded)
+    sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))
+    sys.stdout.flush()
+
+
+def _code(graded: Graded) -> int:
+    """Return the exit code: what is ours or the machine's comes first, then what a student must mend."""
+    from grader.batch.classbook import Status  # noqa: PLC0415  as above
+
+    if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
+        return UNDECIDED
+    return NOT_ALL_MET if graded.book.count(Status.REFUSED) else ALL_MET
+
+
+def _warn(line: str) -> None:
+    click.echo(f"warning: {shown(line)}", err=True)
