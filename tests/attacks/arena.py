@@ -25,6 +25,9 @@ GRADE = Path(sys.executable).with_name("grade")
 USER = 1000
 #: Tiers in which the grader itself is an ordinary user.
 UNPRIVILEGED = ("bubblewrap",)
+#: Tiers that are meant for machines without a network, and what makes this machine one for a command.
+WITHOUT_NETWORK = ("landlock",)
+NO_NETWORK = ("bwrap", "--dev-bind", "/", "/", "--unshare-net", "--die-with-parent", "--")
 #: Real seconds that one run of the grader may take before it counts as hanging.
 RUN_S = 240.0
 GROUP = "239.255.77.77"
@@ -72,6 +75,7 @@ class Arena:
             self._plant()
             self._listen(stack)
             self._as_user = user_prefix() if self.tier in UNPRIVILEGED and os.geteuid() == 0 else ()
+            self._inside = (*(NO_NETWORK if self.tier in WITHOUT_NETWORK else ()), *self._as_user)
             self._bystander = stack.enter_context(self._start_bystander())
             self._before = self._state_of_bystander()
             self._shm = _names("/dev/shm")
@@ -140,7 +144,7 @@ class Arena:
         }
         with self._hidden.open("rb") as open_file:
             os.set_inheritable(open_file.fileno(), True)
-            done = _finished([*self._as_user, *arguments], environment, (open_file.fileno(),), cwd or Path("/"))
+            done = _finished([*self._inside, *arguments], environment, (open_file.fileno(),), cwd or Path("/"))
         return Ran(done.returncode, _report(out / "report.json"), done.stdout, done.stderr, _contents(out))
 
     def findings(self, *runs: Ran) -> Iterator[Finding]:

@@ -133,12 +133,17 @@ def _run_archives(arena: Arena, attacks: Sequence[Attack]) -> Achieved:
             ran = _grade(arena, path.parent if "/" in name else path, publisher_rubric([NODE]))
             if ran.code not in (1, 2) or ran.report.get("score"):
                 yield attack.number, f"{name}: exit code {ran.code}, score {ran.report.get('score')}: {ran.err[-300:]}"
-            if "the grader failed" in ran.err or not ran.report.get("final", True):
+            if _failed(ran) or not ran.report.get("final", True):
                 yield attack.number, f"{name}: {ran.err[-300:]}"
             path.unlink()
             yield from (
                 (number, f"{name}: {text}") for number, text in _surroundings(arena, [attack.number], ran, quiet=True)
             )
+
+
+def _failed(ran: Ran) -> bool:
+    """Whether the grader broke down; that is never a way to contain something."""
+    return "the grader failed" in ran.err or "Traceback" in ran.err
 
 
 def _run_replays(arena: Arena, attacks: Sequence[Attack]) -> Achieved:
@@ -172,11 +177,11 @@ def _run_empty(arena: Arena, attacks: Sequence[Attack]) -> Achieved:
         shutil.copy(path, folder / path.name[:-1])
     ran = _grade(arena, folder, publisher_rubric([NODE]))
     yield from _surroundings(arena, [attack.number], ran, quiet=True)
-    if ran.code not in (1, 2) or ran.report.get("score"):
+    if ran.code not in (1, 2) or ran.report.get("score") or _failed(ran):
         yield attack.number, f"nothing was judged, and it earned {ran.report.get('score')}"
     asks_nothing = publisher_rubric([NODE]).partition('"criteria"')[0] + '"criteria": []}'
     ran = _grade(arena, folder, asks_nothing)
-    if ran.code != 2:
+    if ran.code != 2 or _failed(ran):
         yield attack.number, f"a rubric that asks nothing was not refused: exit code {ran.code}"
 
 

@@ -3,7 +3,7 @@
 Usage: python tests/attacks/count.py [--only NUMBER[,NUMBER...]] [TIER...]
 
 Without a tier it takes each one that can be used on this machine. The tier `none` is refused: there the attacks would
-harm the machine.
+harm the machine. The tier `landlock` is tried as it is meant to be used, without a network.
 """
 
 from __future__ import annotations
