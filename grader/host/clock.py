@@ -12,6 +12,9 @@ LONG_STEP_NS = 10_000_000
 #: So many looks at the clock, or fruitless polls, at one instant show it; fewer once it has been seen to do so.
 LOOKS = 200
 LOOKS_WHILE_SPINNING = 4
+#: A pause of a program that looks at clocks ends by this much late, as it does on any machine. If it ended to the very
+#: nanosecond, `now - last > period` would hold one pause later than its author ever saw, or by chance of rounding.
+LATE_NS = 1_000
 #: So many messages sent at one instant show that a program does not pace itself at all.
 MESSAGES_AT_ONCE = 200
 
@@ -26,6 +29,7 @@ class VirtualClock:
         self._yielding = False
         self._sent = 0
         self._looked_at = False
+        self._was_looked_at = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
 
     @property
@@ -40,9 +44,14 @@ class VirtualClock:
             if not self._yielding:
                 self.busy()  # looks between two pauses are no busy loop, however many pauses there are
 
-    def look(self) -> int:
+    def end_of(self, pause_ns: int) -> int:
+        """Return when a pause that begins now ends."""
+        return self.now_ns + pause_ns + (LATE_NS if self._was_looked_at and pause_ns > 0 else 0)
+
+    def look(self, *, by_library: bool = False) -> int:
         """Return the time to a program that asks for it, letting time pass if it does nothing else."""
         self._looked_at = True
+        self._was_looked_at |= not by_library
         self.idle_look()
         return self.now_ns
 

@@ -14,6 +14,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from . import entry, originals
+from .alarms import install_alarms
 from .faults import Describer
 from .link import Link
 from .virtual import VirtualTime
@@ -36,12 +37,13 @@ def run(request: dict[str, Any]) -> None:
     time.install_ros()
     preload()
     seed_randomness(request["seed"])
-    os.register_at_fork(after_in_child=lambda: os._exit(70))
+    os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: os._exit(70))
     start = link.ask({"kind": "ready", "python": sys.version.split()[0]})
     time.start(start["now_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if watchdog is not None:
         watchdog.start()
+        install_alarms(watchdog.give_up_on_alarms)
     ending = play(request, describer, link)
     if watchdog is not None:
         watchdog.stop()

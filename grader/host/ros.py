@@ -79,6 +79,13 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     ROSClock.set_ros_time_override = lambda self, time: None
     rclpy.impl.rcutils_logger.Throttle.params["throttle_time_source_type"] = Clock()
 
+    timer = rclpy.executors.Timer
+
+    def timeout(callback: Any, group: Any, period_ns: int, of: Clock, **rest: Any) -> Any:
+        """Stand for the timer with which an executor ends its waiting; the node's own timers are exact."""
+        return timer(callback, group, clock.end_of(period_ns) - clock.now_ns, of, **rest)
+
+    rclpy.executors.Timer = timeout
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
@@ -172,7 +179,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             return min((clock.now_ns + max(0, wait) for wait in waits if wait is not None), default=None)
 
         def wait(self, timeout_ns: int) -> None:
-            deadline_ns = None if timeout_ns < 0 else clock.now_ns + timeout_ns
+            deadline_ns = None if timeout_ns < 0 else clock.end_of(timeout_ns)
             while True:
                 super().wait(0)
                 if self._ready():

@@ -31,7 +31,7 @@ class Timeouts:
         """Return the deadline of a timeout; None or a negative number waits for ever."""
         if seconds is None or seconds < 0:
             return None
-        return self._clock.now_ns + round(seconds * NS_PER_S)
+        return self._clock.end_of(round(seconds * NS_PER_S))
 
     def over(self, deadline_ns: int | None) -> bool:
         """Return whether a deadline has come."""

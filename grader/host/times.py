@@ -25,7 +25,7 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
             seconds = operator.index(seconds)
         if seconds < 0:
             raise ValueError("sleep length must be non-negative")
-        end_ns = clock.now_ns + round(seconds * NS_PER_S)
+        end_ns = clock.end_of(round(seconds * NS_PER_S))
         if end_ns <= clock.now_ns:
             clock.idle_look(20)
             scheduler.pause(clock.now_ns)
@@ -38,8 +38,13 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
     time.monotonic = lambda: (clock.look() - start_ns) / NS_PER_S
     time.perf_counter_ns = lambda: clock.look() - start_ns
     time.perf_counter = lambda: (clock.look() - start_ns) / NS_PER_S
-    threading._time = time.monotonic  # type: ignore[attr-defined]
-    queue.time = time.monotonic  # type: ignore[attr-defined]
+
+    def look_unseen() -> float:
+        """Stand for the clock in libraries: that they look is no sign of how the program paces itself."""
+        return (clock.look(by_library=True) - start_ns) / NS_PER_S
+
+    threading._time = look_unseen  # type: ignore[attr-defined]
+    queue.time = look_unseen  # type: ignore[attr-defined]
 
 
 def install_wall_time(clock: VirtualClock) -> None:

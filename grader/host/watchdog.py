@@ -72,6 +72,10 @@ class Watchdog:
         except OSError:
             return False
 
+    def give_up_on_alarms(self) -> None:
+        """End the process, because it is about to be woken by alarms, which know no virtual time."""
+        self._give_up("sets an alarm that rings in real time", "outside")
+
     def _give_up(self, text: str, unsettled: str) -> None:
         """End the process; `unsettled` says why the real clock may do the program more justice."""
         if self._stopped or not self._time.running:

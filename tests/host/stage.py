@@ -42,9 +42,9 @@ class Stage:
         self.time = virtual.VirtualTime(self, self.fault)
 
     def say(self, text: object) -> None:
-        """Note something with the virtual milliseconds since the start."""
+        """Note something with the virtual milliseconds since the start; a pause may end some microseconds late."""
         at_ns = self.time.clock.now_ns - EPOCH_NS
-        self._said.append(f"{at_ns / 1e6:.6f}".rstrip("0").rstrip(".") + f" {text}")
+        self._said.append(f"{at_ns / 1e6:.2f}".rstrip("0").rstrip(".") + f" {text}")
 
     def fault(self, error: BaseException) -> None:
         """Note what ended a thread."""
