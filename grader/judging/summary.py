@@ -34,7 +34,7 @@ def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary
         records=trace.records(),
         lines=trace.lines(),
         faults=trace.faults(),
-        notes=(*trace.notes, *(mark.detail for mark in trace.marks("limit"))),
+        notes=trace.notes,
         graph=max(graphs, key=lambda g: len(g.endpoints), default=None),
         isolation=isolation,
     )
