@@ -81,11 +81,9 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
 
 def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
     """Return the fault that kept a file of the scenario from creating any endpoint, or None if all of them started."""
+    faults = [fault for process in scenario.processes if (fault := first_fault(trace, process)) is not None]
+    if not faults:
+        return None
     started = len({e.participant for e in student_endpoints(trace)}) or int(bool(trace.messages()))
-    for process in scenario.processes:
-        fault = first_fault(trace, process)
-        if fault is None:
-            continue
-        if fault.kind is FaultKind.SYNTAX_ERROR or started < len(scenario.processes):
-            return fault
-    return None
+    few = started < len(scenario.processes)
+    return next((fault for fault in faults if few or fault.kind is FaultKind.SYNTAX_ERROR), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Generic, TypeVar
@@ -78,12 +78,22 @@ def carries_number(type_: str) -> bool:
 
 def published(trace: Trace, topic: str) -> tuple[Message, ...]:
     """Return what the student's nodes published on a topic while it was observed."""
-    return tuple(m for m in trace.messages(topic) if m.t_ns < trace.stop_ns)
+    return _published(Same(trace), topic)
 
 
-def readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
+@lru_cache(maxsize=8)
+def _published(trace: Same[Trace], topic: str) -> tuple[Message, ...]:
+    return tuple(m for m in trace.value.messages(topic) if m.t_ns < trace.value.stop_ns)
+
+
+def readings(messages: tuple[Message, ...] | tuple[Delivery, ...]) -> tuple[Reading, ...]:
     """Return the numbers of those messages that carry one."""
-    found = ((m.t_ns, number_of(m)) for m in messages)
+    return _readings(Same(messages))
+
+
+@lru_cache(maxsize=8)
+def _readings(messages: Same[tuple[Message, ...] | tuple[Delivery, ...]]) -> tuple[Reading, ...]:
+    found = ((m.t_ns, number_of(m)) for m in messages.value)
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
 
 
@@ -97,6 +107,12 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
 
     What was sent before `heard_from_ns`, when nobody listened, is left out, unless that is everything.
     """
+    return _held(Same(trace), topic, heard_from_ns)
+
+
+@lru_cache(maxsize=8)
+def _held(this: Same[Trace], topic: str, heard_from_ns: int) -> tuple[Held, ...]:
+    trace = this.value
     sent = [r for r in readings(trace.deliveries(topic)) if r.t_ns < trace.stop_ns]
     heard = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []

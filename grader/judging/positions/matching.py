@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from grader.judging.positions.labels import Layout, Pair, candidate_pairs, template_of
 from grader.judging.positions.numbers import SLACK_M, Printed, clean, printed_numbers, with_decimal_points
-from grader.judging.positions.track import Pose, Track, X, Y
+from grader.judging.positions.track import Pose, Track
 from grader.model.quantities import NS_PER_MS
 from grader.model.trace import ClockKind, LogRecord, OutputLine
 
@@ -60,7 +60,7 @@ class Group:
 
 def position(pose: Pose) -> tuple[float, float]:
     """Return what is wanted: x and y."""
-    return pose.at(X), pose.at(Y)
+    return pose.x, pose.y
 
 
 def single_texts(outputs: Iterable[LogRecord | OutputLine]) -> list[Text]:
