@@ -228,16 +228,21 @@ class Student:
             severity, logger, file, line, message = match.groups()
             relative = file[len(self.root) + 1 :] if file.startswith(self.root + "/") else ""
             place = int(line[:9]) if relative else 0
-            found.append(LogRecord(t_ns, self.name, severity, logger, message[:TEXT_CHARACTERS], relative, place))
+            said = self._anywhere(message)[:TEXT_CHARACTERS]
+            found.append(LogRecord(t_ns, self.name, severity, logger, said, relative, place))
             position = match.end()
         return found + self._lines(t_ns, stream, text[position:])
 
     def _lines(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
         return [
             OutputLine(t_ns, self.name, stream, line[:TEXT_CHARACTERS])
-            for line in text.replace("\r\n", "\n").split("\n")
+            for line in self._anywhere(text).replace("\r\n", "\n").split("\n")
             if line
         ]
+
+    def _anywhere(self, text: str) -> str:
+        """Return what a process wrote as it would be anywhere: the place that it runs at differs from run to run."""
+        return text.replace(f"{self.root}/", "")
 
     def death(self, t_ns: int) -> Fault:
         """Return the fault of a process that ended without a word, or is ended because it no longer talks."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,23 @@ def test_every_format_is_the_same_byte_for_byte(tmp_path, path):
     recordings = [p for p in evidence.rglob("*") if p.suffix in (".mcap", ".yaml")]
     assert recordings
     assert not [p for p in recordings for text in machine if text.encode() in p.read_bytes()]
+
+
+@pytest.mark.ros
+def test_output_names_no_place_of_the_machine(tmp_path):
+    """A traceback that a program prints or logs is the same wherever it ran, also without a sandbox."""
+    program = (ROOT / "reference_solutions/velocity_publisher.py").read_text(encoding="utf-8")
+    assert "publish(" in program
+    (tmp_path / "in").mkdir()
+    head = "import sys, traceback\ntry:\n    1 / 0\nexcept ZeroDivisionError:\n    traceback.print_exc()\n"
+    (tmp_path / "in/velocity_publisher.py").write_text(head + "print(__file__)\n" + program, encoding="utf-8")
+    words = ["--exercise", "velocity_publisher", "--isolation", "none", "-o", f"evidence={tmp_path / 'e'}"]
+    assert run(str(tmp_path / "in"), *words) in (0, 1)
+    with AnyReader([tmp_path / "e/velocity_publisher.alone"]) as reader:
+        chosen = [c for c in reader.connections if c.topic == "/grader/output"]
+        lines = [json.loads(reader.deserialize(raw, c.msgtype).data)["text"] for c, _, raw in reader.messages(chosen)]
+    assert "velocity_publisher.py" in lines
+    assert '  File "velocity_publisher.py", line 3, in <module>' in lines
 
 
 @pytest.mark.ros
