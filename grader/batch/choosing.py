@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from grader.batch.intake import Entry
 from grader.batch.keys import Conditions, unusable_digest
 from grader.batch.standing import State
-from grader.batch.store import Kept
+from grader.batch.store import Kept, Store
 from grader.model.errors import GraderError, SubmissionError
 from grader.reading.submission import stage_submission
 
@@ -30,6 +31,25 @@ def key_of(entry: Entry, conditions: Conditions, scratch: Path) -> str:
         return conditions.key(unusable_digest(error))
     except (GraderError, OSError, MemoryError, RecursionError):
         return ""  # grading it, in a process of its own, will say why
+
+
+def due_now(store: Store, entries: Sequence[Entry], keys: Mapping[str, str], rerun: str) -> list[Entry]:
+    """Return the submissions to grade: where a run was stopped, the same one goes on.
+
+    Args:
+        store: The results so far.
+        entries: The submissions.
+        keys: Name -> key of a result made now.
+        rerun: One of `RERUNS`.
+    """
+    pending = store.pending(rerun)
+    due = []
+    for entry in entries:
+        kept, key = store.kept(entry.name), keys[entry.name]
+        again = is_due(kept, key, rerun) if pending is None else entry.name in pending
+        if again or is_due(kept, key, CHANGED):
+            due.append(entry)
+    return due
 
 
 def is_due(kept: Kept, key: str, rerun: str) -> bool:

@@ -188,7 +188,7 @@ def _row(entry: Entry, matching: Matching, kept: Kept, report: ReportData | None
         standing=result,
         report=report,
         marked_late=entry.late,
-        outdated=result is not None and result.state is not State.FAILED and result.key != key,
+        outdated=result is not None and bool(key) and result.state is not State.FAILED and result.key != key,
     )
 
 

@@ -3,80 +3,34 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import grader
 from grader.batch.adjustments import Adjustments, read_adjustments
-from grader.batch.choosing import CHANGED, is_due, key_of
+from grader.batch.choosing import due_now, key_of
 from grader.batch.classbook import Classbook, ReportData, decisions_for, make_classbook
 from grader.batch.intake import Entry, Intake, take_in
 from grader.batch.keys import Conditions, unusable_digest
-from grader.batch.layouts import AUTO
 from grader.batch.local import LocalScheduler
 from grader.batch.matching import Matching, match
 from grader.batch.outputs import CLASS, Platforms, class_files, exports
 from grader.batch.people import read_roster
-from grader.batch.standing import Standing, State
+from grader.batch.request import Course
+from grader.batch.running import ClassRun
 from grader.batch.store import Store, open_store
 from grader.batch.summary import Graded, summary_json
-from grader.batch.tasks import Attempt, MakeScheduler, Task
+from grader.batch.tasks import MakeScheduler
 from grader.batch.watching import Watcher
 from grader.batch.worker import GRADESCOPE, REPORT
-from grader.model.containment import missing
-from grader.model.errors import HarnessError, SubmissionError
+from grader.model.errors import SubmissionError
 from grader.model.exercise import Exercise
-from grader.model.quantities import NS_PER_S
-from grader.recording.isolation.choose import choose_isolation
 from grader.recording.leftovers import scratch_folder
-from grader.recording.recorder import MARGIN_S, TRIES
-from grader.recording.ros_installation import find_ros
-from grader.reports.html.bundle import shared_assets
 from grader.reproducing import recording_digest
 from grader.session import Request, read_exercises, read_recording
-
-#: Less room than this, where results or scratch files go, and nothing can be graded.
-LEAST_FREE_BYTES = 4 << 20
-#: Seconds that an attempt may take beyond what its recordings may.
-_BEYOND_S = 300.0
-_GRADING = Request("")
-_NO_PLATFORMS = Platforms()
-
-
-@dataclass(frozen=True, slots=True)
-class Course:
-    """What is to be graded, and how.
-
-    Attributes:
-        sources: Folders of submissions, or downloads.
-        results: Folder for results.
-        layout: How submissions are named; see `layouts`.
-        pattern: A regular expression for names, instead; empty for none.
-        roster: CSV file of the people; None if there is none.
-        adjustments: YAML file of late days and other scores; None if there is none.
-        grading: As for one submission; its path says nothing.
-        jobs: Submissions at a time; None for one a processor.
-        rerun: See `choosing`.
-        standalone: Whether each HTML report can be sent away alone.
-        platforms: What else is written for the class.
-    """
-
-    sources: tuple[Path, ...]
-    results: Path
-    layout: str = AUTO
-    pattern: str = ""
-    roster: Path | None = None
-    adjustments: Path | None = None
-    grading: Request = _GRADING
-    jobs: int | None = None
-    rerun: str = CHANGED
-    standalone: bool = False
-    platforms: Platforms = _NO_PLATFORMS
 
 
 def grade_class(
@@ -106,11 +60,13 @@ def grade_class(
         decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
         with scratch_folder() as scratch:
             keys = {entry.name: _key(entry, conditions, scratch) for entry in intake.entries}
-        due = [e for e in intake.entries if is_due(store.kept(e.name), keys[e.name], course.rerun)]
-        not_replaced = _grade_due(course, due, exercises, conditions, store, watcher, warn, make_scheduler)
+        due = due_now(store, intake.entries, keys, course.rerun)
+        before = len(intake.entries) - len(due)
+        watcher.begin(len(due), before)
+        run = ClassRun(course, exercises, conditions, store, watcher)
+        not_replaced = run.grade(due, warn, make_scheduler)
         book = _book(store, intake, matching, adjustments, keys)
-        graded = Graded(book, len(due), len(intake.entries) - len(due), tuple(not_replaced))
-        return _written(graded, store, course.platforms)
+        return _written(Graded(book, len(due), before, not_replaced), store, course.platforms)
 
 
 def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions:
@@ -126,100 +82,11 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
     )
 
 
-def deadline_s(exercises: Sequence[Exercise]) -> float:
-    """Return the real time after which grading one submission is given up: every limit inside has passed by then."""
-    each = [2 * s.limits.wall_ns / NS_PER_S + MARGIN_S for e in exercises for s in e.scenarios]
-    clocks = 2
-    return clocks * TRIES * sum(each) + _BEYOND_S
-
-
 def _key(entry: Entry, conditions: Conditions, scratch: Path) -> str:
     if entry.problem:
         return conditions.key(unusable_digest(SubmissionError(entry.problem)))
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         return key_of(entry, conditions, Path(folder))
-
-
-def _grade_due(  # noqa: PLR0913  the stages hand on what they made
-    course: Course,
-    due: Sequence[Entry],
-    exercises: Sequence[Exercise],
-    conditions: Conditions,
-    store: Store,
-    watcher: Watcher,
-    warn: Callable[[str], None],
-    make_scheduler: MakeScheduler,
-) -> list[str]:
-    """Grade what is due; return the names of those whose result is still the one of before."""
-    refused = [entry for entry in due if entry.problem]
-    usable = [entry for entry in due if not entry.problem]
-    watcher.begin(len(due), 0)
-    not_replaced: list[str] = []
-    for entry in refused:
-        standing = _refused(entry, conditions)
-        store.commit(entry.name, store.fresh(entry.name), standing)
-        watcher.done(entry.name, standing)
-    if not usable:
-        return not_replaced
-    _prepare(course, store, warn)
-    jobs = course.jobs or len(os.sched_getaffinity(0))
-    workers = max(1, len(os.sched_getaffinity(0)) // jobs)
-    tasks = [_task(entry, course, exercises, conditions, store, workers) for entry in usable]
-    with closing(make_scheduler(jobs).run(tasks, watcher.step)) as attempts:
-        for attempt in attempts:
-            if not _commit(store, attempt):
-                not_replaced.append(attempt.task.name)
-            watcher.done(attempt.task.name, attempt.standing)
-            _stop_if_full(store, attempt.standing)
-    return not_replaced
-
-
-def _prepare(course: Course, store: Store, warn: Callable[[str], None]) -> None:
-    """Make sure that this machine can grade, and write what all HTML reports share."""
-    choice = choose_isolation(course.grading.isolation, find_ros())
-    for found in missing(choice.containment):
-        warn(f"sandbox {choice.isolation.name}: {found}")
-    for name, data in ({} if course.standalone else shared_assets()).items():
-        store.write(f"assets/{name}", data)
-
-
-def _task(  # noqa: PLR0913  as above
-    entry: Entry, course: Course, exercises: Sequence[Exercise], conditions: Conditions, store: Store, workers: int
-) -> Task:
-    grading = course.grading
-    return Task(
-        name=entry.name,
-        label=entry.label,
-        submission=entry.path,
-        into=store.fresh(entry.name).resolve(),
-        exercises=grading.exercises,
-        rubrics=grading.rubrics,
-        odom_bag=grading.odom_bag,
-        conditions=conditions,
-        workers=workers,
-        standalone=course.standalone,
-        deadline_s=deadline_s(exercises),
-    )
-
-
-def _refused(entry: Entry, conditions: Conditions) -> Standing:
-    digest = unusable_digest(SubmissionError(entry.problem))
-    return Standing(State.REFUSED, conditions.key(digest), digest, entry.label, entry.problem)
-
-
-def _commit(store: Store, attempt: Attempt) -> bool:
-    return store.commit(attempt.task.name, attempt.task.into, attempt.standing)
-
-
-def _stop_if_full(store: Store, standing: Standing) -> None:
-    """Raise HarnessError if an attempt failed because a disk is full: the others would fail too."""
-    if standing.state is not State.FAILED:
-        return
-    scratch = Path(tempfile.gettempdir())
-    for place, free in ((store.folder, store.free_bytes), (scratch, Store(scratch).free_bytes)):
-        if free < LEAST_FREE_BYTES:
-            hint = "free some space; the same command goes on where it was"
-            raise HarnessError(f"{place}: expected room for results, found the disk full", hint)
 
 
 def _book(

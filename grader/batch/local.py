@@ -19,6 +19,9 @@ import msgspec
 from grader.batch import standing as kept
 from grader.batch.standing import Standing, State
 from grader.batch.tasks import Attempt, Hear, Task
+from grader.model.containment import missing
+from grader.recording.isolation.choose import choose_isolation
+from grader.recording.ros_installation import find_ros
 
 #: Longest line that a process may say.
 _LINE_BYTES = 1 << 20
@@ -39,6 +42,11 @@ class LocalScheduler:
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._closed = False
+
+    def prepare(self, isolation: str) -> Sequence[str]:
+        """Look for ROS and try the sandbox; see `Scheduler`."""
+        choice = choose_isolation(isolation, find_ros())
+        return [f"sandbox {choice.isolation.name}: {found}" for found in missing(choice.containment)]
 
     def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
         """Yield what comes of each task; see `Scheduler`."""

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.batch import standing as kept
-from grader.batch.standing import Standing, State
+from grader.batch.standing import Standing
 from grader.model.errors import ClassError, HarnessError
 from grader.reports.destination import write_whole
 
 RESULT, ATTEMPT = "result.json", "attempt.json"
 _FRESH, _OLD = ".new", ".old"
+_PENDING = ".pending.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,22 @@ class Store:
             raise HarnessError(f"{path}: cannot be written: {error.strerror}", "free some space") from None
         return path
 
+    def pending(self, rerun: str) -> frozenset[str] | None:
+        """Return the names that a stopped run was still to grade again; None if there was no such run."""
+        try:
+            noted = json.loads((self.folder / _PENDING).read_bytes())
+            return frozenset(map(str, noted["names"])) if noted["rerun"] == rerun else None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return None
+
+    def note_pending(self, rerun: str, names: Iterable[str]) -> None:
+        """Note what a run is still to grade again, so that the same command goes on where it was stopped."""
+        left = sorted(names)
+        if left:
+            self.write(_PENDING, json.dumps({"rerun": rerun, "names": left}).encode())
+        else:
+            (self.folder / _PENDING).unlink(missing_ok=True)
+
     def _swap(self, fresh: Path, place: Path) -> None:
         """Put a folder in the place of another; whenever the machine stops, one of the two is found again."""
         old = self._students / f".{place.name}{_OLD}"
@@ -170,6 +188,3 @@ def _sync(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-__all__ = ["ATTEMPT", "RESULT", "Kept", "State", "Store", "open_store"]

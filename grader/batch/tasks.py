@@ -61,6 +61,17 @@ class Hear(Protocol):
 class Scheduler(Protocol):
     """Grades submissions, several at the same time, on this machine or on others."""
 
+    def prepare(self, isolation: str) -> Sequence[str]:
+        """Make sure that grading is possible at all, and return what an instructor must know before it begins.
+
+        Args:
+            isolation: The sandbox that was asked for.
+
+        Raises:
+            EnvironmentFault: It is not.
+        """
+        ...
+
     def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
         """Yield what comes of each task, once, as soon as it is there and in any order.
 

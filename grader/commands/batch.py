@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.options import ALL_MET, NOT_ALL_MET, PATH, UNDECIDED
+from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED
 from grader.reports.escape import encoded, shown
 
 if TYPE_CHECKING:
@@ -72,8 +72,9 @@ def command(  # noqa: PLR0913  one parameter an option
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
-    from grader.batch.course import Course, grade_class  # noqa: PLC0415  the rest of the grader
+    from grader.batch.course import grade_class  # noqa: PLC0415  the rest of the grader
     from grader.batch.outputs import platforms  # noqa: PLC0415  as above
+    from grader.batch.request import Course  # noqa: PLC0415  as above
     from grader.batch.watching import shown_watcher  # noqa: PLC0415  as above
     from grader.session import Request  # noqa: PLC0415  as above
 
@@ -92,8 +93,12 @@ def command(  # noqa: PLR0913  one parameter an option
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
     )
-    with shown_watcher(wanted=not no_progress) as watcher:
-        graded = grade_class(course, watcher, _warn)
+    try:
+        with shown_watcher(wanted=not no_progress) as watcher:
+            graded = grade_class(course, watcher, _warn)
+    except KeyboardInterrupt:
+        click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
+        return INTERRUPTED
     _print(graded, as_json=as_json)
     return _code(graded)
 
