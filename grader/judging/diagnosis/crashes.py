@@ -132,6 +132,19 @@ def _name_of(source: Source, node: ast.AST) -> str:
     return function.name if function is not None else "the file"
 
 
+def _with_init(case: Case) -> Clue | None:
+    """`with rclpy.init():`, which later releases of rclpy know."""
+    if case.faulty is None or not case.said(r"does not support the context manager|__enter__"):
+        return None
+    fault, source = case.faulty
+    for block in source.on_line(fault.line, ast.With):
+        first = block.items[0].context_expr
+        if isinstance(first, ast.Call) and chain(first.func) == "rclpy.init":
+            hint = "this release of rclpy does not know 'with rclpy.init()': call rclpy.init() on a line of its own"
+            return Clue(hint, source.place(block))
+    return None
+
+
 def _logger_arguments(case: Case) -> Clue | None:
     if case.said(r"rclpy_logging_rcutils_log\(\): incompatible function arguments"):
         return Clue("the logger takes text: put the value into an f-string, info(f'{value}')")
@@ -178,6 +191,7 @@ CRASHES = (
     Cause("published_wrongly", _published_wrongly),
     Cause("undeclared_parameter", _undeclared_parameter),
     Cause("wrong_attribute", _wrong_attribute),
+    Cause("with_init", _with_init),
     Cause("logger_arguments", _logger_arguments),
     Cause("unattended", _unattended),
     Cause("endless_recursion", _recursion),
