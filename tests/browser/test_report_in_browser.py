@@ -10,10 +10,8 @@ from grader.reports.html.render import render_html
 
 MADE = {"perfect": graded.perfect, "wrong": graded.wrong, "crashed": graded.crashed}
 ATTACKS = (
-    "<img src=http://198.51.100.1/x onerror=document.title='owned'>",
-    "</script><script>document.title='owned'</script>",
-    "<svg onload=document.title='owned'>",
-    "{{constructor.constructor('document.title=1')()}}",
+    "<img src=//198.51.100.1/x onerror=document.title='owned'>{{constructor.constructor('owned')()}}",
+    "</script><script>document.title='owned'</script><svg onload=document.title='owned'>",
 )
 
 
@@ -52,8 +50,7 @@ def drawings(page):
     )
 
 
-@pytest.mark.parametrize("name", MADE)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("name", "scheme"), [("perfect", "light"), ("wrong", "dark"), ("crashed", "light")])
 def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit, name, scheme):
     """The console is silent, and the page itself is all that was ever asked for."""
     page, said, asked = visit(render_html(MADE[name]()), color_scheme=scheme)
@@ -153,10 +150,30 @@ def window_of(page, figure):
     )
 
 
+def turn_wheel(page, figure, *, ctrl):
+    """Turn the wheel over a chart; return whether the chart keeps it from the page, once it has zoomed if it does."""
+    return page.evaluate(
+        """async ([id, ctrlKey]) => {
+            const target = document.querySelector(`[data-figure=${id}] .drawing svg`);
+            const chart = echarts.getInstanceByDom(target.closest(".drawing"));
+            const zoomed = new Promise((done) => chart.on("datazoom", done));
+            const late = new Promise((done) => setTimeout(done, 10000));
+            const box = target.getBoundingClientRect();
+            const [clientX, clientY] = [box.x + box.width / 2, box.y + 100];
+            const event = new WheelEvent("wheel", {
+                deltaY: -200, clientX, clientY, ctrlKey, bubbles: true, cancelable: true,
+            });
+            target.dispatchEvent(event);
+            if (event.defaultPrevented) await Promise.race([zoomed, late]);
+            return event.defaultPrevented;
+        }""",
+        [figure, ctrl],
+    )
+
+
 def test_buttons_keys_and_the_wheel_zoom(visit):
     """In, out, along and back to all of it."""
-    # waiting for a condition inside the page takes eval, which its own policy forbids
-    page, said, _ = visit(render_html(graded.perfect()), bypass_csp=True)
+    page, said, _ = visit(render_html(graded.perfect()))
     figure = "velocity_publisher-1"
     tools = page.locator(f"[data-figure={figure}] .tools")
     assert window_of(page, figure) == [0, 100]
@@ -171,27 +188,15 @@ def test_buttons_keys_and_the_wheel_zoom(visit):
     page.keyboard.press("+")
     assert window_of(page, figure) == [25, 75]
     page.keyboard.press("0")
-    box = drawing.bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
-    page.keyboard.down("Control")
-    page.mouse.wheel(0, -400)
-    page.keyboard.up("Control")
-    page.wait_for_function(
-        f"echarts.getInstanceByDom(document.querySelector('[data-figure={figure}] .drawing'))"
-        ".getOption().dataZoom[0].start > 0"
-    )
+    assert turn_wheel(page, figure, ctrl=True)
+    assert window_of(page, figure)[0] > 0
     assert said == []
 
 
 def test_the_wheel_alone_scrolls_the_page(visit):
     """A chart under the pointer is no trap."""
-    page, _, _ = visit(render_html(graded.perfect()), bypass_csp=True)
-    drawing = page.locator("[data-figure=velocity_publisher-1] .drawing")
-    drawing.scroll_into_view_if_needed()
-    box, before = drawing.bounding_box(), page.evaluate("scrollY")
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
-    page.mouse.wheel(0, 300)
-    page.wait_for_function(f"scrollY > {before}")
+    page, _, _ = visit(render_html(graded.perfect()))
+    assert not turn_wheel(page, "velocity_publisher-1", ctrl=False)
     assert window_of(page, "velocity_publisher-1") == [0, 100]
 
 
