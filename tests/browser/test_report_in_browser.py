@@ -161,7 +161,7 @@ def turn_wheel(page, figure, *, ctrl):
             const box = target.getBoundingClientRect();
             const [clientX, clientY] = [box.x + box.width / 2, box.y + 100];
             const event = new WheelEvent("wheel", {
-                deltaY: -200, clientX, clientY, ctrlKey, bubbles: true, cancelable: true,
+                deltaY: -200, wheelDeltaY: 200, clientX, clientY, ctrlKey, bubbles: true, cancelable: true,
             });
             target.dispatchEvent(event);
             if (event.defaultPrevented) await Promise.race([zoomed, late]);
