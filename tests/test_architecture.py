@@ -12,10 +12,11 @@ PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
 #: Room -> rooms it may import. Entries are at the top, the vocabulary at the bottom.
 MAY_IMPORT = {
-    "entry": {"entry", "commands", "batch", "reports", "recording", "judging", "reading", "model"},
-    "commands": {"commands", "entry", "batch", "reports", "recording", "judging", "reading", "model"},
+    "entry": {"entry", "commands", "batch", "exporting", "reports", "recording", "judging", "reading", "model"},
+    "commands": {"commands", "entry", "batch", "exporting", "reports", "recording", "judging", "reading", "model"},
     # A class is graded by what grades one submission.
     "batch": {"batch", "entry", "reports", "recording", "reading", "model"},
+    "exporting": {"exporting", "reading", "model"},
     "reports": {"reports", "model"},
     "recording": {"recording", "model"},
     "reading": {"reading", "judging", "model"},

@@ -1,0 +1,1 @@
+"""Packs the grader for platforms that run it themselves."""

@@ -1,0 +1,96 @@
+"""Bundles for platforms: everything that one needs to grade, by file name."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.exporting.parts import integration, pins, wheel, zipped
+from grader.model.errors import GraderError, RubricError
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+
+#: Files that are run; the others are read.
+_PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
+#: Classroom 50 fetches no more than this.
+CLASSROOM50_BYTES = 10 * 1024 * 1024
+_OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
+_HEX_DIGITS = 40
+_NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """What a platform is to grade, and how.
+
+    Attributes:
+        exercises: Exercise ids; empty for all of the rubrics.
+        rubrics: Rubric files; empty for the built-in ones.
+        isolation: As on the command line.
+    """
+
+    exercises: tuple[str, ...] = ()
+    rubrics: tuple[Path, ...] = ()
+    isolation: str = "auto"
+
+
+def gradescope(chosen: Chosen) -> bytes:
+    """Return the autograder zip for Gradescope; raises GraderError if it would not work there."""
+    scripts = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
+    return zipped({**scripts, **_common(chosen)}, programs=_PROGRAMS)
+
+
+def classroom50(chosen: Chosen) -> dict[str, bytes]:
+    """Return the files of an assignment's autograder for Classroom 50, by name.
+
+    Raises:
+        GraderError: They would not work there.
+    """
+    files = {"autograder.py": integration("classroom50/autograder.py"), **_common(chosen)}
+    size = sum(map(len, files.values()))
+    if size > CLASSROOM50_BYTES:
+        text = f"classroom50: expected at most {CLASSROOM50_BYTES} bytes, found {size}"
+        raise GraderError(text, "leave out rubrics that this assignment does not need")
+    return files
+
+
+def workflow(action: str) -> str:
+    """Return the workflow of a student's repository, which grades with an action at one commit.
+
+    Args:
+        action: `OWNER/NAME@COMMIT`, the commit with all of its 40 digits: what it names never changes.
+
+    Raises:
+        GraderError: It is of another form.
+    """
+    repository, _, commit = action.partition("@")
+    parts = repository.split("/")
+    whole = len(commit) == _HEX_DIGITS and set(commit) <= set("0123456789abcdef")
+    if len(parts) != 2 or not all(part and set(part) <= _NAME_SIGNS for part in parts) or not whole:
+        text = f"{action}: expected OWNER/NAME@COMMIT with a commit of {_HEX_DIGITS} digits, found something else"
+        raise GraderError(text, "git rev-parse HEAD in the repository of the grader says the commit")
+    text = integration("github/workflow.yml").decode()
+    return text.replace(_OWNER, repository).replace(_COMMIT, commit)
+
+
+def _common(chosen: Chosen) -> dict[str, bytes]:
+    _check(chosen)
+    name, content = wheel()
+    # Numbered: two rubrics may have one name in two folders, and names of files may be anything.
+    rubrics = {f"rubrics/{n}.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
+    settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
+    return {
+        "prepare": integration("prepare"),
+        "settings.json": (json.dumps(settings, indent=2) + "\n").encode(),
+        "constraints.txt": pins().encode(),
+        name: content,
+        **rubrics,
+    }
+
+
+def _check(chosen: Chosen) -> None:
+    """Find mistakes now that would otherwise be found by the first student."""
+    known = [read_rubric(path).id for path in chosen.rubrics or tuple(builtin_rubrics().values())]
+    for exercise in chosen.exercises:
+        if exercise not in known:
+            raise RubricError(f"--exercise {exercise}: expected one of {', '.join(known)}, found {exercise}")

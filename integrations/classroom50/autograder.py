@@ -1,0 +1,130 @@
+"""The autograder of a Classroom 50 assignment: grades the checkout it is started in, and writes what the runner reads.
+
+Beside it lie, as `grade export classroom50` puts them there: the grader as a wheel, `prepare`, `constraints.txt`,
+`settings.json` and rubrics of the course's own. It leaves `result.json`, `release-body.md`, `grading-report.html` and
+`grading-evidence.zip`. The exit code is 0 if the submission was graded; with any other one, Classroom 50 records an
+error and no mark.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ALL_MET, NOT_ALL_MET, UNDECIDED = 0, 1, 3
+#: All of the job's environment that the grader gets to see: no token is among it.
+PASSED_ON = (
+    *("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE", "GITHUB_EVENT_PATH"),
+    *("CLASSROOM", "ASSIGNMENT", "ASSIGNMENT_TYPE", "OWNER", "USERNAME", "SUBMISSION_TAG"),
+    *("COMMIT_URL", "RELEASE_URL", "REVIEW_URL"),
+)
+#: What is left in the checkout, by its name while grading.
+LEFT = {
+    "result.json": "result.json",
+    "summary.md": "release-body.md",
+    "report.html": "grading-report.html",
+    "evidence.zip": "grading-evidence.zip",
+}
+
+
+def main() -> int:
+    """Grade the checkout."""
+    checkout = Path.cwd()
+    for name in LEFT.values():
+        remove(checkout / name)  # a student may have handed in a file of that name, or a link to some other
+    folder = Path(tempfile.mkdtemp(prefix="grading-", dir=os.environ.get("RUNNER_TEMP")))
+    code = graded(program(folder), checkout, folder)
+    if (folder / "evidence").is_dir():
+        shutil.make_archive(str(folder / "evidence"), "zip", folder / "evidence")
+    for name, place in LEFT.items():
+        # A result that is not final is no mark; without one, the runner says that there was an error.
+        if (folder / name).exists() and not (code == UNDECIDED and place == "result.json"):
+            shutil.copyfile(folder / name, checkout / place)
+    return 0 if code in (ALL_MET, NOT_ALL_MET) else 1
+
+
+def program(folder: Path) -> str:
+    """Return the grader, set up from the wheel beside this file; without one, the command of this machine."""
+    wheels = sorted(HERE.glob("rclpy_grader-*.whl"))
+    found = shutil.which("grade")
+    if not wheels and found:
+        return found
+    if not wheels:
+        sys.exit(f"{HERE}: expected a wheel of the grader, found none; make this folder with grade export classroom50")
+    words = ["bash", HERE / "prepare", folder / "venv", wheels[-1], HERE / "constraints.txt"]
+    subprocess.run(words, cwd=folder, check=True)
+    return str(folder / "venv" / "bin" / "grade")
+
+
+def graded(grade: str, checkout: Path, folder: Path) -> int:
+    """Run the grader, and show what it prints where no line of it is a command to the runner."""
+    outputs = {"text": "-", "classroom50": folder / "result.json", "markdown": folder / "summary.md"}
+    outputs |= {"html": folder / "report.html", "evidence": folder / "evidence"}
+    words = [grade, *arguments()]
+    for format_, place in outputs.items():
+        words += ["-o", f"{format_}={place}"]
+    token = secrets.token_hex(16)
+    print(f"::stop-commands::{token}", flush=True)
+    try:
+        done = subprocess.run(
+            [*words, "--", "."],
+            cwd=checkout,
+            env=surroundings(os.environ, checkout),
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+    finally:
+        # A line that was left open must not swallow the token.
+        print(f"\n::{token}::", flush=True)
+    return done.returncode
+
+
+def arguments() -> list[str]:
+    """Return what was chosen when this autograder was exported; by default, all exercises."""
+    path = HERE / "settings.json"
+    chosen = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    words = ["--no-progress", "--isolation", chosen.get("isolation", "auto")]
+    for exercise in chosen.get("exercises", ()):
+        words += ["--exercise", exercise]
+    for rubric in chosen.get("rubrics", ()):
+        words += ["--rubric", str(HERE / rubric)]
+    return words
+
+
+def surroundings(environment: Mapping[str, str], checkout: Path) -> dict[str, str]:
+    """Return the variables that the grader starts with: few, and when the submission was committed."""
+    few = {name: environment[name] for name in PASSED_ON if name in environment}
+    when = environment.get("COMMIT_DATETIME") or committed(environment.get("GITHUB_SHA") or "HEAD", checkout)
+    return {**few, "COMMIT_DATETIME": when} if when else few
+
+
+def committed(commit: str, checkout: Path) -> str:
+    """Return the time of a commit, ISO 8601; empty if git does not tell. Regrading has no push that would say it."""
+    words = ["git", "-c", "safe.directory=*", "-c", "core.fsmonitor=false", "-c", "log.showSignature=false"]
+    words += ["show", "--no-patch", "--format=%cI", "--end-of-options", commit]
+    try:
+        done = subprocess.run(words, cwd=checkout, capture_output=True, text=True, timeout=60, check=False)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def remove(path: Path) -> None:
+    """Remove a file, link or folder, if it is there."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
