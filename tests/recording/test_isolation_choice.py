@@ -174,7 +174,17 @@ def test_the_self_test_passes_where_a_tier_holds(ros, tmp_path, name):
     assert [lack.name for lack in missing(seen.properties)] in ([], ["net_egress"] if name == "landlock" else [])
     assert [prop.name for prop in seen.properties] == list(PROPERTIES)
     assert not [prop for prop in seen.properties if selftest.NO_EXCHANGE in prop.found]
-    assert not list(Path("/dev/shm").glob("grade-probe-*"))
+
+
+def test_bait_is_cleared_away():
+    """Its folder, its file in shared memory and its listeners, also after a failure."""
+    with pytest.raises(ZeroDivisionError), selftest.laid_bait() as bait:
+        assert bait.canary.exists()
+        assert bait.segment.exists()
+        raise ZeroDivisionError
+    assert not bait.folder.exists()
+    assert not bait.segment.exists()
+    assert {sink.fileno() for sink in (*bait.sinks, bait.loopback)} == {-1}
 
 
 @pytest.mark.ros

@@ -27,7 +27,7 @@ from grader.recording.isolation.starting import HOST
 from grader.recording.isolation.trial import EXCHANGE, NO_EXCHANGE
 from grader.recording.ros_installation import RosInstallation
 
-TRIAL_S = 25.0
+TRIAL_S = 45.0
 PACKAGE = Path(grader.__file__).resolve().parent
 STAGED = "probe.txt"
 ANSWERED = {"achieved", "outgrown", "said"}

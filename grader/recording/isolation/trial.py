@@ -27,7 +27,7 @@ from grader.recording.isolation.starting import HOST
 from grader.recording.isolation.tiers import isolation_from_name
 
 #: Seconds in which a message must have come back, and between two attempts to send it.
-EXCHANGE_S, AGAIN_S = 8.0, 0.03
+EXCHANGE_S, AGAIN_S = 15.0, 0.03
 LIMITS = Limits(processes=48)
 #: What is noted, and under which property, if no message made the round.
 EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
