@@ -64,7 +64,7 @@ def test_files_of_the_submission_are_relative_to_it(text_of, tmp_path):
         "no '/robot1/odom' on '/a/b/c'",
         "expected 5/4 or 3/2 m/s",
         "see https://docs.example.org/a/b.html",
-        "'/home/ana/data/log.csv'",
+        "'/media/stick/data/log.csv'",
         "../speed.py and ./speed.py",
     ],
 )
