@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import importlib
 import importlib.metadata
 import io
 import re
@@ -20,6 +21,8 @@ PACKAGE = "rclpy-grader"
 #: A zip knows no time before this; the same files give the same bytes.
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 _PROGRAM, _FILE = 0o100755, 0o100644
+#: What every environment has of its own, for its own Python.
+_WITH_PYTHON = ("pip", "setuptools", "wheel")
 _NOT_PACKED = ("__pycache__", "rubrics", "integrations")
 
 
@@ -72,7 +75,8 @@ def pins() -> str:
             done.add((name, extras))
             found[_normal(name)] = distribution.version
             waiting += _needed(distribution.requires or [], extras)
-    del found[PACKAGE]
+    for name in (PACKAGE, *_WITH_PYTHON):
+        found.pop(name, None)
     since = f'python_version >= "{sys.version_info.major}.{sys.version_info.minor}"'
     return "".join(f"{name}=={version} ; {since}\n" for name, version in sorted(found.items()))
 
@@ -93,8 +97,7 @@ def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
     """Refuse a checkout that was installed before it came to need what it needs now."""
     if sys.version_info < (3, 11):
         return
-    import tomllib  # noqa: PLC0415  Python 3.10 has none
-
+    tomllib = importlib.import_module("tomllib")  # Python 3.10 has none
     project = Path(grader.__file__).resolve().parent.parent / "pyproject.toml"
     if not project.is_file():
         return
