@@ -12,6 +12,7 @@ from typing import Any
 
 from grader.model.quantities import NS_PER_S
 from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, Mark, Offer, Trace
+from grader.recording.claims import announce, compatible, counts, is_claim, readers_of, takes_ordinary
 from grader.recording.ending import ending_fault, reported_fault
 from grader.recording.observer import Observer, Taken, wait_until
 from grader.recording.plan import Plan
@@ -43,8 +44,8 @@ HIDDEN_SHARE, HIDDEN_NS = 1.0, 5 * NS_PER_S
 #: Wake-ups of one scenario; more end it.
 STEPS = 400_000
 #: A process that has more to say than this before it waits or ends does not talk like the host, nor does one that says
-#: that it sent more messages at once, or that it has more endpoints.
-WORDS, COUNT, CLAIMS = 10_000, 1_000_000, 1_000
+#: that it has more endpoints and parameters.
+WORDS, CLAIMS = 10_000, 1_000
 
 
 class Conductor:
@@ -184,18 +185,18 @@ class Conductor:
         """Take what a process has published, let it reach everybody, and match new endpoints."""
         used_ns = report.get("cpu_ns")
         student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
-        for channel, count in _counts(report.get("lost")).items():
+        for channel, count in counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
             self._tape.note(f"{student.name}: {some} on {where} did not arrive in time")
-        sent = _counts(report.get("sent"))
+        sent = counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._forward(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
             if len(endpoints) > CLAIMS:
                 self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
-            student.claims = [c for c in endpoints[:CLAIMS] if _is_claim(c)]
+            student.claims = [c for c in endpoints[:CLAIMS] if is_claim(c)]
             self._note_offers(student)
             self._match()
 
@@ -240,19 +241,19 @@ class Conductor:
             if kind == "topic":
                 writers = [c for c in sender.claims if c["kind"] == "publisher" and c["name"] == name]
                 for student in self._students:
-                    if any(_compatible(w, r) for w in writers for r in _readers(student, name)):
-                        _add(student.arrivals, channel, count)
+                    if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
+                        announce(student.arrivals, channel, count)
             elif kind == "request":
                 servers = [
                     s for s in self._students if any(c["kind"] == "service" and c["name"] == name for c in s.claims)
                 ]
                 for student in servers:
-                    _add(student.arrivals, channel, count)
+                    announce(student.arrivals, channel, count)
                     self._requesters.setdefault(name, []).extend([sender] * count)
             elif kind == "response":
                 waiting = self._requesters.get(name, [])
                 for _ in range(min(count, len(waiting))):
-                    _add(waiting.pop(0).arrivals, channel, 1)
+                    announce(waiting.pop(0).arrivals, channel, 1)
 
     def _match(self) -> None:
         """Wait until every endpoint that the processes say they have is seen, watched and matched."""
@@ -309,13 +310,13 @@ class Conductor:
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]
         if kind == "publisher":
-            students = sum(_compatible(claim, c) for c in claims if c["kind"] == "subscription")
+            students = sum(compatible(claim, c) for c in claims if c["kind"] == "subscription")
             return students + sum(
                 1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
             )
         if kind == "subscription":
-            stimulus = self._streams.get(name) == claim["type"] and _takes_ordinary(claim)
-            return int(stimulus) + sum(_compatible(c, claim) for c in claims if c["kind"] == "publisher")
+            stimulus = self._streams.get(name) == claim["type"] and takes_ordinary(claim)
+            return int(stimulus) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
         wanted = "service" if kind == "client" else "client"
         return int(kind == "client" and any(c["kind"] == wanted and c["name"] == name for c in claims))
 
@@ -361,13 +362,13 @@ class Conductor:
         self._tape.add(Mark(self._now_ns, "stream_starts", due.topic))
 
     def _start_stream(self, topic: str, default: str) -> None:
-        asked = [c for s in self._students for c in _readers(s, topic)]
+        asked = [c for s in self._students for c in readers_of(s, topic)]
         carrying = [c for c in asked if default == c["type"] or numeric_field(c["type"]) is not None]
         interface = carrying[0]["type"] if carrying and "nav_msgs" not in default else default
         latched = any(c["latched"] for c in asked if c["type"] == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._streams[topic] = interface
-        readers = [c for c in asked if c["type"] == interface and _takes_ordinary(c)]
+        readers = [c for c in asked if c["type"] == interface and takes_ordinary(c)]
         wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
         for student in self._students:
             if not student.ended and student.claims:
@@ -386,13 +387,13 @@ class Conductor:
         self._tape.add(Delivery(self._now_ns, due.topic, interface, value, cdr))
         self._observer.publish(due.topic, message)
         for student in self._students:
-            if any(c["type"] == interface and _takes_ordinary(c) for c in _readers(student, due.topic)):
-                _add(student.arrivals, f"topic {due.topic}", 1)
+            if any(c["type"] == interface and takes_ordinary(c) for c in readers_of(student, due.topic)):
+                announce(student.arrivals, f"topic {due.topic}", 1)
 
     def _follow_type(self, topic: str) -> None:
         """Change a stimulus's type or durability when a student's node subscribed with another one."""
         current = self._streams[topic]
-        asked = [c for s in self._students for c in _readers(s, topic)]
+        asked = [c for s in self._students for c in readers_of(s, topic)]
         if current == "nav_msgs/msg/Odometry" or not asked or any(c["type"] == current for c in asked):
             return
         if any(numeric_field(c["type"]) is not None for c in asked):
@@ -421,41 +422,3 @@ class Conductor:
         if busiest_ns > BUSY_SHARE * virtual_ns or self._hides_work(virtual_ns):
             return "the node needs so much processor time that virtual time would hide it"
         return ""
-
-
-def _counts(data: Any) -> dict[str, int]:
-    if not isinstance(data, dict):
-        return {}
-    return {str(name): min(count, COUNT) for name, count in data.items() if isinstance(count, int) and count > 0}
-
-
-def _is_claim(claim: Any) -> bool:
-    if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
-        return False
-    ends = claim["kind"] in ("publisher", "subscription")
-    bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
-    return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
-
-
-def _readers(student: Student, topic: str) -> list[dict[str, Any]]:
-    return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
-
-
-def _compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
-    """Return whether a publisher's offer satisfies a subscription's request (reliability and durability)."""
-    return (
-        (writer["name"], writer["type"]) == (reader["name"], reader["type"])
-        and (writer["reliable"] or not reader["reliable"])
-        and (writer["latched"] or not reader["latched"])
-        and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
-        and (writer["manual"] or not reader["manual"])
-    )
-
-
-def _takes_ordinary(reader: dict[str, Any]) -> bool:
-    """Return whether a subscription takes what a stimulus offers: no deadline, automatic liveliness."""
-    return reader["deadline_ns"] == 0 and not reader["manual"]
-
-
-def _add(arrivals: dict[str, int], channel: str, count: int) -> None:
-    arrivals[channel] = arrivals.get(channel, 0) + count

@@ -1,0 +1,52 @@
+"""What a process says of its endpoints and its traffic: untrusted values, checked, and which of them fit each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from grader.recording.student import Student
+
+#: Nobody sends more messages than this between two reports.
+COUNT = 1_000_000
+
+
+def counts(data: Any) -> dict[str, int]:
+    """Return numbers of messages by channel; what is no number of them is left out."""
+    if not isinstance(data, dict):
+        return {}
+    return {str(name): min(count, COUNT) for name, count in data.items() if isinstance(count, int) and count > 0}
+
+
+def is_claim(claim: Any) -> bool:
+    """Return whether a value describes an endpoint, or a parameter, with everything that is asked of it."""
+    if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
+        return False
+    ends = claim["kind"] in ("publisher", "subscription")
+    bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
+    return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
+
+
+def readers_of(student: Student, topic: str) -> list[dict[str, Any]]:
+    """Return the subscriptions that a process says it has on a topic."""
+    return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
+
+
+def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
+    """Return whether a publisher's offer satisfies a subscription's request (reliability and durability)."""
+    return (
+        (writer["name"], writer["type"]) == (reader["name"], reader["type"])
+        and (writer["reliable"] or not reader["reliable"])
+        and (writer["latched"] or not reader["latched"])
+        and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
+        and (writer["manual"] or not reader["manual"])
+    )
+
+
+def takes_ordinary(reader: dict[str, Any]) -> bool:
+    """Return whether a subscription takes what a stimulus offers: no deadline, automatic liveliness."""
+    return reader["deadline_ns"] == 0 and not reader["manual"]
+
+
+def announce(arrivals: dict[str, int], channel: str, count: int) -> None:
+    """Note that messages are on their way to somebody."""
+    arrivals[channel] = arrivals.get(channel, 0) + count
