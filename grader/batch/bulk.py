@@ -122,7 +122,7 @@ def _unpack(members: Iterable[Member], into: Path, found: Unpacked) -> None:
         part = name.split("/", 1)[0]
         if objection(part):
             found.strays.append(f"{shown(name)} ({objection(part)})")
-        elif not passed_over(name if member.kind != FOLDER else f"{name}/x"):
+        elif objection(name) or not passed_over(name if member.kind != FOLDER else f"{name}/x"):
             by_part.setdefault(part, []).append((name, member))
     total = 0
     for part, inside in by_part.items():

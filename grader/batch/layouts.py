@@ -60,8 +60,10 @@ class Layout:
 
     def read(self, label: str) -> Named:
         """Return what the name of a folder, or of a file with its ending, says."""
+        if self.name == FOLDERS:
+            return Named({})
         if self.pattern is None:
-            known = label.startswith(self.prefix) and len(label) > len(self.prefix)
+            known = bool(self.prefix) and label.startswith(self.prefix) and len(label) > len(self.prefix)
             return Named({"user": label[len(self.prefix) :]} if known else {}, recognised=known)
         match = self.pattern.fullmatch(label)
         if match is None:

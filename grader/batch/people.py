@@ -145,7 +145,7 @@ def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> P
     first, last = value("first"), value("last")
     name = f"{first} {last}".strip() or _in_reading_order(value("name"))
     return Person(
-        name=name or next(iter(exact), "").strip(),
+        name=name or value("identifier") or next(iter(exact), "").strip(),
         user=value("user"),
         email=value("email"),
         id=value("id"),

@@ -153,7 +153,7 @@ def test_a_decision_about_nobody_ends_the_run_before_it_begins(tmp_path):
     """The message names the line and the nearest name."""
     hand_in(tmp_path / "in", ada=10)
     (tmp_path / "adjust.yaml").write_text("students:\n  adda: {days_late: 1}\n", encoding="utf-8")
-    with pytest.raises(ClassError, match="adjust.yaml:2:3: expected a submission or a person") as error:
+    with pytest.raises(ClassError, match=r"adjust\.yaml:2:3: expected a submission or a person") as error:
         regraded(tmp_path, adjustments=tmp_path / "adjust.yaml")
     assert error.value.hint == "did you mean `ada`?"
     assert not (tmp_path / "out" / "students" / "ada").exists()

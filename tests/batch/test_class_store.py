@@ -1,11 +1,12 @@
 """The folder for results: whole or not at all, whenever a run is stopped."""
 
+import contextlib
 import os
 
 import pytest
 
 from grader.batch.standing import Standing, State, dump, load
-from grader.batch.store import Store, open_store
+from grader.batch.store import open_store
 from grader.model.errors import HarnessError
 
 
@@ -54,10 +55,8 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(tmp_path, mon
         with monkeypatch.context() as patched:
             for owner, name in ((os, "rename"), (os, "replace"), (os, "fsync"), (os, "rmdir"), (os, "unlink")):
                 patched.setattr(owner, name, stopping(getattr(owner, name)))
-            try:
+            with contextlib.suppress(KeyboardInterrupt):
                 commit(store, standing(score=2.0), text="new")
-            except KeyboardInterrupt:
-                pass
     with open_store(tmp_path) as store:
         found = (store.kept("ada").result.score, (store.place("ada") / "report.json").read_text(encoding="utf-8"))
         assert found in [(1.0, "old"), (2.0, "new")]
