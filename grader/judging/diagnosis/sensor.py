@@ -16,7 +16,7 @@ from grader.judging.wording import number
 
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
 _DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
-_DRAWS += ("urandom", "getrandom", "randbytes", "token_bytes", "getrandbits", "randbits", "standard_normal", "shuffle")
+_DRAWS += ("urandom", "getrandom", "randbytes", "token_bytes", "getrandbits", "randbits", "standard_normal")
 #: How deep an expression around a draw is followed.
 _DEEPEST = 12
 
