@@ -1,10 +1,10 @@
 """One process for each submission: whatever becomes of it, the others and the class go on."""
 
 import json
-import os
 import sys
 import threading
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_giving_up_leaves_no_process(tmp_path):
         assert started.wait(60)
         pids = [process.pid for process in here._running]
     assert pids
-    assert [pid for pid in pids if os.path.exists(f"/proc/{pid}")] == []
+    assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
 
 
 def test_a_program_that_cannot_be_started_is_a_failure(tmp_path):

