@@ -164,7 +164,7 @@ def test_every_module_says_what_it_holds():
 
 
 #: Places on one person's machine; what students hand in may name any.
-AT_HOME = re.compile(r"(?<![\w.])(/home/(?!log\b)\w|/root/|/Users/\w|[A-Z]:\\\\)")
+AT_HOME = re.compile(r"(?<![\w.}])(/home/(?!log\b)\w|/root/|/Users/\w|[A-Z]:\\\\)")
 
 
 def names_a_home(text):
@@ -194,7 +194,9 @@ def test_a_place_on_one_machine_is_recognised(place):
     assert names_a_home(place)
 
 
-@pytest.mark.parametrize("place", ["/tmp/home/log", "~/x", "https://a.b/home/x", "$HOME/x", "a/root/b"])
+@pytest.mark.parametrize(
+    "place", ["/tmp/home/log", "~/x", "https://a.b/home/x", "$HOME/x", "a/root/b", "/proc/{pid}/root/tmp"]
+)
 def test_places_that_every_machine_has_are_none(place):
     """Neither are paths inside a sandbox."""
     assert not names_a_home(place)
