@@ -147,6 +147,8 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
     rows += [_missing(person, adjustments) for person in matching.missing]
     late = [row.name for row in rows if row.marked_late and not row.adjusted.days_late]
     remarks = [f"marked as late by the platform, but no late days are named: {', '.join(late)}"] if late else []
+    odd = [entry.name for entry in intake.entries if not entry.recognised]
+    remarks += [f"named otherwise than the layout names submissions: {', '.join(odd)}"] if odd else []
     return Classbook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
 
 

@@ -91,7 +91,9 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
     called = distinct_names([(source.resolve().name, str(source)) for source in sources])
     for source, own in zip(sources, called, strict=True):
         top, refused = _opened(source, results / "unpacked" / own, strays)
-        used, here = _submissions(top, own, layout, pattern, strays)
+        children = [child for child in _children(top) if child.resolve() != results.resolve()]
+        used = _layout(children, top, layout, pattern)
+        here = _submissions(children, own, used, strays)
         layouts.append((str(source), used.name))
         found += here
         found += [_refused(name, problem, used, top, own) for name, problem in refused.items()]
@@ -124,10 +126,13 @@ def _inner(folder: Path) -> Path:
     return children[0] if several and not any(child.suffix == ".py" for child in inside) else folder
 
 
-def _submissions(top: Path, own: str, wanted: str, pattern: str, strays: list[str]) -> tuple[Layout, list[_Found]]:
-    children = list(_children(top))
+def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> Layout:
+    """Return how the submissions in a folder are named; single files count only where there is nothing else."""
     names = [child.name for child in children if child.is_dir() or _is_archive(child)]
-    layout = layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
+    return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
+
+
+def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: list[str]) -> list[_Found]:
     found: dict[tuple[str, ...], _Found] = {}
     for child in children:
         if child.is_symlink():
@@ -138,7 +143,7 @@ def _submissions(top: Path, own: str, wanted: str, pattern: str, strays: list[st
             strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
             continue
         _add(found, child, own, label, named, merge=layout.name in PATTERNS)
-    return layout, list(found.values())
+    return list(found.values())
 
 
 def _read(layout: Layout, child: Path) -> tuple[Named, str]:

@@ -81,7 +81,8 @@ def export_canvas(book: Classbook, assignment: str, gradebook: Users | None) -> 
     for row in _counted(book, left_out):
         found = _canvas_row(row, gradebook)
         if found is None or not found.get("ID", "").strip():
-            left_out.append(f"{row.shown_name}: Canvas' gradebook has nobody with this user name, number or name")
+            where = "the roster" if gradebook is None else gradebook.path.name
+            left_out.append(f"{row.shown_name}: {where} has no Canvas number (column ID) for this person")
         else:
             rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), number(row.adjusted.score)])
     possible = _possible(gradebook, title) or number(max(maxima, default=None))

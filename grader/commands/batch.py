@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from grader.model.containment import TIERS
 from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED
 from grader.reports.escape import encoded, shown
 
@@ -32,7 +33,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from each digest.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
-@click.option("--isolation", default="auto", help="As for one submission.")
+@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")

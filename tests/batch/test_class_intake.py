@@ -68,6 +68,12 @@ def test_folders_and_archives_are_submissions(tmp_path):
     assert [stray.endswith("notes.txt: neither a folder nor an archive") for stray in intake.strays] == [True]
 
 
+def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path):
+    """Neither at first nor when the command is given again."""
+    class_ = put(tmp_path / "class", "ada/a.py", "out/students/ada/x.py")
+    assert names(take_in([class_], class_ / "out")) == ["ada"]
+
+
 def test_a_link_is_not_followed(tmp_path):
     """It may lead to somebody else's work."""
     class_ = put(tmp_path / "class", "ada/a.py")
