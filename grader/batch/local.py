@@ -19,7 +19,7 @@ import msgspec
 from grader.batch import standing as kept
 from grader.batch.standing import Standing, State
 from grader.batch.tasks import Attempt, Hear, Task
-from grader.model.containment import missing
+from grader.model.containment import NO_WALLS, missing
 from grader.recording.isolation.choose import choose_isolation
 from grader.recording.ros_installation import find_ros
 
@@ -46,7 +46,12 @@ class LocalScheduler:
     def prepare(self, isolation: str) -> Sequence[str]:
         """Look for ROS and try the sandbox; see `Scheduler`."""
         choice = choose_isolation(isolation, find_ros())
-        return [f"sandbox {choice.isolation.name}: {found}" for found in missing(choice.containment)]
+        name = choice.isolation.name
+        warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
+        if choice.isolation.shares_network and name != NO_WALLS and self._jobs > 1:
+            self._jobs = 1
+            warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
+        return warnings
 
     def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
         """Yield what comes of each task; see `Scheduler`."""

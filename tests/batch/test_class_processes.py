@@ -5,6 +5,7 @@ import sys
 import threading
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -118,3 +119,29 @@ def test_tasks_reach_the_process_as_they_are(tmp_path, odd):
     one = Task("x", odd, tmp_path / odd, tmp_path / "into", (), (), None, CONDITIONS, 1, False, 600.0)
     list(here.run([one], lambda name, step: heard.append(step)))
     assert heard[-1] == str(tmp_path / odd)
+
+
+@pytest.mark.parametrize(
+    ("tier", "shares", "most"), [("landlock", True, 1), ("none", True, 3), ("bubblewrap", False, 3)]
+)
+def test_submissions_that_could_reach_each_other_go_one_at_a_time(tmp_path, monkeypatch, tier, shares, most):
+    """Where the sandbox leaves them one network; without walls it is the user's wish."""
+    isolation = SimpleNamespace(name=tier, shares_network=shares)
+    choice = SimpleNamespace(isolation=isolation, containment=())
+    monkeypatch.setattr("grader.batch.local.find_ros", lambda: None)
+    monkeypatch.setattr("grader.batch.local.choose_isolation", lambda wanted, ros: choice)
+    here = scheduler(jobs=3)
+    warnings = here.prepare(tier)
+    together, running = [], set()
+    lock = threading.Lock()
+
+    def hear(name, step):
+        with lock:
+            running.add(name)
+            together.append(len(running))
+
+    for attempt in here.run([task(tmp_path, f"fine {n}") for n in range(6)], hear):
+        with lock:
+            running.discard(attempt.task.name)
+    assert [len(warnings), here._jobs] == [int(most == 1), most]
+    assert max(together) <= most + 1  # one may begin before the end of another is heard
