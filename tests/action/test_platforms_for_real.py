@@ -1,0 +1,185 @@
+"""The platforms with real nodes: the action, Gradescope's zip and Classroom 50's autograder, run as they run them."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import jsonschema
+import pytest
+from click.testing import CliRunner
+from stand_in_runner import CANARY, ROOT, job_environment, obeyed, run_action
+
+from grader.cli import app
+
+BIN = Path(sys.executable).parent
+SCHEMA = ROOT.parent / "shared" / "formats" / "classroom50-result-v1.schema.json"
+#: Looks for the token wherever a process could find one, and says what it found in the only way it has: by failing.
+PRYING = """
+import glob, os, rclpy
+COMMANDS = ("::set-output name=score::100", "##[error]mine", "::stop-commands::mine", "::add-path::/mine")
+places = {places!r} + glob.glob("/proc/*/environ") + glob.glob("/proc/*/cmdline")
+places += [os.path.join(folder, name) for folder, _, names in os.walk("/tmp") for name in names][:2000]
+found = sum("canary" in value for value in os.environ.values())
+for place in places:
+    try:
+        with open(place, "rb") as file:
+            found += b"canary" + b"0123" in file.read(1 << 20)
+    except OSError:
+        pass
+rclpy.init()
+node = rclpy.create_node("velocity_publisher")
+for command in COMMANDS:
+    node.get_logger().info(command)
+    print(command, flush=True)
+raise RuntimeError("\\n".join(COMMANDS) + f"\\ncanaries: {{found}}")
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Return a checkout whose git configuration holds a token, as some workflows leave it."""
+    folder = tmp_path / "checkout"
+    (folder / ".git").mkdir(parents=True)
+    (folder / ".git" / "config").write_text(f"[http]\n\textraheader = AUTHORIZATION: basic {CANARY}\n")
+    return folder
+
+
+def with_grader():
+    return f"{BIN}{os.pathsep}{os.environ['PATH']}"
+
+
+def pry(checkout, *places):
+    source = PRYING.format(places=[str(checkout / ".git" / "config"), *map(str, places)])
+    (checkout / "velocity_publisher.py").write_text(source)
+
+
+def solve(checkout):
+    shutil.copy(ROOT / "reference_solutions" / "velocity_publisher.py", checkout)
+
+
+@pytest.mark.ros
+def test_the_action_grades_and_a_prying_student_finds_nothing(checkout, tmp_path):
+    """No token in the environment, in /proc, in the checkout or the runner's folder; no command in the log."""
+    secret = tmp_path / "runner" / "secret"
+    pry(checkout, secret, tmp_path / "runner" / "1" / "OUTPUT")
+    environment = job_environment(PATH=with_grader())
+    (tmp_path / "runner").mkdir()
+    secret.write_text(CANARY)
+    job = run_action(ROOT, checkout, tmp_path / "runner", environment, setup="false", exercises="velocity_publisher")
+    (upload,) = job.uploads.values()
+    report = json.loads(Path(upload["path"], "report.json").read_text())
+    assert "canaries: 0" in json.dumps(report["exercises"][0]["faults"])
+    assert job.outputs["score"] == str(report["score"])
+    assert job.outputs["max-score"] == "30"
+    assert job.outputs["passed"] == "false"
+    assert {kind for kind, _, _ in job.commands} <= {"notice", "warning", "error"}
+    assert [p["file"] for kind, p, _ in job.commands if kind == "error" and "file" in p] == ["velocity_publisher.py"]
+    assert CANARY not in job.log + job.summaries["Grade"]
+    assert job.changed == ""
+    assert (Path(upload["path"]) / "evidence").is_dir()
+    assert (Path(upload["path"]) / "report.html").stat().st_size > 10_000
+
+
+@pytest.mark.ros
+def test_without_a_sandbox_the_prying_student_finds_something(checkout, tmp_path):
+    """The test above can fail."""
+    pry(checkout)
+    environment = job_environment(PATH=with_grader())
+    job = run_action(
+        ROOT,
+        checkout,
+        tmp_path / "runner",
+        environment,
+        setup="false",
+        exercises="velocity_publisher",
+        isolation="none",
+    )
+    assert "canaries: 0" not in job.log
+    assert "canaries: " in job.log
+
+
+@pytest.fixture
+def autograder(tmp_path):
+    """Return a folder as Gradescope lays it out, with the exported autograder in it."""
+    root = tmp_path / "autograder"
+    (root / "submission").mkdir(parents=True)
+    archive = tmp_path / "autograder.zip"
+    words = ["export", "gradescope", str(archive), "--exercise", "velocity_publisher", "--isolation", "auto"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    subprocess.run(["unzip", "-q", archive, "-d", root / "source"], check=True)
+    shutil.copy(root / "source" / "run_autograder", root)
+    return root
+
+
+def run_autograder(root):
+    environment = job_environment(PATH=with_grader(), AUTOGRADER_ROOT=str(root))
+    return subprocess.run([root / "run_autograder"], env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.ros
+def test_gradescope_s_zip_leaves_results(autograder):
+    """Unpacked and run as the platform does; the exercise is the one that was chosen."""
+    solve(autograder / "submission")
+    done = run_autograder(autograder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((autograder / "results" / "results.json").read_text())
+    assert result["score"] == 30
+    assert sum(test["max_score"] for test in result["tests"]) == 30
+    assert result["stdout_visibility"] == "hidden"
+
+
+@pytest.mark.ros
+def test_classroom50_gets_its_files(checkout, tmp_path):
+    """The result follows the platform's schema, a student's file of that name is replaced, no command is obeyed."""
+    pry(checkout)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_text("untouched")
+    (checkout / "result.json").symlink_to(elsewhere)
+    done = run_classroom50(checkout, bundle(tmp_path), COMMIT_DATETIME="2026-06-01T16:32:01+02:00")
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((checkout / "result.json").read_text())
+    assert elsewhere.read_text() == "untouched"
+    assert result["datetime"] == "2026-06-01T14:32:01Z"
+    assert (result["max-score"], result["owner"]) == (30, "ada")
+    assert "canaries: 0" in json.dumps(result)
+    assert obeyed(done.stdout) == []
+    assert CANARY not in done.stdout + (checkout / "release-body.md").read_text()
+    assert (checkout / "grading-report.html").exists()
+    assert zipfile.ZipFile(checkout / "grading-evidence.zip").testzip() is None
+    if SCHEMA.exists():
+        jsonschema.validate(result, json.loads(SCHEMA.read_text(encoding="utf-8")))
+
+
+def bundle(tmp_path):
+    """Return the exported folder; without its wheel, the autograder uses the grader of this machine."""
+    folder = tmp_path / "bundle"
+    done = CliRunner().invoke(app, ["export", "classroom50", str(folder), "--exercise", "velocity_publisher"])
+    assert done.exit_code == 0, done.output
+    next(folder.glob("*.whl")).unlink()
+    return folder
+
+
+def run_classroom50(checkout, folder, **more):
+    names = {"CLASSROOM": "ros", "ASSIGNMENT": "one", "ASSIGNMENT_TYPE": "individual", "OWNER": "ada"}
+    names |= {"USERNAME": "ada", "SUBMISSION_TAG": "submit/2026-06-01T14-32-05Z-a1b2c3d"}
+    names |= dict.fromkeys(("COMMIT_URL", "RELEASE_URL", "REVIEW_URL"), "https://github.com/school/one/x")
+    environment = job_environment(PATH=with_grader(), RUNNER_TEMP=str(folder.parent), **names, **more)
+    words = [sys.executable, folder / "autograder.py"]
+    return subprocess.run(words, cwd=checkout, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.ros
+def test_the_action_sets_itself_up_from_nothing(checkout, tmp_path):
+    """With the system's Python, the pinned versions, and a submission that passes."""
+    solve(checkout)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("VIRTUAL_ENV", "PYTHON"))}
+    path = os.pathsep.join(part for part in environment["PATH"].split(os.pathsep) if Path(part) != BIN)
+    job = run_action(ROOT, checkout, tmp_path / "runner", {**environment, "PATH": path}, exercises="velocity_publisher")
+    assert job.failed == "", job.log
+    assert job.outputs["passed"] == "true"
+    assert "Passed." in job.log
