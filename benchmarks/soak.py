@@ -27,6 +27,7 @@ from arena import Arena
 from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
 
+from grader.model.errors import GraderError
 from grader.session import Request, grade
 
 NODE = "velocity_publisher"
@@ -103,11 +104,20 @@ def run(arena: Arena, hostile: list[Attack], runs: int) -> tuple[list[Held], Cou
             looks.append(held(arena))
         if number == WARM_UP + runs:
             break
-        report = grade(Request(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
+        score = score_of(folder, rubric)
         if number >= WARM_UP:
-            score = "undecided" if not report.final else "full" if report.score == report.max_score else "less"
             came_to[f"{kind}: {score}"] += 1
     return looks, came_to
+
+
+def score_of(folder: Path, rubric: Path) -> str:
+    """Grade once and return what it came to, in a word."""
+    try:
+        report = grade(Request(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
+    except GraderError as error:
+        print(error.message, file=sys.stderr, flush=True)
+        return "refused"
+    return "undecided" if not report.final else "full" if report.score == report.max_score else "less"
 
 
 def main() -> int:
@@ -118,6 +128,8 @@ def main() -> int:
     started = time.monotonic()
     with Arena(TIER) as arena:
         tempfile.tempdir = str(arena.base / "tmp")
+        # What is remembered of self-tests is this run's own.
+        os.environ["XDG_RUNTIME_DIR"] = str(arena.base / "runtime")
         looks, came_to = run(arena, hostile, runs)
     before, middle, after = looks
     print(f"{runs} runs under {TIER} in {time.monotonic() - started:.0f} s, after {WARM_UP} to warm up")
@@ -130,7 +142,7 @@ def main() -> int:
         stayed += [field.name] if more else []
         name = field.name.replace("_", " ").replace("mib", "MiB")
         print(f"{name:<18}{counts[0]:>8}{counts[1]:>10}{counts[2]:>8}{'  stayed' if more else ''}")
-    wrong = came_to["right: less"] + came_to["right: undecided"]
+    wrong = sum(came_to[f"right: {what}"] for what in ("less", "undecided", "refused"))
     print(f"\nright submissions without full score: {wrong}")
     return 1 if stayed or wrong else 0
 
