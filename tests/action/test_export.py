@@ -1,0 +1,109 @@
+"""Bundles for platforms: complete, small enough, the same every time, and refused where they could not work."""
+
+import csv
+import io
+import json
+import re
+import zipfile
+
+import pytest
+from click.testing import CliRunner
+from stand_in_runner import ROOT
+
+from grader.cli import app
+from grader.exporting import parts
+from grader.exporting.bundles import CLASSROOM50_BYTES, Chosen, classroom50, gradescope
+from grader.exporting.parts import pins, wheel
+from grader.model.errors import EnvironmentFault, RubricError
+
+
+def opened(content):
+    return zipfile.ZipFile(io.BytesIO(content))
+
+
+def test_gradescope_s_zip_has_what_the_platform_runs():
+    """Two programs at the top that can be run, and everything that they name."""
+    archive = opened(gradescope(Chosen()))
+    modes = {info.filename: info.external_attr >> 16 & 0o777 for info in archive.infolist()}
+    assert modes["setup.sh"] == modes["run_autograder"] == modes["prepare"] == 0o755
+    assert {"constraints.txt", "settings.json", wheel()[0]} <= set(modes)
+    assert archive.testzip() is None
+
+
+def test_the_same_choice_gives_the_same_bytes():
+    """So that a course can tell whether anything changed."""
+    assert gradescope(Chosen()) == gradescope(Chosen())
+
+
+def test_classroom50_s_bundle_fits():
+    """The platform fetches no more than ten megabytes."""
+    files = classroom50(Chosen())
+    assert "autograder.py" in files
+    assert sum(map(len, files.values())) < CLASSROOM50_BYTES / 4
+
+
+def test_rubrics_travel_under_names_of_ours():
+    """The settings say where; a name of the course's own could be anything."""
+    archive = opened(gradescope(Chosen(exercises=("odom_subscriber",), rubrics=(ROOT / "rubrics/exercise_2.yaml",))))
+    chosen = json.loads(archive.read("settings.json"))
+    assert chosen == {"exercises": ["odom_subscriber"], "rubrics": ["rubrics/1.yaml"], "isolation": "auto"}
+    assert archive.read("rubrics/1.yaml") == (ROOT / "rubrics/exercise_2.yaml").read_bytes()
+
+
+def test_an_exercise_that_no_rubric_has_is_refused_at_once():
+    """Not by the first student."""
+    with pytest.raises(RubricError, match="--exercise odometry: expected one of velocity_publisher"):
+        gradescope(Chosen(exercises=("odometry",)))
+
+
+def test_the_wheel_holds_what_an_installation_needs_and_no_solution():
+    """Code, rubrics, scripts, and a record in which every file is right."""
+    name, content = wheel()
+    archive = opened(content)
+    names = set(archive.namelist())
+    assert re.fullmatch(r"rclpy_grader-[\w.]+-py3-none-any\.whl", name)
+    needed = {"grader/cli.py", "grader/rubrics/exercise_1.yaml", "grader/rubrics/odometry/odometry.mcap"}
+    assert needed | {"grader/integrations/prepare", "grader/reports/report.schema.json"} <= names
+    assert not [n for n in names if "__pycache__" in n or "reference" in n or "template/" in n]
+    record = next(n for n in names if n.endswith("RECORD"))
+    rows = list(csv.reader(archive.read(record).decode().splitlines()))
+    assert {row[0] for row in rows} == names
+    assert all(parts._recorded(n, archive.read(n)) == f"{n},{d},{s}\n" for n, d, s in rows if n != record)
+    scripts = next(n for n in names if n.endswith("entry_points.txt"))
+    assert "grade = grader.cli:main" in archive.read(scripts).decode()
+
+
+def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers():
+    """Down to what is needed by what is needed; the ROS wheels above all."""
+    names = [line.split("==")[0] for line in pins().splitlines()]
+    assert names == sorted(set(names))
+    assert {"click", "jinja2", "markupsafe", "ros-jazzy-rclpy", "ros-rmw-fastrtps-cpp", "numpy"} <= set(names)
+    assert not {"pytest", "mypy", "rclpy-grader", "pip", "setuptools"} & set(names)
+
+
+def test_the_pins_of_the_action_name_all_that_is_needed_now():
+    """A requirement that is new has to be pinned as well: grade export constraints > integrations/constraints.txt."""
+    kept = (ROOT / "integrations" / "constraints.txt").read_text().splitlines()
+    assert {line.split("==")[0] for line in kept} == {line.split("==")[0] for line in pins().splitlines()}
+
+
+def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypatch):
+    """A checkout whose requirements grew since it was installed would make a wheel that cannot run."""
+    monkeypatch.setattr(parts, "_needed", lambda requirements, extras: [(r, ()) for r in [*requirements][:1]])
+    with pytest.raises(EnvironmentFault, match="expected an installation that knows its requirements"):
+        parts._refuse_stale(parts.importlib.metadata.distribution("click"))
+
+
+def test_the_command_warns_of_an_autograder_without_walls(tmp_path):
+    """Whoever wants that learns what it means."""
+    done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "a.zip"), "--isolation", "none"])
+    assert "can write its own result" in done.output
+    assert (tmp_path / "a.zip").exists()
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    """In one line."""
+    (tmp_path / "file").write_text("")
+    done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "file" / "a.zip")])
+    assert done.exit_code == 2
+    assert "file/a.zip: it cannot be written" in done.output
