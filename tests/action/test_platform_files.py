@@ -1,5 +1,6 @@
 """The files that platforms read: they follow the public schemas, and linters find nothing in them."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -71,6 +72,15 @@ def test_the_steps_of_the_action_pass_shellcheck(tmp_path):
     for number, step in enumerate(step for step in steps if "run" in step):
         (tmp_path / f"{number}.sh").write_text(f"set -e\n{step['run']}")
     assert complaints("shellcheck", "--shell=bash", *map(str, sorted(tmp_path.glob("*.sh")))) == ""
+
+
+@pytest.mark.parametrize("part", ["inputs", "outputs"])
+def test_the_documentation_names_every_input_and_output(part):
+    """And none that the action has not."""
+    text = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    table = text.partition(f"\n| {part[:-1]} |")[2].partition("\n\n")[0]
+    told = [name for row in table.splitlines()[2:] for name in re.findall(r"`([a-z-]+)`", row.split("|")[1])]
+    assert told == list(YAML(typ="safe").load(ACTION.read_text(encoding="utf-8"))[part])
 
 
 def test_students_start_from_the_workflow_that_is_exported():
