@@ -110,7 +110,8 @@ def _written(graded: Graded, store: Store, wanted: Platforms) -> Graded:
     results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}
     made = exports(graded.book, wanted, results)
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
-    graded = replace(graded, left_out=left_out)
+    remarks = tuple(export.remark for export in made.values() if export.remark)
+    graded = replace(graded, left_out=left_out, remarks=remarks)
     texts = {**class_files(graded.book, made), CLASS: summary_json(graded)}
     return replace(graded, files=tuple(store.write(name, text.encode()) for name, text in texts.items()))
 

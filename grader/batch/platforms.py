@@ -34,10 +34,12 @@ class Export:
     Attributes:
         files: Name below the folder for results -> content.
         left_out: Who is not in it, and why; one line each.
+        remark: What else an instructor must know; may be empty.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    remark: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +88,11 @@ def export_canvas(book: Classbook, assignment: str, gradebook: Users | None) -> 
         else:
             rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), number(row.adjusted.score)])
     possible = _possible(gradebook, title) or number(max(maxima, default=None))
-    if len(maxima) == 1 and possible != number(next(iter(maxima))):
-        left_out.append(f"note: {title} has {possible} points in Canvas, the reports have {number(next(iter(maxima)))}")
+    ours = listed([number(points) for points in sorted(maxima)] or [possible])
+    remark = "" if ours == possible else _line(f"{title} has {possible} points in Canvas, the reports have {ours}")
     header = [*CANVAS_COLUMNS, text_cell(title)]
     points = ["    Points Possible", *[""] * (len(CANVAS_COLUMNS) - 1), text_cell(possible)]
-    return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)))
+    return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)), remark)
 
 
 def export_moodle(book: Classbook, users: Users) -> Export:

@@ -6,9 +6,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import Enum
-from typing import Any
 
 import msgspec
+
+from grader.reports.escape import json_value
 
 SCHEMA = "grader/batch-result/v1"
 
@@ -59,9 +60,8 @@ class Standing:
 
 
 def dump(standing: Standing) -> bytes:
-    """Return a standing as JSON."""
-    data: dict[str, Any] = {"schema": standing.schema, **asdict(standing), "state": standing.state.value}
-    return json.dumps(data, indent=2).encode() + b"\n"
+    """Return a standing as JSON; what is no text in a name becomes a sign for that."""
+    return json.dumps(json_value(asdict(standing)), indent=2).encode() + b"\n"
 
 
 def load(data: bytes) -> Standing | None:

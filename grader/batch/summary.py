@@ -29,6 +29,7 @@ class Graded:
         not_replaced: Names of those whose new attempt came to less than the result that was there, which stays.
         files: What was written for the whole class.
         left_out: Platform -> who is not in its file, and why.
+        remarks: What else must be known of those files.
     """
 
     book: Classbook
@@ -37,6 +38,7 @@ class Graded:
     not_replaced: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
 
 def render_summary(graded: Graded) -> str:
@@ -47,6 +49,7 @@ def render_summary(graded: Graded) -> str:
     lines += _scores(book)
     lines += _lists(book, graded.not_replaced)
     lines += [f"not in {platform}: {line}" for platform, out in graded.left_out.items() for line in out]
+    lines += [f"note: {remark}" for remark in graded.remarks]
     lines += [f"written: {shown(str(path), limit=300)}" for path in graded.files if path.suffix == ".csv"]
     return "\n".join(lines) + "\n"
 
@@ -68,6 +71,7 @@ def summary_json(graded: Graded) -> str:
             "duplicates": [list(names) for names in matching.duplicates],
             "strays": json_value(book.strays),
             "left_out": {platform: list(lines) for platform, lines in graded.left_out.items()},
+            "remarks": [*json_value(book.remarks), *graded.remarks],
             "results_of_nobody": list(book.foreign),
             "layouts": [{"source": json_value(source), "layout": layout} for source, layout in book.layouts],
         }

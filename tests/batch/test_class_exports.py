@@ -68,7 +68,7 @@ def test_canvas_by_number_alone(class_):
 def test_canvas_with_other_points_is_told(class_, tmp_path):
     """A score of 10 would be little of 100."""
     graded, _ = class_("7", gradebook=True)
-    assert "note: Other (7) has 5 points in Canvas, the reports have 10" in graded.left_out["canvas"]
+    assert graded.remarks == ("Other (7) has 5 points in Canvas, the reports have 10",)
 
 
 @pytest.mark.parametrize(

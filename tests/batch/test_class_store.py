@@ -107,6 +107,12 @@ def test_a_damaged_standing_is_none(data):
     assert load(data) is None
 
 
+def test_a_standing_survives_names_that_are_no_text():
+    """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
+    odd = Standing(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
+    assert load(dump(odd)).state is State.REFUSED
+
+
 def test_a_standing_of_another_version_is_none():
     """It is not guessed at."""
     assert load(dump(standing())) == standing()
