@@ -13,16 +13,17 @@ from pathlib import Path
 
 from grader.model.errors import ClassError, HarnessError
 from grader.reading.archive_members import FILE, FOLDER, Member, UnusableArchiveError
-from grader.reading.archives import HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind
+from grader.reading.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind
 from grader.reading.member_names import collision, objection, passed_over
 from grader.reading.quoting import shown
 from grader.reading.tar_members import is_tar, tar_members, unpacked
 from grader.reading.zip_members import zip_members
 from grader.reports.destination import write_whole
 
-#: Largest download, most that it unpacks to, and most entries in it.
+#: Largest download, most that it unpacks to, on disk and for a compressed tar in memory, and most entries in it.
 MAX_DOWNLOAD_BYTES = 1 << 30
 MAX_UNPACKED_BYTES = 4 << 30
+MAX_TAR_BYTES = 2 << 30
 MAX_ENTRIES = 300_000
 #: Most that one student's part of it unpacks to; what it may hold in the end is for grading to say.
 MAX_PART_BYTES = 2 * MAX_ARCHIVE_BYTES
@@ -35,8 +36,8 @@ class Unpacked:
     """A download that lies in a folder now.
 
     Attributes:
-        folder: Where.
-        refused: First part of a path -> why nothing below it was unpacked.
+        folder: Where; a folder around all submissions is left behind.
+        refused: Name of a folder or file in it -> why it was not unpacked.
         strays: Names that lead nowhere in the download, and why.
     """
 
@@ -57,24 +58,26 @@ def unpack_download(archive: Path, into: Path) -> Unpacked:
         HarnessError: The copy cannot be written.
     """
     data = _read(archive)
-    found = Unpacked(into)
     note = into.with_name(f".{into.name}.json")
     digest = hashlib.sha256(data).hexdigest()
-    known = _known(note, digest) if into.is_dir() else None
+    known = _known(note, digest, into) if into.is_dir() else None
     if known is not None:
-        return Unpacked(into, *known)
+        return known
     try:
         into.parent.mkdir(parents=True, exist_ok=True)
+        for unfinished in into.parent.glob(f".{into.name}.*.tmp"):
+            shutil.rmtree(unfinished, ignore_errors=True)
         fresh = into.with_name(f".{into.name}.{secrets.token_hex(4)}.tmp")
-        _unpack(_members(archive, data), fresh, found)
+        found = _unpack(_members(archive, data), fresh)
         note.unlink(missing_ok=True)
         shutil.rmtree(into, ignore_errors=True)
         fresh.rename(into)
-        kept = {"digest": digest, "refused": found.refused, "strays": found.strays}
+        inner = found.folder.relative_to(fresh).as_posix()
+        kept = {"digest": digest, "inner": inner, "refused": found.refused, "strays": found.strays}
         write_whole(note, json.dumps(kept).encode())
     except OSError as error:
         raise HarnessError(f"{into}: the download cannot be unpacked: {error.strerror}", "free some space") from None
-    return found
+    return Unpacked(into / inner, found.refused, found.strays)
 
 
 def _read(archive: Path) -> bytes:
@@ -87,10 +90,12 @@ def _read(archive: Path) -> bytes:
         raise ClassError(f"{archive}: the download cannot be read: {error.strerror}") from None
 
 
-def _known(note: Path, digest: str) -> tuple[dict[str, str], list[str]] | None:
+def _known(note: Path, digest: str, into: Path) -> Unpacked | None:
+    """Return what was unpacked before, if it was the same download."""
     try:
         kept = json.loads(note.read_bytes())
-        return (dict(kept["refused"]), list(kept["strays"])) if kept["digest"] == digest else None
+        found = Unpacked(into / kept["inner"], dict(kept["refused"]), list(kept["strays"]))
+        return found if kept["digest"] == digest else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -103,8 +108,8 @@ def _members(archive: Path, data: bytes) -> list[Member]:
         if kind == "zip":
             return zip_members(data, most=MAX_ENTRIES)
         if kind != "tar":
-            limit = f"{MAX_UNPACKED_BYTES >> 30} GiB unpacked"
-            data = unpacked(data, kind, most=MAX_UNPACKED_BYTES, limit=limit)
+            limit = f"{MAX_TAR_BYTES >> 30} GiB unpacked"
+            data = unpacked(data, kind, most=MAX_TAR_BYTES, limit=limit)
             if not is_tar(data[:HEAD_BYTES]):
                 raise UnusableArchiveError(f"expected a tar archive inside the {kind}, found another kind of file")
         return tar_members(data, most=MAX_ENTRIES)
@@ -112,26 +117,51 @@ def _members(archive: Path, data: bytes) -> list[Member]:
         raise ClassError(f"{archive}: {error.problem}", "download it again, or name the unpacked folder") from None
 
 
-def _unpack(members: Iterable[Member], into: Path, found: Unpacked) -> None:
-    into.mkdir()
+def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
+    """Write what may be written, each student's part whole or not at all."""
+    named = [(member.name.removeprefix("./"), member) for member in members]
+    around = _around(name for name, member in named if member.kind == FILE)
+    top = into / around
+    top.mkdir(parents=True)
+    found = Unpacked(top)
     by_part: dict[str, list[tuple[str, Member]]] = {}
-    for member in members:
-        name = member.name.removeprefix("./")
-        if name in ("", "."):
-            continue
+    for whole, member in named:
+        name = whole.removeprefix(around)
         part = name.split("/", 1)[0]
-        if objection(part):
-            found.strays.append(f"{shown(name)} ({objection(part)})")
+        if name in ("", ".") or f"{whole}/" == around:
+            continue
+        if objection(part) or not whole.startswith(around):
+            found.strays.append(f"{shown(whole)} ({objection(part) or 'beside the folder of all others'})")
         elif objection(name) or not passed_over(name if member.kind != FOLDER else f"{name}/x"):
             by_part.setdefault(part, []).append((name, member))
-    total = 0
+    left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
-        problem, size = _write_part(inside, into, MAX_UNPACKED_BYTES - total)
-        total += size
+        problem, size = _write_part(inside, top, left)
+        left -= size
         if problem:
             found.refused[part] = problem
-            shutil.rmtree(into / part, ignore_errors=True)
-            (into / part).unlink(missing_ok=True)
+            _remove(top / part)
+    return found
+
+
+def _around(files: Iterable[str]) -> str:
+    """Return the folder that all submissions of a download lie in, with a slash; empty if there is none.
+
+    A folder with several folders or archives, and no program of its own, is nobody's submission.
+    """
+    paths = [name.split("/") for name in files if not passed_over(name)]
+    if not paths or len({path[0] for path in paths}) != 1 or objection(paths[0][0]):
+        return ""
+    inside = {path[1] for path in paths if len(path) > 2 or path[-1].casefold().endswith(ARCHIVE_SUFFIXES)}
+    programs = any(len(path) == 2 and path[1].casefold().endswith(".py") for path in paths)
+    return f"{paths[0][0]}/" if len(inside) > 1 and not programs and all(len(path) > 1 for path in paths) else ""
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tuple[str, int]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from grader.batch.bulk import unpack_download
 from grader.batch.layouts import AUTO, PATTERNS, Layout, Named, layout_of
 from grader.batch.naming import distinct_names
-from grader.model.errors import ClassError, HarnessError
+from grader.model.errors import ClassError, HarnessError, SubmissionError
 from grader.reading.archives import ARCHIVE_SUFFIXES
 from grader.reading.member_names import objection, passed_over_file, passed_over_folder
 from grader.reading.quoting import shown
@@ -73,6 +73,9 @@ class _Found:
     files: list[tuple[str, Path]] = field(default_factory=list)
 
 
+_ByStudent = dict[tuple[str, ...], _Found]
+
+
 def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
     """Find all submissions.
 
@@ -94,10 +97,11 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
         children = [child for child in _children(top) if child.resolve() != results.resolve()]
         used = _layout(children, top, layout, pattern)
         here = _submissions(children, own, used, strays)
+        for name, problem in refused.items():
+            _refuse(here, top / name, own, used, problem)
         layouts.append((str(source), used.name))
-        found += here
-        found += [_refused(name, problem, used, top, own) for name, problem in refused.items()]
-        if not here and not refused:
+        found += here.values()
+        if not here:
             hint = "name the folder that holds one folder or archive for each student"
             raise ClassError(f"{source}: expected submissions, found none", hint)
     names = distinct_names([(one.wish, one.own) for one in found])
@@ -113,17 +117,7 @@ def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[
         raise ClassError(f"{source}: expected a folder of submissions or a download, found nothing there")
     unpacked = unpack_download(source, into)
     strays += [f"{source}: {stray}" for stray in unpacked.strays]
-    return _inner(unpacked.folder), unpacked.refused
-
-
-def _inner(folder: Path) -> Path:
-    """Return the only folder in a download, if that holds several submissions; else the folder itself."""
-    children = list(_children(folder))
-    if len(children) != 1 or not children[0].is_dir():
-        return folder
-    inside = list(_children(children[0]))
-    several = sum(child.is_dir() or _is_archive(child) for child in inside) > 1
-    return children[0] if several and not any(child.suffix == ".py" for child in inside) else folder
+    return unpacked.folder, unpacked.refused
 
 
 def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> Layout:
@@ -132,8 +126,8 @@ def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> L
     return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
 
 
-def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: list[str]) -> list[_Found]:
-    found: dict[tuple[str, ...], _Found] = {}
+def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: list[str]) -> _ByStudent:
+    found: _ByStudent = {}
     for child in children:
         if child.is_symlink():
             strays.append(f"{shown(str(child), 200)}: a link, which is not followed")
@@ -142,8 +136,11 @@ def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: lis
         if not child.is_dir() and not _is_archive(child) and not named.file:
             strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
             continue
-        _add(found, child, own, label, named, merge=layout.name in PATTERNS)
-    return list(found.values())
+        key = _student(child.name, named, layout)
+        one = found.setdefault(key, _found(child, label, own, named))
+        if one.path != child:  # of the same student: files go together under their own names
+            one.files = [*(one.files or [(one.named.file, one.path)]), (named.file, child)]
+    return found
 
 
 def _read(layout: Layout, child: Path) -> tuple[Named, str]:
@@ -155,28 +152,23 @@ def _read(layout: Layout, child: Path) -> tuple[Named, str]:
     return layout.read(label), label
 
 
-def _add(  # noqa: PLR0913  all that is known of it
-    found: dict[tuple[str, ...], _Found], child: Path, own: str, label: str, named: Named, *, merge: bool
-) -> None:
-    """Take note of a folder or file; what says that it is of the same student may belong together."""
+def _student(name: str, named: Named, layout: Layout) -> tuple[str, ...]:
+    """Return what tells students of one source apart: who they are where a platform deals in files, else the name."""
     who = tuple(f"{key}={value}" for key, value in sorted(named.identity.items()))
-    key = who if who and (merge or named.file) else ("", child.name)
-    if key not in found:
-        files = [(named.file, child)] if named.file else []
-        found[key] = _Found(
-            f"{own}/{child.name}", label, "-".join(named.identity.values()) or label, child, named, files=files
-        )
-        return
-    first = found[key]
-    if not first.files:
-        first.files.append(("", first.path))
-    first.files.append((named.file, child))
+    return who if who and (named.file or layout.name in PATTERNS) else ("", name)
 
 
-def _refused(name: str, problem: str, layout: Layout, top: Path, own: str) -> _Found:
-    named = layout.read(name)
-    wish = "-".join(named.identity.values()) or name
-    return _Found(f"{own}/{name}", name, wish, top / name, named, problem)
+def _found(path: Path, label: str, own: str, named: Named) -> _Found:
+    wish = "-".join(named.identity.values()) or label
+    files = [(named.file, path)] if named.file else []
+    return _Found(f"{own}/{path.name}", wish if named.file else label, wish, path, named, files=files)
+
+
+def _refuse(found: _ByStudent, path: Path, own: str, layout: Layout, problem: str) -> None:
+    """Take note of a submission of which something was not unpacked; then nothing of it is graded."""
+    named = layout.read(path.name)
+    one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named))
+    one.problem = problem
 
 
 def _entry(one: _Found, name: str, results: Path) -> Entry:
@@ -204,6 +196,10 @@ def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
                 target = into / (name or path.name)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(read_start(path, MAX_FILE_BYTES, where=shown(str(path), 200)))
+    except SubmissionError as error:
+        return error.message
+    except shutil.Error:
+        return "expected plain files, found something that cannot be copied"
     except OSError as error:
         raise HarnessError(f"{into}: the submission cannot be copied: {error.strerror}", "free some space") from None
     return ""

@@ -1,6 +1,7 @@
 """Which submissions are found in folders and downloads, what they are called, and what is named instead of dropped."""
 
 import io
+import os
 import stat
 import sys
 import tarfile
@@ -239,6 +240,34 @@ def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path, bad, text):
     assert not ada.path.exists()
     assert (bob.problem, contents(bob)) == ("", ["b.py"])
     assert not list(tmp_path.rglob("evil*"))
+
+
+def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path):
+    """Also where the whole class lies in one folder of the download."""
+    files = {"hw/": b"", "hw/ada/../../evil.py": PY, "hw/bob/b.py": PY, "hw/cleo/c.py": PY, "hw/scores.csv": b""}
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert [(e.name, bool(e.problem)) for e in intake.entries] == [("ada", True), ("bob", False), ("cleo", False)]
+    assert len(intake.strays) == 1
+    again = found(tmp_path, tmp_path / "hw.zip")
+    assert again == intake
+
+
+def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path, monkeypatch):
+    """A part of the work would get a part of the marks."""
+    monkeypatch.setattr("grader.batch.bulk.MAX_ARCHIVE_BYTES", 1000)
+    files = {"lovelaceada_1_2_a.py": PY, "lovelaceada_1_3_b.bin": b"x" * 5000, "rossbob_2_4_a.py": PY}
+    ada, bob = found(tmp_path, zipped(tmp_path / "hw.zip", files)).entries
+    assert ("MiB a file" in ada.problem, bob.problem) == (True, "")
+
+
+def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path):
+    """It is not waited for, and the others go on."""
+    class_ = put(tmp_path / "class", "Bob_2_assignsubmission_file/b.py")
+    for kind in ("file", "onlinetext"):
+        put(class_, f"Ada_1_assignsubmission_{kind}/{kind}.py")
+    os.mkfifo(class_ / "Ada_1_assignsubmission_file" / "pipe")
+    ada, bob = found(tmp_path, class_).entries
+    assert (bool(ada.problem), bob.problem) == (True, "")
 
 
 @pytest.mark.parametrize("bad", ["/etc/evil.py", "../evil.py", "C:/evil.py"])
