@@ -1,5 +1,6 @@
 """The platforms with real nodes: the action, Gradescope's zip and Classroom 50's autograder, run as they run them."""
 
+import base64
 import json
 import os
 import shutil
@@ -75,6 +76,8 @@ def test_the_action_grades_and_a_prying_student_finds_nothing(checkout, tmp_path
     assert "canaries: 0" in json.dumps(report["exercises"][0]["faults"])
     assert job.outputs["score"] == str(report["score"])
     assert job.outputs["max-score"] == "30"
+    legacy = json.loads(base64.b64decode(job.outputs["result"]))
+    assert (legacy["max_score"], sum(test["score"] for test in legacy["tests"])) == (30, report["score"])
     assert job.outputs["passed"] == "false"
     assert {kind for kind, _, _ in job.commands} <= {"notice", "warning", "error"}
     assert [p["file"] for kind, p, _ in job.commands if kind == "error" and "file" in p] == ["velocity_publisher.py"]
