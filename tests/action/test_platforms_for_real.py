@@ -186,3 +186,9 @@ def test_the_action_sets_itself_up_from_nothing(checkout, tmp_path):
     assert job.failed == "", job.log
     assert job.outputs["passed"] == "true"
     assert "Passed." in job.log
+    # What was installed can be packed in its turn.
+    own = tmp_path / "runner" / "temp" / "rclpy-grader" / "bin" / "grade"
+    words = [own, "export", "classroom50", tmp_path / "bundle"]
+    subprocess.run(words, env={**environment, "PATH": path}, cwd=tmp_path, check=True)
+    names = {file.name for file in (tmp_path / "bundle").iterdir()}
+    assert {"autograder.py", "prepare", "constraints.txt", "settings.json"} < names
