@@ -88,7 +88,10 @@ def wait_for(condition, seconds=60):
         (lambda path: None, "expected a folder, a .py file or an archive, found nothing there"),
         (lambda path: path.mkdir(), "expected at least one .py file, found none"),
         (lambda path: path.write_text("x"), "expected a folder, a .py file or an archive, found another kind of file"),
-        (lambda path: path.symlink_to("/nonexistent"), "expected a folder, a .py file or an archive, found nothing there"),
+        (
+            lambda path: path.symlink_to("/nonexistent"),
+            "expected a folder, a .py file or an archive, found nothing there",
+        ),
         (os.mkfifo, "expected a folder, a .py file or an archive, found a device, pipe or socket"),
     ],
     ids=["nothing", "empty folder", "another file", "dangling link", "pipe"],
