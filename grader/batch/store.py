@@ -170,6 +170,11 @@ def open_store(folder: Path) -> Iterator[Store]:
     try:
         store.recover()
         yield store
+        store.recover()
+    except BaseException:
+        with suppress(OSError):  # what stopped the run says more
+            store.recover()
+        raise
     finally:
         os.close(lock)
 

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from grader.batch.standing import Standing, State, dump, load
-from grader.batch.store import open_store
+from grader.batch.store import Store, open_store
 from grader.model.errors import HarnessError
 
 
@@ -72,6 +72,19 @@ def test_an_unfinished_result_is_none(tmp_path):
     with open_store(tmp_path) as store:
         assert (store.names(), leftovers(store)) == ([], [])
         assert store.kept("ada").result is None
+
+
+def test_a_stopped_run_tidies_up(tmp_path):
+    """What was being written is gone at once, not only when the command is given again."""
+
+    def stopped():
+        with open_store(tmp_path) as store:
+            store.fresh("ada").mkdir()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert leftovers(Store(tmp_path)) == []
 
 
 def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path):
