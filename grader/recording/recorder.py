@@ -10,6 +10,7 @@ import contextlib
 import json
 import os
 import queue
+import re
 import socket
 import subprocess
 import threading
@@ -23,7 +24,7 @@ from typing import Any
 from grader.model.errors import HarnessError
 from grader.model.limits import Limits
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, Trace
+from grader.model.trace import ClockKind, FaultKind, Trace
 from grader.recording.codec import trace_from_json
 from grader.recording.isolation.environment import quick_discovery, runtime_environment
 from grader.recording.isolation.protocol import Isolation, PythonRuntime
@@ -34,6 +35,8 @@ MARGIN_S = 60.0
 #: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
+#: What a fault says where a signal ended a process, and no limit: its own doing, or a machine that is out of threads.
+UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
 
 
 class WorkerProcess:
@@ -163,7 +166,13 @@ class Recorder:
             yield future.result()
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
+        """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
         progress(job.title)
+        trace = self._recorded(job)
+        again = any(f.kind is FaultKind.KILLED and UNEXPLAINED.fullmatch(f.text) for f in trace.faults())
+        return self._recorded(job) if again else trace
+
+    def _recorded(self, job: Job) -> Trace:
         problem = ""
         for _ in range(TRIES):
             worker = self._idle.get()

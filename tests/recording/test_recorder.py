@@ -37,6 +37,7 @@ behaviours = json.load(open(os.path.join(folder, "behaviours.json")))
 behaviour = behaviours[min(number, len(behaviours) - 1)]
 open(os.path.join(folder, f"start-{number}", "pid"), "w").write(str(os.getpid()))
 line = socket.socket(fileno=request["line"])
+plans = 0
 def trace(plan, note):
     return {"format": "grader/trace/v1", "scenario": plan["scenario"], "clock": plan["clock"], "clock_reason": "",
             "stop_ns": plan["duration_ns"], "notes": [note], "harness_problem": "", "observations": []}
@@ -44,6 +45,13 @@ for command in line.makefile("r"):
     asked = json.loads(command)
     if behaviour == "answers":
         said = json.dumps({"trace": trace(asked["plan"], f"worker {number}, domain {asked['domain']}")}).encode()
+    elif behaviour.startswith("tells of"):
+        told = behaviour[9:].split("|")
+        found = trace(asked["plan"], f"plan {plans}")
+        text = told[min(plans, len(told) - 1)]
+        plans += 1
+        found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, []]] if text else []
+        said = json.dumps({"trace": found}).encode()
     elif behaviour == "dies":
         os._exit(1)
     elif behaviour == "dies in its sentence":
@@ -346,3 +354,22 @@ def wait_for(condition, seconds: float = 60) -> None:
     while not condition():
         assert time.monotonic() < deadline, "it never came to that"
         time.sleep(0.005)
+
+
+@pytest.mark.parametrize(
+    ("told", "kept", "times"),
+    [
+        ("ended by SIGABRT|", "", 2),
+        ("ended by SIGABRT|ended by SIGSEGV|", "ended by SIGSEGV", 2),
+        ("stopped at 512 MiB of memory|", "stopped at 512 MiB of memory", 1),
+        ("ended by SIGABRT (the limit is 64 processes and threads)|", "ended by SIGABRT (the limit", 1),
+        ("|ended by SIGABRT", "", 1),
+    ],
+)
+def test_a_signal_that_no_limit_explains_has_to_come_twice(make, told, kept, times):
+    """A machine that was out of threads for a moment costs nobody a point; a node that aborts does so again."""
+    recorder, _ = make(f"tells of {told}")
+    (found,) = recorder.record(jobs("alone"), lambda step: None)
+    assert "".join(fault.text for fault in found.faults()).startswith(kept)
+    assert bool(found.faults()) is bool(kept)
+    assert found.notes == (f"plan {times - 1}",)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
+import os
 import secrets
 import stat
 import sysconfig
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -16,11 +20,55 @@ from grader.recording.isolation.protocol import PythonRuntime
 # containers map no others.
 STUDENT_GROUP = 61234
 STUDENT_USERS = range(61234, 65234)
+TRIES = 1000
+
+
+#: Graders of one machine lock in this file the byte of each user that they have taken; only root writes there.
+TAKEN = Path("/run/rclpy-grader.users")
+
+
+class StudentUsers:
+    """Hands out users that student processes may become, each to one process on this machine.
+
+    A user stays taken until the process that asked for it ends. Where no note can be made of that, a user is only
+    unlikely to be another's.
+
+    Args:
+        taken: The file of locks, made if it is not there.
+    """
+
+    def __init__(self, taken: Path) -> None:
+        self._path = taken
+        self._file: int | None = None
+        self._mine: set[int] = set()
+        self._lock = threading.Lock()
+
+    def next(self) -> int:
+        """Return a user that nobody else has."""
+        with self._lock:
+            for _ in range(TRIES):
+                user = STUDENT_USERS.start + secrets.randbelow(len(STUDENT_USERS))
+                if user not in self._mine and self._take(user):
+                    break
+            self._mine.add(user)
+            return user
+
+    def _take(self, user: int) -> bool:
+        try:
+            if self._file is None:
+                self._file = os.open(self._path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, user)
+        except OSError as error:
+            return error.errno not in (errno.EAGAIN, errno.EACCES) or self._file is None
+        return True
+
+
+_USERS = StudentUsers(TAKEN)
 
 
 def some_user() -> int:
-    """Return a user that a student's process may become, unlikely to be another student's."""
-    return STUDENT_USERS.start + secrets.randbelow(len(STUDENT_USERS))
+    """Return a user that a student's process may become, and that no other grader on this machine uses."""
+    return _USERS.next()
 
 
 def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
