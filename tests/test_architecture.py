@@ -28,8 +28,8 @@ MAY_IMPORT = {
 IMPURE = {"os", "subprocess", "socket", "time", "datetime", "random", "threading", "pathlib", "tempfile", "rclpy"}
 #: The only modules of the grader's own processes that may know rclpy.
 KNOWS_ROS = {"recording/observer.py", "recording/isolation/probe.py", "recording/isolation/trial.py"}
-#: Modules in pure rooms that are not pure: a path is a value in some, others deliver what has been rendered or read what
-#: a platform says in the environment.
+#: Modules in pure rooms that are not pure: a path is a value in some, others deliver what has been rendered or read
+#: what a platform says in the environment.
 EXCUSED = {
     "model/submission.py": {"pathlib"},
     "reports/delivery.py": IMPURE,
