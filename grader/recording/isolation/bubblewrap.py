@@ -153,7 +153,8 @@ class Bubblewrap:
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
         for folder in (*view.parents(), *parents_of((HOST,))):
-            options += ["--perms", "0755", "--dir", str(folder)]
+            # Where Python lies below /tmp, these are in the scratch folder, and a user's student owns them.
+            options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:
             options += ["--ro-bind", str(path), str(path)]
         for where, target in view.links:
