@@ -9,6 +9,8 @@ from grader.model.trace import LogRecord, OutputLine, Trace
 
 #: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
+#: Loggers of the layers below rclpy, which write when something of theirs fails.
+_MIDDLEWARE = re.compile(r"(rmw|rcl|rcutils|rosidl|rcl_\w+|rmw_\w+|rosidl_\w+)(\.|$)")
 _TRACEBACK_HEAD = re.compile(r"\s*(Traceback \(most recent call last\):|Exception in thread .*|Exception ignored .*)$")
 _BETWEEN_TRACEBACKS = re.compile(r"(The above exception was|During handling of the above exception)")
 _INTERPRETER = re.compile(
@@ -23,12 +25,14 @@ _INTERPRETER = re.compile(
 
 
 def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
-    """Return the records of a process without those that rclpy itself wrote."""
-    return tuple(
-        r
-        for r in trace.records(process)
-        if r.t_ns < trace.stop_ns and not (not r.file and _RCLPY_TEXT.match(r.text[:400]))
-    )
+    """Return the records of a process without those that rclpy or what is below it wrote."""
+    return tuple(r for r in trace.records(process) if r.t_ns < trace.stop_ns and not _of_ros(r))
+
+
+def _of_ros(record: LogRecord) -> bool:
+    if record.file:
+        return False
+    return bool(_RCLPY_TEXT.match(record.text[:400]) or _MIDDLEWARE.match(record.logger))
 
 
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:

@@ -87,3 +87,16 @@ def test_a_crash_before_any_log_is_the_reason() -> None:
 def test_a_log_before_a_crash_counts() -> None:
     """What was earned stays earned."""
     assert CHECK.judge(Recording().log(0.0, "started").crashed(1.0).trace()).credit == 1
+
+
+@pytest.mark.parametrize("logger", ["rmw_fastrtps_shared_cpp", "rcl", "rcl.logging_rosout", "rmw_dds_common"])
+def test_what_the_layers_below_rclpy_write_is_not_the_students(logger: str) -> None:
+    """They complain when a node fails; that is no logging of its own."""
+    assert CHECK.judge(Recording().log(1.0, "Attempted to delete a topic", logger=logger).trace()).credit == 0
+
+
+@pytest.mark.parametrize("logger", ["rclone", "rmwatch", "rcl"])
+def test_a_students_logger_may_have_a_name_like_theirs(logger: str) -> None:
+    """What is logged in a file of the student's is the student's, whatever the logger is called."""
+    assert CHECK.judge(Recording().log(1.0, "hello", logger=logger, line=5).trace()).credit == 1
+    assert CHECK.judge(Recording().log(1.0, "hello", logger=f"my_{logger}").trace()).credit == 1
