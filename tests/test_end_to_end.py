@@ -58,7 +58,9 @@ def test_a_submission_gets_what_it_is_worth(folder):
     report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"])), say_nothing)
     found, told = outcomes(report)
     assert found == wanted["expected"], told
-    if folder in GOLDEN:
+    # The exception of this one is raised inside rclpy, in the words of the release.
+    same_words = report.environment.ros_distro == "jazzy" or folder != "broken/timer_callback_called"
+    if folder in GOLDEN and same_words:
         assert what_a_student_reads(report) == GOLDEN[folder]
 
 

@@ -70,6 +70,7 @@ def _errors(limits: Limits) -> Mapping[str, str]:
         "MemoryError": limits.memory_words(),
         "Cannot allocate memory": limits.memory_words(),
         "can't start new thread": limits.processes_words(),
+        "pthread_create failed: Resource temporarily unavailable": limits.processes_words(),
         "[Errno 11] Resource temporarily unavailable": limits.processes_words(),
         "[Errno 24] Too many open files": f"{limits.open_files:,} open files",
         "[Errno 27] File too large": f"{size(limits.file_bytes)} in one file",
