@@ -28,8 +28,6 @@ from grader.reports.rejudged import Result
 from grader.reproducing import command_words
 from grader.session import Request, read_exercises
 
-#: Formats that show pictures, which take about as long as judging.
-ILLUSTRATED = frozenset({"html"})
 #: File name endings of reports, one file a submission.
 ENDINGS = {"json": ".json", "html": ".html", "markdown": ".md", "junit": ".xml", "text": ".txt", "github": ".txt"}
 #: Fewer submissions than this are judged in this process.

@@ -71,6 +71,8 @@ def grade(
     progress: Progress,
     hear: Callable[[Run, Sequence[Exercise]], None] | None = None,
     early: Callable[[Report], None] | None = None,
+    *,
+    pictures: bool = True,
 ) -> Report:
     """Grade one submission.
 
@@ -79,6 +81,7 @@ def grade(
         progress: Hears which step begins.
         hear: Hears what was recorded, and for which exercises.
         early: Hears a partial report whenever an exercise is done and others are not.
+        pictures: Whether the report is to hold figures, which only some formats show.
 
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
@@ -108,7 +111,7 @@ def grade(
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if hear is not None:
             hear(run, exercises)
-        return judge_run(exercises, run)
+        return judge_run(exercises, run, pictures=pictures)
 
 
 def read_exercises(request: Request) -> list[Exercise]:

@@ -38,8 +38,9 @@ class Session:
         self.requests = []
         self.result = a_report()
 
-    def grade(self, request, progress, hear=None, early=None):
+    def grade(self, request, progress, hear=None, early=None, *, pictures=True):
         self.requests.append(request)
+        self.pictures = pictures
         progress("exercise 1: alone")
         if isinstance(self.result, BaseException):
             raise self.result
@@ -311,7 +312,7 @@ import sys
 sys.path.insert(0, {folder!r})
 from test_cli import a_report
 from grader import cli, session
-def grade(request, progress, hear=None, early=None):
+def grade(request, progress, hear=None, early=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()
@@ -386,3 +387,11 @@ def test_help_starts_light():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_pictures_are_drawn_where_a_report_shows_them(run_session, tmp_path):
+    """Drawing takes about as long as judging, and text shows none."""
+    grade("ada")
+    assert run_session.pictures is False
+    grade("ada", "-o", f"html={tmp_path / 'r.html'}")
+    assert run_session.pictures is True

@@ -10,7 +10,7 @@ import click
 
 from grader.options import EVIDENCE, PATH, exit_code, parse_outputs, parse_percent
 from grader.reports.delivery import Output, deliver, prepared, show
-from grader.reports.formats import FORMATS
+from grader.reports.formats import FORMATS, ILLUSTRATED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -69,7 +69,7 @@ def command(  # noqa: PLR0913  one parameter an option
     how = rejudging.judgement(
         tuple(dict.fromkeys(exercises)),
         rubrics,
-        pictures=any(output.format in rejudging.ILLUSTRATED for output in outputs),
+        pictures=any(output.format in ILLUSTRATED for output in outputs),
         verify=verify,
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,6 +15,7 @@ KINDS = {kind.value: kind for kind in FaultKind}
 TEXT_CHARACTERS, PLACE_CHARACTERS, FRAMES = 500, 300, 20
 #: What C++ writes before it ends a process that found no memory.
 NO_MEMORY = b"std::bad_alloc"
+_UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
 #: A process that had this share of the threads it may have, and then failed, wanted more.
 NEARLY_ALL = 0.9
 
@@ -42,6 +44,16 @@ def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Lim
     return Fault(t_ns, process, FaultKind.EXITED, f"exited with code {code if type(code) is int else '?'}")
 
 
+def ended_by(signal: str) -> str:
+    """Return what a fault says where a signal ended a process, and no limit explains it."""
+    return f"ended by {signal}"
+
+
+def is_unexplained(fault: Fault) -> bool:
+    """Return whether a signal and no limit ended a process: its own doing, or a machine that was out of threads."""
+    return fault.kind is FaultKind.KILLED and _UNEXPLAINED.fullmatch(fault.text) is not None
+
+
 def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limits) -> str:
     """Return which limit a process was ended at that a signal ended, in words; empty if none explains it.
 
@@ -58,9 +70,9 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limi
     if signal == OUTGROWN.name:
         return f"stopped at {size(limits.scratch_bytes)} in one folder"
     if signal == "SIGABRT" and NO_MEMORY in last_words:
-        return f"ended by {signal}: it found no more memory (the limit is {limits.memory_words()})"
+        return f"{ended_by(signal)}: it found no more memory (the limit is {limits.memory_words()})"
     if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:
-        return f"ended by {signal} (the limit is {limits.processes_words()})"
+        return f"{ended_by(signal)} (the limit is {limits.processes_words()})"
     return ""
 
 

@@ -10,7 +10,6 @@ import contextlib
 import json
 import os
 import queue
-import re
 import socket
 import subprocess
 import threading
@@ -19,15 +18,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from grader.model.errors import HarnessError
 from grader.model.limits import Limits
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, FaultKind, Trace
+from grader.model.trace import ClockKind, Trace
 from grader.recording.codec import trace_from_json
-from grader.recording.isolation.environment import quick_discovery, runtime_environment
-from grader.recording.isolation.protocol import Isolation, PythonRuntime
+from grader.recording.ending import is_unexplained
+from grader.recording.isolation.environment import worker_environment
+from grader.recording.isolation.protocol import Isolation, PythonRuntime, runtime_to_json
 from grader.recording.plan import Plan, plan_to_json
 
 #: A worker that has not answered after twice the real time of a scenario and this many seconds is taken for lost.
@@ -35,8 +34,6 @@ MARGIN_S = 60.0
 #: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
-#: What a fault says where a signal ended a process, and no limit: its own doing, or a machine that is out of threads.
-UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
 
 
 class WorkerProcess:
@@ -52,9 +49,9 @@ class WorkerProcess:
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
         self._domains = domains
         self._line, theirs = socket.socketpair()
-        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": _runtime_to_json(runtime)}
+        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": runtime_to_json(runtime)}
         argv = [str(runtime.executable), "-s", "-u", "-m", "grader.recording.worker", json.dumps(request)]
-        command = isolation.worker_command(argv, _worker_environment(runtime, scratch), (theirs.fileno(),))
+        command = isolation.worker_command(argv, _environment(runtime, scratch), (theirs.fileno(),))
         self._process = subprocess.Popen(
             command.argv,
             env=dict(command.environment),
@@ -169,8 +166,7 @@ class Recorder:
         """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
         progress(job.title)
         trace = self._recorded(job)
-        again = any(f.kind is FaultKind.KILLED and UNEXPLAINED.fullmatch(f.text) for f in trace.faults())
-        return self._recorded(job) if again else trace
+        return self._recorded(job) if any(map(is_unexplained, trace.faults())) else trace
 
     def _recorded(self, job: Job) -> Trace:
         problem = ""
@@ -231,27 +227,7 @@ class _Shared:
             return next(self._numbers)
 
 
-def _runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
-    return {
-        "executable": str(runtime.executable),
-        "read_paths": [str(p) for p in runtime.read_paths],
-        "library_paths": [str(p) for p in runtime.library_paths],
-        "python_paths": [str(p) for p in runtime.python_paths],
-        "environment": dict(runtime.environment),
-    }
-
-
-def _worker_environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
+def _environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
     """Return the whole environment of a worker: nothing of the caller's but where to find programs."""
-    package_root = Path(__file__).resolve().parents[2]
-    environment = runtime_environment(runtime)
-    python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
     from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
-    return {
-        **environment,
-        **quick_discovery(package_root / "grader" / "host", runtime),
-        "PYTHONPATH": os.pathsep.join([*python_paths, str(package_root)]),
-        "HOME": str(scratch),
-        "ROS_LOG_DIR": str(scratch),
-        **from_caller,
-    }
+    return {**worker_environment(runtime, scratch), **from_caller}

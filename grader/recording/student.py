@@ -18,7 +18,7 @@ from typing import Any
 from grader.model.limits import Limits
 from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine
-from grader.recording.ending import limit_behind
+from grader.recording.ending import ended_by, limit_behind
 from grader.recording.isolation.protocol import Command
 
 #: How the host's processes write log records on standard error, so that they can be told from other output.
@@ -257,7 +257,7 @@ class Student:
             return Fault(t_ns, self.name, FaultKind.EXITED, f"exited with code {code}")
         name = _signal_name(-code if code < 0 else code - 128)
         behind = limit_behind(name, self._last, self.most_threads, self.limits)
-        return Fault(t_ns, self.name, FaultKind.KILLED, behind or f"ended by {name}")
+        return Fault(t_ns, self.name, FaultKind.KILLED, behind or ended_by(name))
 
     def stop(self, why: str, family: Collection[int] = ()) -> None:
         """End the process at a limit, and what it started; may be called from another thread.

@@ -137,6 +137,7 @@ class WallConductor:
 
     def _do(self, due: Due, now_ns: int) -> None:
         if due.action == "appear":
+            self._withdraw_left(due.topic)
             self._advertise(due.topic, due.payload)
             self._tape.add(Mark(now_ns, "stream_starts", due.topic))
         elif due.action == "disappear":
@@ -145,6 +146,12 @@ class WallConductor:
             self._tape.add(Mark(now_ns, "stream_stops", due.topic))
         else:
             self._publish(due, now_ns)
+
+    def _withdraw_left(self, topic: str) -> None:
+        """Let a publisher that stayed for its last message go before the next one on its topic comes."""
+        if any(left == topic for _, left in self._leaving):
+            self._leaving = [(at_ns, left) for at_ns, left in self._leaving if left != topic]
+            self._observer.withdraw(topic)
 
     def _publish(self, due: Due, now_ns: int) -> None:
         interface = self._streams[due.topic]

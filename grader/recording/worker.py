@@ -19,9 +19,9 @@ from typing import Any
 from grader.model.trace import Trace
 from grader.recording.codec import trace_to_json
 from grader.recording.guard import Guard
-from grader.recording.isolation.choose import isolation_from_name
 from grader.recording.isolation.environment import quick_discovery
-from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess
+from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess, runtime_from_json
+from grader.recording.isolation.tiers import isolation_from_name
 from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
 
@@ -100,7 +100,6 @@ class Worker:
                     "RCUTILS_CONSOLE_OUTPUT_FORMAT": LOG_FORMAT,
                     "RCUTILS_COLORIZED_OUTPUT": "0",
                     **quick_discovery(self._isolation.host_seen_at, self._runtime),
-                    "ROS_PYTHON_CHECK_FIELDS": "1",
                     "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
                 },
                 pass_fds=(theirs.fileno(),),
@@ -143,14 +142,7 @@ def main() -> None:
     """Serve plans until the supervisor hangs up."""
     request = json.loads(sys.argv[1])
     line = socket.socket(fileno=request["line"])
-    runtime = PythonRuntime(
-        executable=Path(request["runtime"]["executable"]),
-        read_paths=tuple(map(Path, request["runtime"]["read_paths"])),
-        library_paths=tuple(map(Path, request["runtime"]["library_paths"])),
-        python_paths=tuple(map(Path, request["runtime"]["python_paths"])),
-        environment=request["runtime"]["environment"],
-    )
-    worker = Worker(isolation_from_name(request["isolation"]), runtime)
+    worker = Worker(isolation_from_name(request["isolation"]), runtime_from_json(request["runtime"]))
     commands, answers = line.makefile("r"), line.makefile("w")
     for command in commands:
         data = json.loads(command)

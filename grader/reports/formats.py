@@ -118,5 +118,7 @@ FORMATS: dict[str, Callable[[Report, Layout], str]] = {
     "classroom50": _classroom50,
     "classroom": _classroom,
 }
+#: Formats that show pictures, which take about as long to draw as judging takes.
+ILLUSTRATED = frozenset({"html"})
 #: Formats whose platform ends a run that takes too long, and then takes what is there.
 WRITTEN_EARLY = frozenset({"gradescope"})

@@ -17,9 +17,10 @@ from grader.model.containment import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Prop
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import choose, memory, remedies, selftest
 from grader.recording.isolation.bubblewrap import Bubblewrap
-from grader.recording.isolation.choose import choose_isolation, inspect_tier, inspect_tiers, isolation_from_name
+from grader.recording.isolation.choose import choose_isolation, inspect_tier, inspect_tiers
 from grader.recording.isolation.memory import Memory
 from grader.recording.isolation.plain import Plain
+from grader.recording.isolation.tiers import isolation_from_name
 from grader.recording.ros_installation import RosInstallation, find_ros
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -187,3 +187,16 @@ def test_a_node_that_floods_is_no_excuse(clock):
     clock.held_up = {300: 400}
     trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500)).trace
     assert (trace.harness_problem, len(trace.messages("/cmd_vel"))) == ("", 500)
+
+
+def test_two_recordings_on_one_topic_do_not_end_each_other(clock):
+    """The first one's publisher, which stays for its last message, goes before the second one's comes."""
+    first = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 300 * MS, ((200 * MS, b"cdr", {}),))
+    second = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 400 * MS, 900 * MS, ((800 * MS, b"cdr", {}),))
+    run = Run(quiet, recordings=(first, second))
+    assert [(topic, bool(kind)) for topic, kind, _ in run.observer.advertised] == [
+        ("/odom", True),
+        ("/odom", False),
+        ("/odom", True),
+    ]
+    assert len(run.trace.deliveries("/odom")) == 2

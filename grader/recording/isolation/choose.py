@@ -16,8 +16,6 @@ from grader.recording.isolation.tiers import WALLED, isolation_from_name
 from grader.recording.isolation.trial import NO_EXCHANGE
 from grader.recording.ros_installation import RosInstallation
 
-__all__ = ["AUTO", "Choice", "choose_isolation", "inspect_tiers", "isolation_from_name"]
-
 AUTO = "auto"
 #: So much of the reason against one tier is told where all of them are refused.
 MOST_CHARACTERS = 100

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
+import grader
 from grader.recording.isolation.protocol import PythonRuntime, StudentProcess
+
+PACKAGE = Path(grader.__file__).resolve().parent
 
 # Worker and student must agree on these. With the default transports Fast DDS would look for a /dev/shm that the two do
 # not share, and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST would bring that transport back by itself: it must stay unset.
@@ -68,6 +72,24 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
     if runtime.python_paths:
         environment["PYTHONPATH"] = ":".join(map(str, runtime.python_paths))
     return environment
+
+
+def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
+    """Return what a trusted worker needs: ROS, this package, and a folder for what ROS writes beside its work.
+
+    Args:
+        runtime: Interpreter and ROS.
+        home: That folder.
+    """
+    environment = runtime_environment(runtime)
+    python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
+    return {
+        **environment,
+        **quick_discovery(PACKAGE / "host", runtime),
+        "PYTHONPATH": os.pathsep.join([*python_paths, str(PACKAGE.parent)]),
+        "HOME": str(home),
+        "ROS_LOG_DIR": str(home),
+    }
 
 
 def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:

@@ -11,16 +11,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.model.errors import HarnessError
 from grader.model.limits import Limits
 from grader.recording.isolation.protocol import Command, StudentProcess
 from grader.recording.isolation.starting import (
     HOST,
     Ground,
-    loopback_only,
+    require_domain,
     require_walls,
-    start_command,
     walled_command,
+    worker_on_shared_network,
 )
 
 NAME = "landlock"
@@ -64,7 +63,7 @@ class Landlock:
 
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
         """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
-        return Command((*start_command("/"), *argv), {**environment, **loopback_only(environment)}, tuple(pass_fds))
+        return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process.
@@ -72,7 +71,6 @@ class Landlock:
         Raises:
             HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
         """
-        if "ROS_DOMAIN_ID" not in process.environment:
-            raise HarnessError("isolation landlock: expected ROS_DOMAIN_ID for a student's process, found none")
+        require_domain(process, NAME)
         ground = Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root)
         return walled_command(process, limits, ground)

@@ -8,10 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.model.errors import HarnessError
 from grader.recording.isolation.environment import student_environment
 from grader.recording.isolation.protocol import Command, Limits, StudentProcess
-from grader.recording.isolation.starting import HOST, by_resource, loopback_only, start_command
+from grader.recording.isolation.starting import (
+    HOST,
+    by_resource,
+    loopback_only,
+    require_domain,
+    start_command,
+    worker_on_shared_network,
+)
 
 NAME = "none"
 
@@ -22,12 +28,7 @@ class Plain:
 
     They still have an exact environment, a working directory that is thrown away, and limits; not on the number of
     processes, which the kernel would count over all of the user's.
-
-    Attributes:
-        why: Why there are no walls, one line for a warning; empty if they were not wanted.
     """
-
-    why: str = ""
 
     @property
     def name(self) -> str:
@@ -51,7 +52,7 @@ class Plain:
 
     def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
         """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
-        return Command((*start_command("/"), *argv), {**environment, **loopback_only(environment)}, tuple(pass_fds))
+        return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process.
@@ -59,8 +60,7 @@ class Plain:
         Raises:
             HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
         """
-        if "ROS_DOMAIN_ID" not in process.environment:
-            raise HarnessError("isolation none: expected ROS_DOMAIN_ID for a student's process, found none")
+        require_domain(process, NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
         start = start_command(str(folder), made=True, limits=by_resource(limits))
         environment = student_environment(process, folder / "home")

@@ -17,18 +17,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import grader
 from grader.model.containment import PROPERTIES, TIERS, Property, TierReport, missing
 from grader.recording.domains import private_domains, shared_domains
-from grader.recording.isolation.environment import quick_discovery, runtime_environment
+from grader.recording.isolation.environment import PACKAGE, worker_environment
 from grader.recording.isolation.mechanisms import mechanism
 from grader.recording.isolation.protocol import Isolation, runtime_to_json
-from grader.recording.isolation.starting import HOST
 from grader.recording.isolation.trial import EXCHANGE, NO_EXCHANGE
 from grader.recording.ros_installation import RosInstallation
 
 TRIAL_S = 45.0
-PACKAGE = Path(grader.__file__).resolve().parent
 STAGED = "probe.txt"
 ANSWERED = {"achieved", "outgrown", "said"}
 #: Folders that a student never writes to.
@@ -138,17 +135,8 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
 
 def environment(ros: RosInstallation, bait: Bait) -> Mapping[str, str]:
     """Return the environment of the worker of a trial, which holds a secret as a worker's may."""
-    variables = runtime_environment(ros.runtime)
-    paths = [variables["PYTHONPATH"]] if "PYTHONPATH" in variables else []
-    return {
-        **variables,
-        **quick_discovery(HOST, ros.runtime),
-        "PATH": os.environ.get("PATH", variables["PATH"]),
-        "PYTHONPATH": os.pathsep.join([*paths, str(PACKAGE.parent)]),
-        "HOME": str(bait.folder),
-        "ROS_LOG_DIR": str(bait.folder),
-        "PROBE_SECRET": bait.secret,
-    }
+    variables = worker_environment(ros.runtime, bait.folder)
+    return {**variables, "PATH": os.environ.get("PATH", variables["PATH"]), "PROBE_SECRET": bait.secret}
 
 
 def asked_of_probe(bait: Bait) -> dict[str, Any]:

@@ -7,15 +7,14 @@ import json
 import platform
 import secrets
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import grader
-from grader.model.errors import EnvironmentFault
+from grader.model.errors import EnvironmentFault, HarnessError
 from grader.model.limits import Limits
 from grader.recording.isolation import seccomp
-from grader.recording.isolation.environment import dds_profile, distro_of, student_environment
+from grader.recording.isolation.environment import PACKAGE, dds_profile, distro_of, student_environment
 from grader.recording.isolation.exposure import STUDENT_GROUP, closed_folders, make_readable, secrets_within, some_user
 from grader.recording.isolation.protocol import Command, StudentProcess
 from grader.recording.isolation.seccomp_flat import flat_filter
@@ -23,7 +22,7 @@ from grader.recording.isolation.start import landlock_version
 from grader.recording.isolation.view import view_of
 
 HERE = Path(__file__).parent
-HOST = Path(grader.__file__).resolve().parent / "host"
+HOST = PACKAGE / "host"
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 #: From this version on Landlock has a say over signals.
 WITH_SIGNALS = 6
@@ -67,6 +66,17 @@ def by_resource(limits: Limits) -> dict[str, int]:
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
     """Keep Fast DDS to the loopback address, on both sides: there is no network of one's own."""
     return dds_profile(HERE, "loopback", distro_of(environment))
+
+
+def worker_on_shared_network(argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+    """Return the command of a worker without a network of its own, in its own session; it is killed with the caller."""
+    return Command((*start_command("/"), *argv), {**environment, **loopback_only(environment)}, tuple(pass_fds))
+
+
+def require_domain(process: StudentProcess, tier: str) -> None:
+    """Raise HarnessError without a ROS domain: on a shared network nodes of different runs would talk."""
+    if "ROS_DOMAIN_ID" not in process.environment:
+        raise HarnessError(f"isolation {tier}: expected ROS_DOMAIN_ID for a student's process, found none")
 
 
 def require_walls() -> None:
