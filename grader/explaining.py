@@ -14,7 +14,7 @@ from grader.model.errors import GraderError
 from grader.model.exercise import Criterion, Exercise
 from grader.model.explanation import CheckExplanation, CriterionExplanation, Parameter
 from grader.model.quantities import Unit, duration
-from grader.model.scenario import NumberStream, Scenario, Stimulus
+from grader.model.scenario import MessageStream, NumberStream, Scenario, ServiceCalls, ServiceServer, Stimulus
 from grader.reading.manuals import Manual, manual_of
 from grader.reading.units import format_quantity
 from grader.session import Request, read_exercises
@@ -118,6 +118,15 @@ def _stimulus(stimulus: Stimulus) -> str:
     if isinstance(stimulus, NumberStream):
         pace = f"one every {duration(stimulus.period_ns)}, each value for {duration(stimulus.hold_ns)}"
         return f"the grader publishes {len(stimulus.values)} values on {stimulus.topic}, {pace}"
+    if isinstance(stimulus, MessageStream):
+        pace = f"one every {duration(stimulus.period_ns)} from {duration(stimulus.start_ns)} on"
+        return f"the grader publishes {len(stimulus.values) * stimulus.repeats} messages on {stimulus.topic}, {pace}"
+    if isinstance(stimulus, ServiceServer):
+        return f"the grader offers the service {stimulus.service} from {duration(stimulus.start_ns)} on"
+    if isinstance(stimulus, ServiceCalls):
+        who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
+        pace = f"{stimulus.calls} times each, every {duration(stimulus.period_ns)}"
+        return f"{who} of the grader's call {stimulus.service} {pace}"
     played = f"from {duration(stimulus.start_ns)} on for {duration(stimulus.duration_ns)}"
     return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
 

@@ -86,7 +86,108 @@ class OdometryStream:
     duration_ns: int
 
 
-Stimulus = NumberStream | OdometryStream
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """One of several values, drawn from the seed."""
+
+    options: tuple[str | int | float | bool, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A text with a drawn number in place of `{}`: `Battery: {}% remaining`.
+
+    Attributes:
+        text: Holds `{}` once.
+        number: What is drawn.
+        decimals: How many decimals are written.
+    """
+
+    text: str
+    number: Between
+    decimals: int = 1
+
+
+#: What a field of a planned message may hold; mappings are nested messages, tuples are sequences.
+FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MessageStream:
+    """A stimulus: messages of one type with given fields, one a period, by a publisher that may disappear again.
+
+    Attributes:
+        topic: Topic name, absolute.
+        type: e.g. `std_msgs/msg/String`; fixed, unlike a number stream's.
+        values: Fields of each message; fields left out keep the type's defaults.
+        period_ns: Time between two messages.
+        start_ns: Time of the first message.
+        repeats: How often each is sent, one a period.
+        stop_ns: When the publisher disappears; 0 for never.
+        best_effort: Whether it offers best effort only.
+        latched: Whether it offers transient local.
+    """
+
+    topic: str
+    type: str
+    values: tuple[Mapping[str, FieldSpec], ...]
+    period_ns: int
+    start_ns: int = 0
+    repeats: int = 1
+    stop_ns: int = 0
+    best_effort: bool = False
+    latched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceServer:
+    """A stimulus: a reference server that answers a student's client.
+
+    Attributes:
+        service: Absolute name.
+        type: e.g. `std_srvs/srv/Trigger`.
+        responses: Fields of each response in order; an empty tuple never answers.
+        start_ns: When it appears.
+        stop_ns: When it disappears; 0 for never.
+        delay_ns: Time from a request to its response.
+        cycle: Whether the responses begin again after the last one; otherwise the last one is repeated.
+        answers: After so many responses it disappears, before it takes the next request; 0 for never.
+    """
+
+    service: str
+    type: str
+    responses: tuple[Mapping[str, FieldSpec], ...]
+    start_ns: int = 0
+    stop_ns: int = 0
+    delay_ns: int = 0
+    cycle: bool = False
+    answers: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceCalls:
+    """A stimulus: reference clients that call a student's server.
+
+    Attributes:
+        service: Absolute name; parameters, actions and lifecycle transitions are calls of the services behind them.
+        type: e.g. `std_srvs/srv/Trigger`.
+        requests: Fields of each request in order, repeated from the first one if there are fewer than calls.
+        calls: How many requests each client sends.
+        clients: How many clients there are; the k-th call of all of them is sent at the same instant.
+        period_ns: Time between two calls of a client; it does not wait for the response.
+        start_ns: When the clients appear and call first; a request waits for the server as a real client would.
+    """
+
+    service: str
+    type: str
+    requests: tuple[Mapping[str, FieldSpec], ...]
+    calls: int = 1
+    clients: int = 1
+    period_ns: int = NS_PER_S
+    start_ns: int = 0
+
+
+Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +200,9 @@ class Scenario:
         span: How long it is observed.
         stimuli: What the grader publishes.
         limits: How much the processes may use, and how much is recorded.
+        starts_ns: `(process, t_ns)` of processes that start late; the others start at 0.
+        may_exit: Processes that are free to end by themselves: with code 0 that is no fault.
+        shutdown_ns: How long the processes may take to end after the stop signal, if that is looked at; 0 if not.
     """
 
     id: str
@@ -106,6 +210,9 @@ class Scenario:
     span: Span
     stimuli: tuple[Stimulus, ...] = ()
     limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    starts_ns: tuple[tuple[str, int], ...] = ()
+    may_exit: tuple[str, ...] = ()
+    shutdown_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

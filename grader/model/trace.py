@@ -60,6 +60,48 @@ class Delivery:
 
 
 @dataclass(frozen=True, slots=True)
+class Request:
+    """One request of a service call between the grader and a student's node.
+
+    Attributes:
+        t_ns: When the grader sent it, or took it.
+        service: Absolute name.
+        type: e.g. `std_srvs/srv/Trigger`.
+        number: Pairs it with its response; counts from 1 within a service and a sender.
+        sender: `grader` where a student's server is asked, `student` where a student's client asks.
+        client: Which of the grader's clients asked, from 1; 0 is a student's.
+        value: Fields as plain JSON values, as for Message.
+        cdr: The bytes, where they are known.
+    """
+
+    t_ns: int
+    service: str
+    type: str
+    number: int
+    sender: str
+    client: int
+    value: Mapping[str, Any]
+    cdr: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """One response of a service call; attributes as for Request, whose number it has.
+
+    The sender is whoever answers: `student` where a student's server was asked.
+    """
+
+    t_ns: int
+    service: str
+    type: str
+    number: int
+    sender: str
+    client: int
+    value: Mapping[str, Any]
+    cdr: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
 class LogRecord:
     """One record written through an rclpy logger.
 
@@ -122,12 +164,30 @@ class Endpoint:
 
 
 @dataclass(frozen=True, slots=True)
+class ServiceEnd:
+    """One server or client of a service in the live graph, without those that every node has.
+
+    Attributes:
+        kind: `service` or `client`.
+        service: Absolute name.
+        type: e.g. `std_srvs/srv/Trigger`.
+        node: Fully qualified node name.
+    """
+
+    kind: str
+    service: str
+    type: str
+    node: str
+
+
+@dataclass(frozen=True, slots=True)
 class GraphSnapshot:
-    """The live ROS graph at one moment, without the grader's own nodes; endpoints sorted."""
+    """The live ROS graph at one moment, without the grader's own nodes; endpoints and services sorted."""
 
     t_ns: int
     nodes: tuple[str, ...]
     endpoints: tuple[Endpoint, ...]
+    services: tuple[ServiceEnd, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +236,11 @@ class Offer:
 class Mark:
     """A moment of the scenario itself.
 
-    Names: `stream_starts` and `stream_stops` (detail: the topic of the stimulus), `limit` (detail: a sentence).
+    Names: `stream_starts` and `stream_stops` (detail: the topic of the stimulus), `server_starts` and `server_stops`
+    (detail: the service of the grader's server), `process_starts` (detail: a process that starts late), `exited`
+    (detail: a process that was free to end, and did with code 0), `stop_signal` (detail: the process that was sent
+    one), `stopped` (detail: a process that ended with code 0 or by that very signal after it), `limit` (detail: a
+    sentence).
     """
 
     t_ns: int
@@ -185,7 +249,7 @@ class Mark:
 
 
 Kind = TypeVar("Kind")
-Observation = Message | Delivery | LogRecord | OutputLine | GraphSnapshot | Fault | Offer | Mark
+Observation = Message | Delivery | Request | Response | LogRecord | OutputLine | GraphSnapshot | Fault | Offer | Mark
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,6 +292,14 @@ class Trace:
         """Return what the grader published on a topic."""
         return tuple(o for o in self.of(Delivery) if o.topic == topic)
 
+    def requests(self, service: str, sender: str) -> tuple[Request, ...]:
+        """Return the requests of a service that `student` or `grader` sent."""
+        return tuple(o for o in self.of(Request) if (o.service, o.sender) == (service, sender))
+
+    def responses(self, service: str, sender: str) -> tuple[Response, ...]:
+        """Return the responses of a service that `student` or `grader` sent."""
+        return tuple(o for o in self.of(Response) if (o.service, o.sender) == (service, sender))
+
     def records(self, process: str | None = None) -> tuple[LogRecord, ...]:
         """Return the records written through rclpy loggers, by one process or by all."""
         return tuple(o for o in self.of(LogRecord) if process in (None, o.process))
@@ -251,4 +323,9 @@ class Trace:
     def endpoints(self, kind: str, topic: str | None = None) -> tuple[Endpoint, ...]:
         """Return every `publisher` or `subscription` that was ever in the graph, each once, in order of appearance."""
         seen = (e for g in self.graphs() for e in g.endpoints if e.kind == kind and topic in (None, e.topic))
+        return tuple(dict.fromkeys(seen))
+
+    def service_ends(self, kind: str, service: str | None = None) -> tuple[ServiceEnd, ...]:
+        """Return every `service` or `client` that was ever in the graph, each once, in order of appearance."""
+        seen = (e for g in self.graphs() for e in g.services if e.kind == kind and service in (None, e.service))
         return tuple(dict.fromkeys(seen))
