@@ -82,6 +82,7 @@ class _Everyday(click.Command):
 @click.command(cls=_Everyday, epilog=_EPILOG)
 @click.argument("submission")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from the files' digest.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
@@ -120,6 +121,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     *,
     submission: str,
     exercises: tuple[str, ...],
+    every: bool,
     seed: int | None,
     odom_bag: Path | None,
     as_json: bool,
@@ -141,6 +143,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     request = session.Request(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
+        every=every,
         rubrics=rubrics,
         seed=seed,
         odom_bag=odom_bag,

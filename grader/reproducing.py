@@ -36,6 +36,8 @@ def command_words(request: Request, seed: int) -> tuple[str, ...]:
     words = ["grade", _plainly_a_path(request.submission)]
     for exercise in request.exercises:
         words += ["--exercise", exercise]
+    if request.every:
+        words.append("--all")
     for rubric in request.rubrics:
         words += ["--rubric", str(rubric)]
     words += ["--seed", str(seed)]

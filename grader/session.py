@@ -13,12 +13,13 @@ from typing import Protocol
 import grader
 from grader.early import EarlyReports
 from grader.judging.whole import judge_run
-from grader.model.errors import RubricError
+from grader.model.errors import RubricError, SubmissionError
 from grader.model.exercise import Exercise
 from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
+from grader.reading.quoting import listed, shown
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
@@ -39,7 +40,9 @@ class Request:
 
     Attributes:
         submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all of the rubrics.
+        exercises: Exercise ids to grade; empty for all of the rubrics, of the built-in ones for those that are not
+            only graded by request.
+        every: Whether to grade every exercise of which the submission has a file, and no other.
         rubrics: Rubric files; empty for the built-in ones.
         seed: Seed of every drawn value; None derives it from the submission.
         odom_bag: An /odom recording to play instead of the project's own.
@@ -50,6 +53,7 @@ class Request:
 
     submission: str
     exercises: tuple[str, ...] = ()
+    every: bool = False
     rubrics: tuple[Path, ...] = ()
     seed: int | None = None
     odom_bag: Path | None = None
@@ -93,6 +97,8 @@ def grade(
         root = studio.folder / "submission"
         root.mkdir()
         submission = stage_submission(request.submission, _wanted(exercises), root)
+        if request.every:
+            exercises, submission = _begun(exercises, submission)
         odometry = read_recording(request, exercises)
         seed = seed_of(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
@@ -124,7 +130,10 @@ def read_exercises(request: Request) -> list[Exercise]:
             nearest = difflib.get_close_matches(wanted, known, n=1, cutoff=0.3)
             hint = f"did you mean {nearest[0]}" if nearest else f"known are {', '.join(known)}"
             raise RubricError(f"--exercise {wanted}: expected one of {', '.join(known)}, found {wanted}", hint)
-    return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
+    if request.exercises:
+        return [exercise for exercise in exercises if exercise.id in request.exercises]
+    everything = request.every or bool(request.rubrics)
+    return [exercise for exercise in exercises if everything or not exercise.by_request]
 
 
 def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:
@@ -142,13 +151,29 @@ def plan_jobs(
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
-            f"exercise {exercise.number}: {scenario.id.replace('_', ' ')}",
+            f"{step_name(exercise)}: {scenario.id.replace('_', ' ')}",
             plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
         )
         for exercise in exercises
         for scenario in exercise.scenarios
         if all(submission.files[name].found for name in scenario.processes)
     }
+
+
+def step_name(exercise: Exercise) -> str:
+    """Return what an exercise is called while it is recorded: `exercise 1`, but `project 1` if its number says so."""
+    number = exercise.number
+    return f"exercise {number}" if number[:1].isdigit() else number.lower()
+
+
+def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
+    """Return the exercises of which a submission has a file, and the submission as they see it."""
+    begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
+    if not begun:
+        where = shown(submission.path, 500)
+        files = listed(_wanted(exercises))
+        raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
+    return begun, replace(submission, files={name: submission.files[name] for name in _wanted(begun)})
 
 
 def _wanted(exercises: Sequence[Exercise]) -> list[str]:

@@ -97,6 +97,7 @@ class Exercise:
         scenarios: What is recorded, in order.
         criteria: What is judged, in order.
         digest: `sha256:` over the rubric file's bytes.
+        by_request: Whether it is graded only where somebody asks for it.
     """
 
     id: str
@@ -107,3 +108,4 @@ class Exercise:
     scenarios: tuple[Scenario, ...]
     criteria: tuple[Criterion, ...]
     digest: str
+    by_request: bool = False

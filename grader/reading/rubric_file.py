@@ -84,6 +84,7 @@ def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
         scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
         criteria=criteria,
         digest=f"sha256:{hashlib.sha256(content).hexdigest()}",
+        by_request=rubric.exercise.by_request,
     )
 
 

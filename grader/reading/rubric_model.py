@@ -36,6 +36,7 @@ class ExerciseShape(Shape):
     number: Number
     title: Text
     required: YesNo = True
+    by_request: YesNo = False
 
 
 class ObserveShape(Shape):

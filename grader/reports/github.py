@@ -63,7 +63,7 @@ def _annotation(exercise: ExerciseReport, verdict: Verdict) -> _Annotation:
     word = wording.OUTCOME_WORDS[verdict.outcome]
     return _Annotation(
         kind=_KINDS[verdict.outcome],
-        title=f"Exercise {number}, {shown(verdict.title)}: {word}, {score}",
+        title=f"{wording.numbered(number)}, {shown(verdict.title)}: {word}, {score}",
         message="\n".join(wording.explanation(verdict)),
         location=verdict.location,
     )

@@ -60,7 +60,12 @@ def exercise_line(exercise: ExerciseReport) -> str:
     """Return number, title and score of an exercise; safe to show as a line of text."""
     number, title = (shown(text, limit=NAME_LIMIT) for text in (exercise.number, exercise.title))
     score = f"{points(exercise.score)} of {points(exercise.max_score)} points"
-    return f"Exercise {number}: {title} ({score}{'' if exercise.required else ', optional'})"
+    return f"{numbered(number)}: {title} ({score}{'' if exercise.required else ', optional'})"
+
+
+def numbered(number: str) -> str:
+    """Return what an exercise is called by its number: `Exercise 1`, but `Project 1` if the number says so itself."""
+    return f"Exercise {number}" if number[:1].isdigit() else number
 
 
 def warnings(report: Report) -> list[str]:

@@ -53,6 +53,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     templates.filters["shown"] = shown
+    templates.filters["numbered"] = wording.numbered
     templates.globals |= {
         "wording": wording,
         "outcome_word": _outcome_word,
