@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 import grader
-from grader.commands import batch, doctor, explain, export, rejudge
+from grader.commands import batch, doctor, explain, export, rejudge, rubric
 from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
@@ -199,6 +199,7 @@ app.add_command(batch.command)
 app.add_command(explain.command)
 app.add_command(doctor.command)
 app.add_command(export.command)
+app.add_command(rubric.command)
 
 
 def main() -> None:
