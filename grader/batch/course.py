@@ -79,6 +79,7 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
         seed=grading.seed,
         clock=grading.clock,
         isolation=grading.isolation,
+        every=grading.every,
     )
 
 

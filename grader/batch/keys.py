@@ -20,6 +20,7 @@ class Conditions:
         seed: The seed that was asked for; None if it follows from the files handed in.
         clock: The clock that was asked for.
         isolation: The sandbox that was asked for.
+        every: Whether only exercises count of which a submission has a file.
     """
 
     grader: str
@@ -28,6 +29,7 @@ class Conditions:
     seed: int | None
     clock: str
     isolation: str
+    every: bool = False
 
     def key(self, submission: str) -> str:
         """Return the key of the result of a submission, by its digest."""

@@ -67,6 +67,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
     request = Request(
         submission=str(task.submission),
         exercises=task.exercises,
+        every=conditions.every,
         rubrics=task.rubrics,
         seed=conditions.seed,
         odom_bag=task.odom_bag,

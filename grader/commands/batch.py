@@ -29,6 +29,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
 @click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from each digest.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
@@ -52,6 +53,7 @@ def command(  # noqa: PLR0913  one parameter an option
     jobs: int | None,
     rerun: str,
     exercises: tuple[str, ...],
+    every: bool,
     rubrics: tuple[Path, ...],
     seed: int | None,
     odom_bag: Path | None,
@@ -88,7 +90,16 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
-        grading=Request("", tuple(dict.fromkeys(exercises)), rubrics, seed, odom_bag, clock, isolation),
+        grading=Request(
+            "",
+            exercises=tuple(dict.fromkeys(exercises)),
+            every=every,
+            rubrics=rubrics,
+            seed=seed,
+            odom_bag=odom_bag,
+            clock=clock,
+            isolation=isolation,
+        ),
         jobs=jobs,
         rerun=rerun,
         standalone=standalone,
