@@ -24,12 +24,12 @@ class Bundle:
     @property
     def script_digest(self) -> str:
         """The script's digest as a Content-Security-Policy writes it."""
-        return _policy_digest(self.script)
+        return policy_digest(self.script)
 
     @property
     def style_digest(self) -> str:
         """The style sheet's digest as a Content-Security-Policy writes it."""
-        return _policy_digest(self.style)
+        return policy_digest(self.style)
 
     @property
     def script_name(self) -> str:
@@ -60,7 +60,8 @@ def _read(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-def _policy_digest(text: str) -> str:
+def policy_digest(text: str) -> str:
+    """Return the digest of an inline script or style sheet as a Content-Security-Policy writes it."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 

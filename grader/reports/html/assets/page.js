@@ -1,6 +1,8 @@
 // Brings the page to life: draws every figure, and gives it buttons, keys, a legend and a table.
 (() => {
-  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const holder = document.getElementById("figures");
+  if (!holder) return; // another page, which only wants the charts
+  const figures = JSON.parse(holder.textContent);
   const PRINTED_WIDTH = 660;
   const drawn = [];
 
