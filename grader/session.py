@@ -19,11 +19,12 @@ from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
+from grader.reading.collected import Collected
 from grader.reading.quoting import listed, shown
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
-from grader.reading.submission import stage_submission
+from grader.reading.submission import stage_collected, stage_submission
 from grader.recording.bag import Odometry, read_odometry
 from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job
@@ -49,6 +50,7 @@ class Request:
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
         workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
+        collected: What was read of the submission before, perhaps elsewhere; None to read it now.
     """
 
     submission: str
@@ -60,6 +62,7 @@ class Request:
     clock: str = "auto"
     isolation: str = "auto"
     workers: int | None = None
+    collected: Collected | None = None
 
 
 class Progress(Protocol):
@@ -96,7 +99,7 @@ def grade(
         exercises = read_exercises(request)
         root = studio.folder / "submission"
         root.mkdir()
-        submission = stage_submission(request.submission, _wanted(exercises), root)
+        submission = _staged(request, exercises, root)
         if request.every:
             exercises, submission = _begun(exercises, submission)
         odometry = read_recording(request, exercises)
@@ -171,13 +174,21 @@ def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[
     begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
     if not begun:
         where = shown(submission.path, 500)
-        files = listed(_wanted(exercises))
+        files = listed(wanted_files(exercises))
         raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
-    return begun, replace(submission, files={name: submission.files[name] for name in _wanted(begun)})
+    return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
 
 
-def _wanted(exercises: Sequence[Exercise]) -> list[str]:
+def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
+    """Return the names of the files that exercises ask for."""
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+
+
+def _staged(request: Request, exercises: Sequence[Exercise], root: Path) -> Submission:
+    wanted = wanted_files(exercises)
+    if request.collected is not None:
+        return stage_collected(request.collected, request.submission, wanted, root)
+    return stage_submission(request.submission, wanted, root)
 
 
 def _release_notes(distro: str) -> tuple[str, ...]:

@@ -34,11 +34,13 @@ class LocalScheduler:
     Args:
         jobs: Submissions at a time.
         command: What grades one; another one only in tests.
+        folder: What relative paths start from; None for the folder that this process is in.
     """
 
-    def __init__(self, jobs: int, command: Sequence[str] = WORKER) -> None:
+    def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs
         self._command = command
+        self._folder = folder
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._closed = False
@@ -112,7 +114,8 @@ class LocalScheduler:
         """Return what a process says of its task at last; None if it ends before."""
         assert process.stdin is not None
         assert process.stdout is not None
-        request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(Path.cwd()), "parent": os.getpid()}
+        folder = self._folder or Path.cwd()
+        request = {"task": msgspec.to_builtins(task, enc_hook=str), "folder": str(folder), "parent": os.getpid()}
         with suppress(OSError):
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.close()

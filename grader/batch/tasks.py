@@ -27,6 +27,7 @@ class Task:
         workers: Most scenarios recorded side by side.
         standalone: Whether the HTML report holds its scripts, instead of sharing them with the class.
         deadline_s: Real time after which the attempt is given up.
+        collected: File of what was read of the submission on another machine; None to read it now.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Task:
     workers: int
     standalone: bool
     deadline_s: float
+    collected: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ import msgspec
 
 from grader.batch import standing as kept
 from grader.batch.keys import unusable_digest
+from grader.batch.parcels import read_collected
 from grader.batch.standing import Standing, State
 from grader.batch.tasks import Task
 from grader.keeping import Keeper
@@ -74,6 +75,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
         clock=conditions.clock,
         isolation=conditions.isolation,
         workers=task.workers,
+        collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
     )
     task.into.mkdir()
     keeper = Keeper([task.into / EVIDENCE], request)

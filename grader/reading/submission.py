@@ -47,18 +47,42 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
             archive cannot be used.
         HarnessError: The copy cannot be written.
     """
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
+
+
+def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
+    """Read a submission without writing anything; as `stage_submission`, which says what is raised.
+
+    Args:
+        path: As there.
+        wanted: As there.
+        into: Where the files will be copied; if that lies in the student's folder, it is no part of the submission.
+    """
     where = shown(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
-        collected = _with_python(collect_folder(source, into=into, where=where), wanted, where)
-    else:
-        collected = _collect_file(source, wanted, where)
+        return _with_python(collect_folder(source, into=into, where=where), wanted, where)
+    return _collect_file(source, wanted, where)
+
+
+def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
+    """Write what was read of a submission, and find the wanted files in it.
+
+    Args:
+        collected: What was read, here or on another machine.
+        path: What the submission is called; nothing needs to be there any more.
+        wanted: As for `stage_submission`.
+        into: As for `stage_submission`.
+
+    Raises:
+        HarnessError: The copy cannot be written.
+    """
     digest = write_files(collected, into)
     names = [name for name, _ in collected.files]
     files = {name: _look_for(name, names, wanted) for name in wanted}
     several = tuple(_several(file) for file in files.values() if file.others)
     return Submission(
-        name=_name(source),
+        name=_name(Path(path)),
         path=path,
         root=into,
         digest=digest,
