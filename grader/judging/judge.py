@@ -48,6 +48,8 @@ def judge_exercise(
         faults=_faults(recorded),
         notes=_notes(recorded, submission, sources),
         graph=_graph(exercise, traces),
+        feedback={c.id: c.feedback for c in exercise.criteria},
+        situations={c.id: c.scenario for c in exercise.criteria},
     )
 
 

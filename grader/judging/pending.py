@@ -22,4 +22,6 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
         clock=ClockKind.VIRTUAL,
         clock_reason="",
         verdicts=tuple(verdicts),
+        feedback={c.id: c.feedback for c in exercise.criteria},
+        situations={c.id: c.scenario for c in exercise.criteria},
     )

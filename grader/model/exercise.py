@@ -8,6 +8,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any, Protocol
 
+from grader.model.feedback import OPEN, Feedback
 from grader.model.scenario import Scenario
 from grader.model.trace import Trace
 
@@ -72,6 +73,7 @@ class Criterion:
         needs: Ids of criteria that must be met or partly met for this one to make sense.
         hint: What to tell a student who did not meet it, if the check has nothing better.
         chapter: Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
+        feedback: How much of its result a student is shown.
     """
 
     id: str
@@ -82,6 +84,7 @@ class Criterion:
     needs: tuple[str, ...] = ()
     hint: str = ""
     chapter: str = ""
+    feedback: Feedback = OPEN
 
 
 @dataclass(frozen=True, slots=True)

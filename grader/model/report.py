@@ -9,6 +9,7 @@ from typing import Any
 
 from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
+from grader.model.feedback import Feedback
 from grader.model.figure import Excerpt, Figure
 from grader.model.trace import ClockKind, GraphSnapshot
 
@@ -73,6 +74,8 @@ class ExerciseReport:
         figures: Pictures of what the nodes did; reports of plain text and data leave them out.
         excerpts: The source around the places that verdicts and faults name.
         expected: Criterion id -> what it asks for, in one phrase.
+        feedback: Criterion id -> how much of its result a student is shown; no report shows this.
+        situations: Criterion id -> scenario that it is judged on; no report shows this.
     """
 
     id: str
@@ -88,6 +91,8 @@ class ExerciseReport:
     figures: tuple[Figure, ...] = ()
     excerpts: tuple[Excerpt, ...] = ()
     expected: Mapping[str, str] = field(default_factory=dict)
+    feedback: Mapping[str, Feedback] = field(default_factory=dict)
+    situations: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def score(self) -> Fraction:
@@ -147,7 +152,7 @@ class Report:
         path: Where it came from, as the user typed it.
         digest: Submission digest.
         environment: What it was made with.
-        seed: The seed of every drawn value, printed so that a run can be repeated.
+        seed: The seed of every drawn value, printed so that a run can be repeated; None where a reader is not told.
         exercises: In the order graded.
         duration_s: Wall time of the run; the only figure that differs between two runs.
         notes: Sentences about the intake.
@@ -160,7 +165,7 @@ class Report:
     path: str
     digest: str
     environment: Environment
-    seed: int
+    seed: int | None
     exercises: tuple[ExerciseReport, ...]
     duration_s: float
     notes: tuple[str, ...] = ()

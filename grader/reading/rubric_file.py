@@ -14,31 +14,22 @@ from pydantic import ValidationError
 from grader.judging.checks import CHECKS
 from grader.model.errors import RubricError
 from grader.model.exercise import Check, Criterion, Exercise
+from grader.model.feedback import Feedback
 from grader.model.limits import Limits
-from grader.model.scenario import (
-    Between,
-    JustAbove,
-    JustBelow,
-    NumberSpec,
-    NumberStream,
-    OdometryStream,
-    Scenario,
-    Span,
-    Stimulus,
-)
+from grader.model.scenario import Scenario, Span
 from grader.reading.check_parameters import build
+from grader.reading.feedback import feedback_of
 from grader.reading.quoting import shown
 from grader.reading.rubric_limits import limits_of
 from grader.reading.rubric_links import broken_links
 from grader.reading.rubric_mistakes import mistakes_of
 from grader.reading.rubric_model import (
     CriterionShape,
-    DrawnShape,
     RubricShape,
     ScenarioShape,
-    StimulusShape,
     rubric_model,
 )
+from grader.reading.rubric_stimuli import stimulus_of
 from grader.reading.shipped import shipped_folder
 from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, read_yaml
 
@@ -151,10 +142,10 @@ def _criteria(
             where = tree.keys[("criteria", index, "check", name)]
             mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
             continue
-        yield _criterion(shape, check)
+        yield _criterion(shape, check, feedback_of(shape.feedback, feedback_of(rubric.feedback)))
 
 
-def _criterion(shape: CriterionShape, check: Check) -> Criterion:
+def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Criterion:
     return Criterion(
         id=shape.id,
         title=shape.title,
@@ -164,6 +155,7 @@ def _criterion(shape: CriterionShape, check: Check) -> Criterion:
         needs=shape.needs,
         hint=" ".join((shape.hint or "").split()),
         chapter=" ".join((shape.chapter or "").split()),
+        feedback=feedback,
     )
 
 
@@ -173,33 +165,16 @@ def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
         after_first_message_on=shape.observe.after_first_message_on,
         wait_at_most_ns=shape.observe.wait_at_most,
     )
-    stimuli = tuple(_stimulus(stimulus) for stimulus in shape.stimuli)
-    return Scenario(shape.id, shape.processes, span, stimuli, limits)
-
-
-def _stimulus(shape: StimulusShape) -> Stimulus:
-    kind, _ = shape.chosen
-    if kind == "odometry":
-        odometry = shape.odometry
-        return OdometryStream(topic=odometry.topic, start_ns=odometry.start, duration_ns=odometry.duration)
-    numbers = shape.numbers
-    return NumberStream(
-        topic=numbers.topic,
-        type=numbers.type,
-        values=tuple(_number(value) for value in numbers.values),
-        period_ns=numbers.period,
-        hold_ns=numbers.hold,
-        start_ns=numbers.start,
+    return Scenario(
+        id=shape.id,
+        processes=shape.processes,
+        span=span,
+        stimuli=tuple(stimulus_of(stimulus) for stimulus in shape.stimuli),
+        limits=limits,
+        starts_ns=tuple((name, shape.start[name]) for name in shape.processes if name in shape.start),
+        may_exit=shape.may_exit,
+        shutdown_ns=shape.shutdown or 0,
     )
-
-
-def _number(value: float | DrawnShape) -> NumberSpec:
-    if not isinstance(value, DrawnShape):
-        return float(value)
-    kind, _ = value.chosen
-    if kind == "between":
-        return Between(*value.between)
-    return JustAbove(value.just_above) if kind == "just_above" else JustBelow(value.just_below)
 
 
 def builtin_rubrics() -> Mapping[str, Path]:

@@ -5,28 +5,23 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, create_model
+from pydantic import Field, create_model
 
 from grader.model.quantities import NS_PER_S
 from grader.reading.check_parameters import Choice, Shape, choice_model
+from grader.reading.feedback import FeedbackField
 from grader.reading.rubric_limits import LimitsShape
+from grader.reading.rubric_stimuli import StimulusShape
 from grader.reading.rubric_types import (
-    Duration,
     Id,
     LongDuration,
-    MessageType,
     Number,
     Points,
     PythonFile,
-    Real,
     Text,
     Topic,
     YesNo,
-    wrong,
 )
-
-#: Default of the keys of a choice that were not chosen; not a value that a rubric can write.
-ABSENT: Any = None
 
 
 class ExerciseShape(Shape):
@@ -47,55 +42,6 @@ class ObserveShape(Shape):
     wait_at_most: LongDuration = 60 * NS_PER_S
 
 
-def _between(low_high: tuple[float, float]) -> tuple[float, float]:
-    if not low_high[0] < low_high[1]:
-        raise wrong("two numbers, the lower one first")
-    return low_high
-
-
-class DrawnShape(Choice):
-    """A number that depends on the seed or on the student's message type."""
-
-    between: Annotated[tuple[Real, Real], AfterValidator(_between)] = ABSENT
-    just_above: Real = ABSENT
-    just_below: Real = ABSENT
-
-
-def _kind_of_number(value: object) -> str:
-    return "drawn" if isinstance(value, dict) else "written"
-
-
-NumberShape = Annotated[
-    Annotated[Real, Tag("written")] | Annotated[DrawnShape, Tag("drawn")], Discriminator(_kind_of_number)
-]
-
-
-class NumbersShape(Shape):
-    """A stimulus: numbers published on a topic, each held for a while."""
-
-    topic: Topic
-    type: MessageType
-    values: tuple[NumberShape, ...] = Field(min_length=1)
-    period: LongDuration
-    hold: LongDuration
-    start: Duration = 0
-
-
-class OdometryShape(Shape):
-    """A stimulus: the recorded odometry."""
-
-    topic: Topic
-    start: Duration = 0
-    duration: LongDuration
-
-
-class StimulusShape(Choice):
-    """Something that the grader publishes."""
-
-    numbers: NumbersShape = ABSENT
-    odometry: OdometryShape = ABSENT
-
-
 class ScenarioShape(Shape):
     """One situation that is recorded once."""
 
@@ -103,6 +49,11 @@ class ScenarioShape(Shape):
     processes: tuple[PythonFile, ...] = Field(min_length=1)
     observe: ObserveShape
     stimuli: tuple[StimulusShape, ...] = ()
+    start: dict[PythonFile, LongDuration] = Field(default={}, description="processes that start late")
+    may_exit: Annotated[tuple[PythonFile, ...], Field(description="processes that are free to end by themselves")] = ()
+    shutdown: Annotated[
+        LongDuration | None, Field(description="how long they may take to end after Ctrl-C, which comes at the end")
+    ] = None
 
 
 class CriterionShape(Shape):
@@ -116,6 +67,7 @@ class CriterionShape(Shape):
     needs: tuple[Id, ...] = ()
     hint: Text | None = None
     chapter: Text | None = None
+    feedback: FeedbackField | None = None
 
 
 class RubricShape(Shape):
@@ -125,6 +77,7 @@ class RubricShape(Shape):
     exercise: ExerciseShape
     files: tuple[PythonFile, ...] = Field(min_length=1)
     limits: LimitsShape = Field(default_factory=LimitsShape)
+    feedback: FeedbackField | None = None
     scenarios: tuple[ScenarioShape, ...] = Field(min_length=1)
     criteria: tuple[CriterionShape, ...] = Field(min_length=1)
 

@@ -98,7 +98,8 @@ def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
 
 def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
     """Each exercise carries the notes of the whole run, for the format has no other place for them."""
-    notes = (*report.notes, *exercise.notes, f"drawn values come from seed {report.seed}")
+    seed = () if report.seed is None else (f"drawn values come from seed {report.seed}",)
+    notes = (*report.notes, *exercise.notes, *seed)
     return list(dict.fromkeys(valid_unicode(note) for note in notes))
 
 

@@ -192,7 +192,8 @@ def run_line(report: Report) -> str:
 
 def reproduction(report: Report) -> list[tuple[str, str]]:
     """Return name and value of all that gives the report again, except the command; safe to show as lines of text."""
-    rows = [("seed", str(report.seed)), ("versions", versions(report)), ("isolation", isolation(report))]
+    rows = [("versions", versions(report)), ("isolation", isolation(report))]
+    rows[:0] = [] if report.seed is None else [("seed", str(report.seed))]
     rows.append(("clock", clock(report)))
     if report.reproduce.rubrics:
         rows.append(("rubrics", ", ".join(f"{id_} {_short(digest)}" for id_, digest in report.reproduce.rubrics)))
