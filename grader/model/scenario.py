@@ -169,7 +169,8 @@ class ServiceCalls:
     """A stimulus: reference clients that call a student's server.
 
     Attributes:
-        service: Absolute name; parameters, actions and lifecycle transitions are calls of the services behind them.
+        service: Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions
+            are calls of the services behind them.
         type: e.g. `std_srvs/srv/Trigger`.
         requests: Fields of each request in order, repeated from the first one if there are fewer than calls.
         calls: How many requests each client sends.
@@ -187,7 +188,29 @@ class ServiceCalls:
     start_ns: int = 0
 
 
-Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls
+@dataclass(frozen=True, slots=True)
+class ActionGoal:
+    """A stimulus: a reference client that sends one goal to a student's action server.
+
+    In the trace its parts are calls of the services behind an action, `/NAME/_action/send_goal`, `get_result` and
+    `cancel_goal`; what the server publishes are messages on `/NAME/_action/feedback` and `status`.
+
+    Attributes:
+        action: Absolute name.
+        type: e.g. `test_msgs/action/Fibonacci`.
+        goal: Fields of the goal.
+        start_ns: When the client appears and sends the goal; it waits for the server as a real client would.
+        cancel_after_ns: Time from the goal's acceptance until it asks to cancel it; 0 for never.
+    """
+
+    action: str
+    type: str
+    goal: Mapping[str, FieldSpec]
+    start_ns: int = 0
+    cancel_after_ns: int = 0
+
+
+Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,25 @@ MAX_BYTES = 256 * 1024
 MAX_MISTAKES = 10
 
 
+class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
+    """A rubric has mistakes.
+
+    Args:
+        where: The file, as messages show it.
+        mistakes: All of them; the message lists the first ones.
+    """
+
+    def __init__(self, where: str, mistakes: Iterable[Mistake]) -> None:
+        self.where = where
+        self.mistakes = tuple(sorted(set(mistakes)))
+        lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in self.mistakes[:MAX_MISTAKES]]
+        if len(self.mistakes) > MAX_MISTAKES:
+            lines.append(f"{where}: {len(self.mistakes) - MAX_MISTAKES} more")
+        hinted = [m for m in self.mistakes[:MAX_MISTAKES] if m.hint]
+        hints = [m.hint if len(self.mistakes) == 1 else f"{m.line}:{m.column}: {m.hint}" for m in hinted]
+        super().__init__("\n".join(lines), "; ".join(hints))
+
+
 def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
     """Read one rubric file.
 
@@ -109,14 +128,7 @@ def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
 
 def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
     """Raise the error that lists mistakes, one a line; with several, each hint says which it belongs to."""
-    where = shown(str(path), 500)
-    ordered = sorted(set(mistakes))
-    lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in ordered[:MAX_MISTAKES]]
-    if len(ordered) > MAX_MISTAKES:
-        lines.append(f"{where}: {len(ordered) - MAX_MISTAKES} more")
-    hinted = [m for m in ordered[:MAX_MISTAKES] if m.hint]
-    hints = [m.hint if len(ordered) == 1 else f"{m.line}:{m.column}: {m.hint}" for m in hinted]
-    raise RubricError("\n".join(lines), "; ".join(hints))
+    raise RubricMistakes(shown(str(path), 500), mistakes)
 
 
 def _validated(path: Path, tree: YamlTree, model: type[RubricShape]) -> RubricShape:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from grader.reading.quoting import listed, shown
 from grader.reading.rubric_mistakes import nearest
@@ -48,14 +49,38 @@ def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree
     yield from _repeated(scenario.processes, (*path, "processes"), tree)
     for number, process in enumerate(scenario.processes):
         yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree)
+    yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
+    for number, process in enumerate(scenario.may_exit):
+        yield from _unknown(process, scenario.processes, "one of `processes`", (*path, "may_exit", number), tree)
+    for process, start_ns in scenario.start.items():
+        yield from _key_unknown(process, scenario.processes, (*path, "start", process), tree)
+        yield from _too_late(start_ns, scenario, (*path, "start", process), tree)
     for number, stimulus in enumerate(scenario.stimuli):
         kind, parameters = stimulus.chosen
-        place: TreePath = (*path, "stimuli", number, kind)
-        if parameters.start >= scenario.observe.duration and scenario.observe.after_first_message_on is None:
-            yield tree.values.get((*place, "start"), TOP).mistake("expected a start before the end of `observe`")
-        if kind == "numbers" and parameters.hold < parameters.period:
-            text = "expected each number to be held for at least one period, found a shorter `hold`"
-            yield tree.values.get((*place, "hold"), TOP).mistake(text)
+        yield from _in_stimulus(kind, parameters, scenario, (*path, "stimuli", number, kind), tree)
+
+
+def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    if name not in known:
+        text = f"expected one of `processes` ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
+        yield tree.keys.get(path, TOP).mistake(text, nearest(name, known))
+
+
+def _too_late(start_ns: int, scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    if start_ns >= scenario.observe.duration and scenario.observe.after_first_message_on is None:
+        yield tree.values.get(path, TOP).mistake("expected a start before the end of `observe`")
+
+
+def _in_stimulus(
+    kind: str, parameters: Any, scenario: ScenarioShape, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    yield from _too_late(parameters.start, scenario, (*path, "start"), tree)
+    if kind == "numbers" and parameters.hold < parameters.period:
+        text = "expected each number to be held for at least one period, found a shorter `hold`"
+        yield tree.values.get((*path, "hold"), TOP).mistake(text)
+    stop_ns = getattr(parameters, "stop", None)
+    if stop_ns is not None and stop_ns <= parameters.start:
+        yield tree.values.get((*path, "stop"), TOP).mistake("expected a stop after the start")
 
 
 def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:

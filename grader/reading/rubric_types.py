@@ -112,6 +112,13 @@ Topic = Annotated[str, Matching(f"(?:/{_NAME})+", "an absolute topic name such a
 MessageType = Annotated[
     str, Matching(f"[a-z][a-z0-9_]*/msg/{_NAME}", "a message type such as std_msgs/msg/Float32", "std_msgs/msg/Float32")
 ]
+ServiceType = Annotated[
+    str, Matching(f"[a-z][a-z0-9_]*/srv/{_NAME}", "a service type such as std_srvs/srv/Trigger", "std_srvs/srv/Trigger")
+]
+ActionType = Annotated[
+    str,
+    Matching(f"[a-z][a-z0-9_]*/action/{_NAME}", "an action type such as pkg/action/Move", "test_msgs/action/Fibonacci"),
+]
 PythonFile = Annotated[
     str,
     Matching(r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"),
