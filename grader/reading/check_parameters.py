@@ -11,14 +11,18 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from typing_extensions import Self
 
+from grader.model import names
 from grader.model.quantities import DurationNs, Hertz
 from grader.reading.quoting import listed
+from grader.reading.rubric_texts import FormulaText, PatternText
 from grader.reading.rubric_types import (
+    ActionType,
     Duration,
     Frequency,
     MessageType,
     PythonFile,
     Real,
+    ServiceType,
     Text,
     Topic,
     Whole,
@@ -33,7 +37,7 @@ _PREFIX = "p_"
 
 #: What a parameter of a certain name has to look like, beyond being text.
 _BY_NAME: Mapping[str, Any] = {
-    **dict.fromkeys(("topic", "input", "output", "forward", "back"), Topic),
+    **dict.fromkeys(("topic", "input", "output", "forward", "back", "service", "action"), Topic),
     "type": MessageType,
     "process": PythonFile,
 }
@@ -41,6 +45,10 @@ _BY_NAME: Mapping[str, Any] = {
 _BY_ANNOTATION: tuple[tuple[Any, Any], ...] = (
     (DurationNs, Duration),
     (Hertz, Frequency),
+    (names.ServiceType, ServiceType),
+    (names.ActionType, ActionType),
+    (names.Formula, FormulaText),
+    (names.Pattern, PatternText),
     (float, Real),
     (int, Whole),
     (bool, YesNo),

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from check_instances import INSTANCES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_fan_check import HONEST, WRONG
@@ -37,21 +38,6 @@ from grader.model.trace import (
     Trace,
 )
 
-INSTANCES: dict[str, Check] = {
-    "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),
-    "topic_rate": CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0),
-    "field_values": CHECKS["field_values"]("/cmd_vel", {"linear.x": 0.5, "angular.z": 0.1}),
-    "uses_logger": CHECKS["uses_logger"]("velocity_publisher.py"),
-    "subscribes": CHECKS["subscribes"]("/odom", ODOMETRY),
-    "logs_position": CHECKS["logs_position"]("odom_subscriber.py", "/odom"),
-    "log_period": CHECKS["log_period"]("odom_subscriber.py", "/odom", NS_PER_S),
-    "waits_gracefully": CHECKS["waits_gracefully"]("odom_subscriber.py", "/odom", 5 * NS_PER_S),
-    "random_in_range": CHECKS["random_in_range"]("/temperature", 20, 30),
-    "logs_received": CHECKS["logs_received"]("temperature_sensor.py", "/fan_speed"),
-    "threshold_response": CHECKS["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above"),
-    "answers_together": CHECKS["answers_together"]("/temperature", "/fan_speed", 25, 100, 0),
-    "bidirectional_graph": CHECKS["bidirectional_graph"]("/temperature", "/fan_speed"),
-}
 TRACES = {
     "velocity": velocity().log(0.0, "started"),
     "half rate": velocity(10.0),

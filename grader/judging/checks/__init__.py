@@ -1,6 +1,7 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
 
 from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
@@ -24,6 +25,7 @@ CHECKS: dict[str, type] = {
     "threshold_response": ThresholdResponse,
     "answers_together": AnswersTogether,
     "bidirectional_graph": BidirectionalGraph,
+    "field_function": FieldFunction,
 }
 
 __all__ = ["CHECKS"]

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
@@ -88,6 +89,10 @@ def _graph(check: BidirectionalGraph) -> str:
     return f"one node reached by {check.forward}, the other by {check.back}, with the types agreeing"
 
 
+def _function(check: FieldFunction) -> str:
+    return f"{check.field} = {check.formula} in every message on {check.topic}, n being 0 in the first one"
+
+
 _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
     {
         Publishes: _publishes,
@@ -103,5 +108,6 @@ _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
         ThresholdResponse: _threshold,
         AnswersTogether: _together,
         BidirectionalGraph: _graph,
+        FieldFunction: _function,
     }
 )

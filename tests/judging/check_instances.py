@@ -1,0 +1,26 @@
+"""One of every check, as a rubric might ask it."""
+
+from __future__ import annotations
+
+from tracing import ODOMETRY, TWIST
+
+from grader.judging.checks import CHECKS
+from grader.model.exercise import Check
+from grader.model.quantities import NS_PER_S
+
+INSTANCES: dict[str, Check] = {
+    "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),
+    "topic_rate": CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0),
+    "field_values": CHECKS["field_values"]("/cmd_vel", {"linear.x": 0.5, "angular.z": 0.1}),
+    "uses_logger": CHECKS["uses_logger"]("velocity_publisher.py"),
+    "subscribes": CHECKS["subscribes"]("/odom", ODOMETRY),
+    "logs_position": CHECKS["logs_position"]("odom_subscriber.py", "/odom"),
+    "log_period": CHECKS["log_period"]("odom_subscriber.py", "/odom", NS_PER_S),
+    "waits_gracefully": CHECKS["waits_gracefully"]("odom_subscriber.py", "/odom", 5 * NS_PER_S),
+    "random_in_range": CHECKS["random_in_range"]("/temperature", 20, 30),
+    "logs_received": CHECKS["logs_received"]("temperature_sensor.py", "/fan_speed"),
+    "threshold_response": CHECKS["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above"),
+    "answers_together": CHECKS["answers_together"]("/temperature", "/fan_speed", 25, 100, 0),
+    "bidirectional_graph": CHECKS["bidirectional_graph"]("/temperature", "/fan_speed"),
+    "field_function": CHECKS["field_function"]("/joint_commands", "sin(0.1 * n)"),
+}
