@@ -17,6 +17,7 @@ from . import entry, originals
 from .alarms import install_alarms
 from .faults import Describer
 from .link import Link
+from .stand_ins import install_stand_ins
 from .virtual import VirtualTime
 from .watchdog import Watchdog
 
@@ -36,6 +37,7 @@ def run(request: dict[str, Any]) -> None:
     time = make_time(request["clock"], link, describer)
     time.install_ros()
     preload()
+    install_stand_ins()
     seed_randomness(request["seed"])
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: os._exit(70))
     start = link.ask({"kind": "ready", "python": sys.version.split()[0]})
