@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +18,12 @@ import grader
 from grader.batch.adjustments import Adjustments, read_adjustments
 from grader.batch.choosing import due_now, key_of
 from grader.batch.classbook import Classbook, ReportData, decisions_for, make_classbook
+from grader.batch.facts import RunOfClass, folders_of, title_of
 from grader.batch.intake import Entry, Intake, take_in
 from grader.batch.keys import Conditions, unusable_digest
 from grader.batch.local import LocalScheduler
 from grader.batch.matching import Matching, match
-from grader.batch.outputs import CLASS, Platforms, class_files, exports
+from grader.batch.outputs import CLASS, class_files, exports
 from grader.batch.people import read_roster
 from grader.batch.request import Course
 from grader.batch.running import ClassRun
@@ -26,7 +32,7 @@ from grader.batch.summary import Graded, summary_json
 from grader.batch.tasks import MakeScheduler
 from grader.batch.watching import Watcher
 from grader.batch.worker import GRADESCOPE, REPORT
-from grader.model.errors import SubmissionError
+from grader.model.errors import GraderError, HarnessError, SubmissionError
 from grader.model.exercise import Exercise
 from grader.recording.leftovers import scratch_folder
 from grader.reproducing import recording_digest
@@ -64,9 +70,16 @@ def grade_class(
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before)
         run = ClassRun(course, exercises, conditions, store, watcher)
-        not_replaced = run.grade(due, warn, make_scheduler)
-        book = _book(store, intake, matching, adjustments, keys)
-        return _written(Graded(book, len(due), before, not_replaced), store, course.platforms)
+        book = partial(_book, store, intake, matching, adjustments, keys)
+        began = time.monotonic()
+        try:
+            not_replaced = run.grade(due, warn, make_scheduler)
+        except (KeyboardInterrupt, HarnessError):
+            with suppress(GraderError):  # what stopped the run says more
+                _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
+            raise
+        graded = Graded(book(), len(due), before, not_replaced)
+        return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
 def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions:
@@ -105,16 +118,36 @@ def _book(
     )
 
 
-def _written(graded: Graded, store: Store, wanted: Platforms) -> Graded:
+def _run(course: Course, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
+    """Return what belongs to this run alone; without what was graded it is one that was stopped."""
+    return RunOfClass(
+        conditions=conditions,
+        title=title_of(course.sources),
+        written=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+        jobs=course.jobs or len(os.sched_getaffinity(0)),
+        took_s=time.monotonic() - began_s,
+        graded=0 if graded is None else graded.graded,
+        kept=0 if graded is None else graded.kept_before,
+        stopped=graded is None,
+        folders=folders_of([*course.sources, course.results, Path.cwd(), Path(tempfile.gettempdir())]),
+    )
+
+
+def _written(graded: Graded, run: RunOfClass, store: Store, course: Course) -> Graded:
     """Write what is made for the whole class, and return the class with what was written."""
+    wanted = course.platforms
     names = [row.name for row in graded.book.rows if row.report is not None] if wanted.gradescope else []
     results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}
     made = exports(graded.book, wanted, results)
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
     remarks = tuple(export.remark for export in made.values() if export.remark)
     graded = replace(graded, left_out=left_out, remarks=remarks)
-    texts = {**class_files(graded.book, made), CLASS: summary_json(graded)}
-    return replace(graded, files=tuple(store.write(name, text.encode()) for name, text in texts.items()))
+    files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
+    return replace(graded, files=_write({CLASS: summary_json(graded).encode(), **files}, store))
+
+
+def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:
+    return tuple(store.write(name, data) for name, data in files.items())
 
 
 def _report(path: Path) -> ReportData | None:

@@ -1,16 +1,21 @@
-"""What is written for the whole class: the gradebook, the class as JSON, and files for the platforms asked for."""
+"""What is written for the whole class: the page, the gradebook, JSON, and files for the platforms asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from grader.batch.class_page import class_page
 from grader.batch.classbook import Classbook
+from grader.batch.facts import RunOfClass
 from grader.batch.gradebook import render_gradebook
 from grader.batch.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
+from grader.reports.class_page.bundle import class_assets
+from grader.reports.class_page.contents import PageLink
+from grader.reports.class_page.render import render_class
 
-GRADEBOOK, CLASS = "gradebook.csv", "batch.json"
+PAGE, GRADEBOOK, CLASS, ASSETS = "index.html", "gradebook.csv", "batch.json", "assets"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +63,27 @@ def exports(book: Classbook, wanted: Platforms, results: Mapping[str, str]) -> d
     return made
 
 
-def class_files(book: Classbook, made: Mapping[str, Export]) -> dict[str, str]:
-    """Return name below the folder for results -> content, of all that is made for the class."""
-    files = {GRADEBOOK: render_gradebook(book)}
+def class_files(
+    book: Classbook,
+    made: Mapping[str, Export],
+    run: RunOfClass,
+    *,
+    links: Sequence[PageLink] = (),
+    standalone: bool = False,
+) -> dict[str, bytes]:
+    """Return name below the folder for results -> content, of all that is made for the class; the page is last.
+
+    Args:
+        book: The class.
+        made: What platforms are told.
+        run: The run that writes it.
+        links: Other pages in the folder, which the page of the class leads to.
+        standalone: Whether the page holds its scripts, instead of sharing them with the reports.
+    """
+    files = {GRADEBOOK: render_gradebook(book).encode()}
     for export in made.values():
-        files.update(export.files)
+        files.update({name: text.encode() for name, text in export.files.items()})
+    if not standalone:
+        files.update({f"{ASSETS}/{name}": data for name, data in class_assets().items()})
+    files[PAGE] = render_class(class_page(book, run, links), assets=None if standalone else ASSETS).encode()
     return files

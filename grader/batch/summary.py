@@ -10,11 +10,14 @@ from typing import Any
 
 from grader.batch.classbook import Classbook, Row, Status
 from grader.batch.gradebook import number, remarks
+from grader.reports.class_page.contents import PageLink
 from grader.reports.escape import json_value, shown
 from grader.reports.json_report import json_text
 
 SCHEMA = "grader/batch/v1"
 _MOST = 10
+#: Endings of files that people open.
+_OPENED = (".csv", ".html")
 _MINUS = {Status.GRADED, Status.MISSING}
 
 
@@ -30,6 +33,7 @@ class Graded:
         files: What was written for the whole class.
         left_out: Platform -> who is not in its file, and why.
         remarks: What else must be known of those files.
+        links: Pages of their own in the folder for results, which the page of the class leads to.
     """
 
     book: Classbook
@@ -39,6 +43,7 @@ class Graded:
     files: tuple[Path, ...] = ()
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    links: tuple[PageLink, ...] = ()
 
 
 def render_summary(graded: Graded) -> str:
@@ -50,7 +55,7 @@ def render_summary(graded: Graded) -> str:
     lines += _lists(book, graded.not_replaced)
     lines += [f"not in {platform}: {line}" for platform, out in graded.left_out.items() for line in out]
     lines += [f"note: {remark}" for remark in graded.remarks]
-    lines += [f"written: {shown(str(path), limit=300)}" for path in graded.files if path.suffix == ".csv"]
+    lines += [f"written: {shown(str(path), limit=300)}" for path in graded.files if path.suffix in _OPENED]
     return "\n".join(lines) + "\n"
 
 

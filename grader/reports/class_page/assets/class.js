@@ -1,0 +1,236 @@
+// Brings the page of a class to life: the chart of scores, and a table to sort and to search. Text is only ever set as text.
+(() => {
+  const data = JSON.parse(document.getElementById("class").textContent);
+  const byId = (id) => document.getElementById(id);
+  const table = byId("table");
+  const body = table.tBodies[0];
+  const rows = [...body.rows];
+  const LETTERS = { met: "m", partly: "p", not_met: "n", blocked: "b", undecided: "u", lost: "np" };
+  const PRINTED_WIDTH = 660;
+
+  // ---- order
+  const collator = new Intl.Collator("en", { numeric: true, sensitivity: "base" });
+  const order = (values) => {
+    const sorted = [...values.keys()].sort((a, b) => collator.compare(values[a], values[b]) || a - b);
+    const place = new Array(values.length);
+    let rank = -1;
+    sorted.forEach((index, k) => {
+      if (!k || collator.compare(values[index], values[sorted[k - 1]])) rank += 1;
+      place[index] = rank;
+    });
+    return place;
+  };
+  const names = order(data.students.map((student) => student.name));
+  const keys = {
+    name: () => names,
+    status: () => order(data.students.map((student) => student.status)),
+    raw: () => data.students.map((student) => student.raw),
+    change: () => data.students.map((student) => student.change),
+    final: () => data.students.map((student) => student.final),
+    exercise: (head) => data.students.map((student) => student.exercises[Number(head.dataset.index)]),
+  };
+
+  // Rows without a value come last, whichever way the others go; equal ones go by name.
+  function sort(head, descending) {
+    const values = keys[head.dataset.sort](head);
+    const way = descending ? -1 : 1;
+    const sorted = [...rows.keys()].sort((a, b) => {
+      if (values[a] === null || values[b] === null) return (values[a] === null) - (values[b] === null) || names[a] - names[b];
+      return way * (values[a] - values[b]) || names[a] - names[b] || a - b;
+    });
+    for (const other of table.tHead.querySelectorAll("th[data-sort]")) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", descending ? "descending" : "ascending");
+    body.replaceChildren(...sorted.map((index) => rows[index]));
+  }
+
+  for (const head of table.tHead.querySelectorAll("th[data-sort]")) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => {
+      const before = head.getAttribute("aria-sort");
+      const numbers = head.dataset.sort !== "name" && head.dataset.sort !== "status";
+      sort(head, before ? before === "ascending" : numbers && head.dataset.sort !== "change");
+    });
+  }
+
+  // ---- filters
+  const plain = (text) => text.normalize("NFKD").replace(/\p{M}/gu, "").toLowerCase();
+  let texts = null; // made when somebody searches for the first time
+  let cause = null;
+
+  function matching() {
+    const words = plain(byId("search").value).split(/\s+/).filter(Boolean);
+    if (words.length && !texts) texts = rows.map((row) => plain(row.textContent));
+    const criterion = data.criteria.indexOf(byId("criterion").value);
+    const outcome = LETTERS[byId("outcome").value] || "";
+    const status = byId("status").value;
+    const [least, most] = [byId("least").value, byId("most").value];
+    const inCause = cause === null ? null : new Set(data.causes[cause]);
+    return (student, index) => {
+      if (inCause && !inCause.has(index)) return false;
+      if (status && student.status !== status) return false;
+      const letters = criterion < 0 ? student.outcomes : student.outcomes[criterion];
+      if (outcome && ![...letters].some((letter) => outcome.includes(letter))) return false;
+      if (!outcome && criterion >= 0 && letters === "-") return false;
+      if (least !== "" && !(student.final !== null && student.final >= Number(least))) return false;
+      if (most !== "" && !(student.final !== null && student.final <= Number(most))) return false;
+      return words.every((word) => texts[index].includes(word));
+    };
+  }
+
+  function filter() {
+    const fits = matching();
+    let count = 0;
+    data.students.forEach((student, index) => {
+      const fit = fits(student, index);
+      count += fit;
+      if (rows[index].hidden === fit) rows[index].hidden = !fit;
+    });
+    const which = cause === null ? "" : ` with cause ${cause + 1}`;
+    byId("shown").textContent = count === rows.length ? `${count} rows` : `${count} of ${rows.length} rows${which}`;
+  }
+
+  function only(change) {
+    byId("filters").reset();
+    cause = null;
+    change();
+    filter();
+    byId("students").scrollIntoView();
+    byId("shown").setAttribute("tabindex", "-1");
+    byId("shown").focus({ preventScroll: true });
+  }
+
+  const form = byId("filters");
+  form.hidden = false;
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("input", () => filter());
+  form.addEventListener("reset", () => setTimeout(() => { cause = null; filter(); }));
+  // What is wanted of a criterion is nearly always who failed it.
+  byId("criterion").addEventListener("input", () => {
+    if (byId("criterion").value && !byId("outcome").value) byId("outcome").value = "lost";
+  });
+  for (const button of document.querySelectorAll("button[data-criterion]")) {
+    button.addEventListener("click", () => only(() => {
+      byId("criterion").value = button.dataset.criterion;
+      byId("outcome").value = button.dataset.outcome;
+    }));
+  }
+  for (const button of document.querySelectorAll("button[data-cause]")) {
+    button.addEventListener("click", () => only(() => { cause = Number(button.dataset.cause); }));
+  }
+
+  // ---- chart
+  const figure = document.querySelector("[data-figure=scores]");
+  const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
+  let chart = null;
+  let pointed = -1;
+
+  const words = (bin) => `${bin[0]}: ${bin[3]} as graded${data.changed ? `, ${bin[4]} after adjustments` : ""}`;
+
+  function tip(params) {
+    const box = document.createElement("div");
+    box.className = "tip";
+    box.textContent = words(data.bins[params[0].dataIndex]);
+    return box;
+  }
+
+  function bars(name, column, tone) {
+    return {
+      name,
+      type: "bar",
+      data: data.bins.map((bin) => bin[column]),
+      itemStyle: { color: Charts.colour(tone), borderRadius: [3, 3, 0, 0] },
+      label: { show: true, position: "top", ...FONT, formatter: ({ value }) => (value ? String(value) : "") },
+      barGap: "8%",
+      barCategoryGap: "18%",
+      animation: false,
+      emphasis: { disabled: true },
+    };
+  }
+
+  function paint(width) {
+    const drawing = figure.querySelector(".drawing");
+    const height = 260;
+    drawing.style.height = `${height}px`;
+    if (chart) chart.resize({ width, height });
+    else chart = echarts.init(drawing, null, { renderer: "svg", width, height });
+    const narrow = width < 560;
+    const short = (label) => (narrow ? label.replace(/ to .*/, "") : label);
+    chart.setOption({
+      animation: false,
+      grid: { left: 36, right: 8, top: data.changed ? 40 : 18, bottom: 44, outerBoundsMode: "none" },
+      legend: { show: data.changed, top: 0, left: 0, textStyle: FONT, selectedMode: false },
+      xAxis: {
+        type: "category",
+        data: data.bins.map((bin) => short(bin[0])),
+        name: narrow ? "percent of the points, from" : "percent of the points",
+        nameLocation: "middle",
+        nameGap: 28,
+        nameTextStyle: FONT,
+        axisLabel: { ...FONT, interval: 0, fontSize: narrow ? 10 : 12, formatter: (text) => text.replace(" %", "") },
+        axisLine: { lineStyle: { color: Charts.colour("axis") } },
+        axisTick: { show: false },
+      },
+      yAxis: {
+        type: "value",
+        minInterval: 1,
+        axisLabel: FONT,
+        splitLine: { lineStyle: { color: Charts.colour("grid") } },
+      },
+      tooltip: {
+        trigger: "axis",
+        axisPointer: { type: "shadow" },
+        confine: true,
+        transitionDuration: 0,
+        backgroundColor: "var(--card)",
+        borderColor: "var(--line)",
+        textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
+        formatter: tip,
+      },
+      series: [bars("as graded", 3, "main"), ...(data.changed ? [bars("after adjustments", 4, "second")] : [])],
+    }, { notMerge: true });
+    const picture = drawing.querySelector("svg");
+    if (picture) picture.setAttribute("aria-hidden", "true");
+  }
+
+  // Shows the students of a bar; their final scores decide.
+  function pick(index) {
+    const [, low, high] = data.bins[index];
+    only(() => {
+      byId("least").value = String(low * data.max_score);
+      if (index < data.bins.length - 1) byId("most").value = String(Math.max(0, high * data.max_score - 0.01));
+    });
+  }
+
+  function walk(way) {
+    pointed = Math.min(Math.max(pointed + way, 0), data.bins.length - 1);
+    chart.dispatchAction({ type: "showTip", seriesIndex: 0, dataIndex: pointed });
+    figure.querySelector("[data-said]").textContent = words(data.bins[pointed]);
+  }
+
+  function draw() {
+    const drawing = figure.querySelector(".drawing");
+    let width = drawing.clientWidth || 640;
+    paint(width);
+    chart.on("click", (event) => pick(event.dataIndex));
+    const acts = { ArrowRight: () => walk(1), ArrowLeft: () => walk(-1), Enter: () => pointed >= 0 && pick(pointed) };
+    drawing.addEventListener("keydown", (event) => {
+      if (!acts[event.key]) return;
+      event.preventDefault();
+      acts[event.key]();
+    });
+    let printing = false;
+    new ResizeObserver(() => {
+      if (printing || !drawing.clientWidth || drawing.clientWidth === width) return;
+      width = drawing.clientWidth;
+      paint(width);
+    }).observe(drawing);
+    window.addEventListener("beforeprint", () => { printing = true; paint(PRINTED_WIDTH); });
+    window.addEventListener("afterprint", () => { printing = false; paint(width); });
+  }
+
+  if (figure) draw();
+  document.documentElement.dataset.ready = "yes";
+})();
