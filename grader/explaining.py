@@ -44,6 +44,28 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     raise _unknown(name, [c.id for _, c in pairs])
 
 
+def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what every criterion of some rubrics asks; of the built-in ones if none is named.
+
+    Raises:
+        RubricError: A rubric cannot be used.
+    """
+    return [_criterion(e, c) for e in read_exercises(Request("", rubrics=rubrics)) for c in e.criteria]
+
+
+def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what every check asks, and which criteria of some rubrics use it.
+
+    Raises:
+        RubricError: A rubric cannot be used.
+    """
+    pairs = [(e, c) for e in read_exercises(Request("", rubrics=rubrics)) for c in e.criteria]
+    used: dict[str, list[str]] = {}
+    for e, c in pairs:
+        used.setdefault(check_name(c.check), []).append(f"{e.id}/{c.id}")
+    return [_check(name, used.get(name, [])) for name in CHECKS]
+
+
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     name = check_name(criterion.check)

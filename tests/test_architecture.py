@@ -10,12 +10,16 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
+#: All rooms but the host's, and but the commands: what stands at the top may use them.
+BELOW_COMMANDS = {"entry", "batch", "authoring", "exporting", "reports", "recording", "judging", "reading", "model"}
 #: Room -> rooms it may import. Entries are at the top, the vocabulary at the bottom.
 MAY_IMPORT = {
-    "entry": {"entry", "commands", "batch", "exporting", "reports", "recording", "judging", "reading", "model"},
-    "commands": {"commands", "entry", "batch", "exporting", "reports", "recording", "judging", "reading", "model"},
+    "entry": BELOW_COMMANDS | {"commands"},
+    "commands": BELOW_COMMANDS | {"commands"},
     # A class is graded by what grades one submission.
     "batch": {"batch", "entry", "reports", "recording", "reading", "model"},
+    # A skeleton is written from what the reference does, and tried on it as a submission would be.
+    "authoring": {"authoring", "entry", "reading", "judging", "model"},
     "exporting": {"exporting", "reading", "model"},
     "reports": {"reports", "model"},
     "recording": {"recording", "model"},

@@ -33,6 +33,14 @@ def explanations_to_json(found: Sequence[CriterionExplanation | CheckExplanation
     return json.dumps({"schema": SCHEMA, "explanations": rows}, indent=2) + "\n"
 
 
+def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
+    """Return the checks among explanations as a list: name, and what it asks."""
+    checks = [e for e in found if isinstance(e, CheckExplanation)]
+    column = max((len(e.name) for e in checks), default=0) + 2
+    lines = (line for e in checks for line in _wrapped(f"{e.name:<{column}}", shown(e.asks), width, after=column))
+    return "\n".join(lines) + "\n"
+
+
 def _criterion(e: CriterionExplanation, width: int) -> Iterator[str]:
     yield f"{e.id}: {shown(e.title)}"
     yield from _row("exercise", e.exercise, width)

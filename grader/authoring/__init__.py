@@ -1,0 +1,1 @@
+"""What authors of rubrics need: rubrics looked over, and skeletons of new ones."""

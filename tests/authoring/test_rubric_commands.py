@@ -1,0 +1,117 @@
+"""The commands `grade rubric check`, `schema` and `explain`: what authors are told about their rubrics."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from grader import cli
+from grader.judging.checks import CHECKS
+from grader.reading.rubric_schema import schema_text
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+GOOD = """\
+schema: grader/rubric/v1
+exercise: {id: pump, number: 7, title: A pump}
+files: [pump.py]
+scenarios:
+  - id: alone
+    processes: [pump.py]
+    observe: {duration: 5 s}
+criteria:
+  - id: flows
+    title: Publishes the flow
+    points: 10
+    scenario: alone
+    check:
+      publishes: {topic: /flow, type: std_msgs/msg/Float32}
+    hint: publish it
+"""
+RATE = """\
+  - id: rate
+    title: At 5 Hz
+    points: 2.5
+    scenario: alone
+    check:
+      topic_rate: {topic: /flow, rate: 5 Hz, tolerance: 1 Hz, window: 10 s}
+"""
+
+
+def rubric(*words):
+    return CliRunner().invoke(cli.app, ["rubric", *map(str, words)])
+
+
+def written(folder, text, name="r.yaml"):
+    (folder / name).write_text(text, encoding="utf-8")
+    return folder / name
+
+
+def test_a_good_rubric_is_summed_up(tmp_path):
+    """One line on standard output, no warning, exit code 0."""
+    path = written(tmp_path, GOOD)
+    done = rubric("check", path)
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout == f"{path}: pump: 1 scenario, 1 criterion, 10 points\n"
+
+
+def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path):
+    """Line and column of each, however many there are; exit code 2, and the good rubric is still summed up."""
+    many = GOOD.replace("points: 10", "points: -1") + "".join(f"key{n}: 1\n" for n in range(20))
+    bad, good = written(tmp_path, many, "bad.yaml"), written(tmp_path, GOOD)
+    done = rubric("check", bad, good)
+    assert done.exit_code == 2
+    assert f"error: {bad}:11:13: expected points above 0, found `-1`\n" in done.stderr
+    assert all(f"found `key{n}`" in done.stderr for n in range(20))
+    assert done.stdout.startswith(str(good))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "told"),
+    [
+        ("    hint: publish it\n", "", "9:9", "flows has no hint"),
+        ("points: 10", "points: 11", "8:1", "the points add up to 11"),
+        (
+            "criteria:",
+            "  - {id: idle, processes: [pump.py], observe: {duration: 1 s}}\ncriteria:",
+            "8:10",
+            "idle is recorded, but no",
+        ),
+        ("files: [pump.py]", "files: [pump.py, spare.py]", "3:18", "spare.py is asked for, but no scenario runs it"),
+        ("", RATE.replace("2.5", "5"), "21:71", "window is 10 s, but alone is observed for 5 s only"),
+    ],
+)
+def test_what_is_odd_is_a_warning_with_its_place(tmp_path, old, new, place, told):
+    """Exit code 0 all the same."""
+    path = written(tmp_path, GOOD.replace(old, new, 1) if old else GOOD + new)
+    done = rubric("check", path)
+    assert done.exit_code == 0
+    assert any(line.startswith(f"warning: {path}:{place}: ") and told in line for line in done.stderr.splitlines())
+
+
+def test_the_rubrics_that_come_with_the_grader_are_not_odd():
+    """No warning in any of them."""
+    done = rubric("check", *sorted((ROOT / "rubrics").glob("*.yaml")))
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+def test_the_schema_is_the_one_that_is_shipped():
+    """What editors read, and nothing else."""
+    assert rubric("schema").stdout == schema_text()
+
+
+def test_every_criterion_of_a_file_is_explained(tmp_path):
+    """What it asks and with which values; also for programs."""
+    path = written(tmp_path, GOOD + RATE)
+    done = rubric("explain", path)
+    assert done.exit_code == 0
+    for line in ("flows: Publishes the flow", "rate: At 5 Hz", "    rate: 5 Hz ", "pump.py observed for 5 s"):
+        assert line in done.stdout
+    rows = json.loads(rubric("explain", path, "--json").stdout)["explanations"]
+    assert [(r["kind"], r["id"], r["points"]) for r in rows] == [("criterion", "flows", 10), ("criterion", "rate", 2.5)]
+
+
+def test_all_checks_are_listed():
+    """Each begins a line with its name."""
+    starts = {line.split(" ")[0] for line in rubric("explain", "--checks").stdout.splitlines()}
+    assert set(CHECKS) <= starts
