@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 import grader
-from grader.commands import batch, doctor, explain, export, rejudge, rubric
+from grader.commands import batch, doctor, explain, export, rejudge, rubric, selftest
 from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
@@ -23,9 +23,11 @@ from grader.options import (
     PATH,
     UNDECIDED,
     UNUSABLE,
+    audience_options,
     exit_code,
     parse_outputs,
     parse_percent,
+    readers,
 )
 from grader.progress import shown_progress
 from grader.reports.delivery import Output, deliver, early_delivery, prepared
@@ -115,6 +117,7 @@ class _Everyday(click.Command):
     default="auto",
     help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
+@audience_options
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
 def _grade(  # noqa: PLR0913  one parameter an option
@@ -130,6 +133,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
     min_score: Fraction | None,
     clock: str,
     isolation: str,
+    audience: str | None,
+    as_of: str,
     no_progress: bool,
 ) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
@@ -138,7 +143,9 @@ def _grade(  # noqa: PLR0913  one parameter an option
     """
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
+    for_whom = readers(audience, as_of)
     from grader import keeping, session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+    from grader.reports.audience import told  # noqa: PLC0415  as above
 
     request = session.Request(
         submission=submission,
@@ -154,14 +161,18 @@ def _grade(  # noqa: PLR0913  one parameter an option
     keeper = keeping.Keeper(folders, request)
     pictures = any(output.format in ILLUSTRATED for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
-        report = session.grade(request, progress, keeper.hear, early_delivery(wanted), pictures=pictures)
+        report = session.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
         _warn(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in session.TRIED_ON:
         _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
-    deliver(report, wanted)
-    keeper.write(report)
-    return exit_code(report, min_score)
+    deliver(report, wanted, for_whom)
+    seen = told(report, for_whom)
+    if folders and seen is not report:
+        _warn("the evidence is not kept: it holds what the rubric withholds from students")
+    else:
+        keeper.write(report)
+    return exit_code(seen, min_score)
 
 
 @click.command(name="observe")
@@ -200,6 +211,7 @@ app.add_command(explain.command)
 app.add_command(doctor.command)
 app.add_command(export.command)
 app.add_command(rubric.command)
+app.add_command(selftest.command)
 
 
 def main() -> None:

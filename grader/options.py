@@ -3,20 +3,58 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import date
 from fractions import Fraction
 from pathlib import Path
+from typing import Any, TypeVar
 
 import click
 
+from grader.model.feedback import Audience
 from grader.model.report import Report
 from grader.reports.delivery import Output
 from grader.reports.formats import FORMATS
+from grader.reports.readers import Readers
 
 ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 #: What `-o` calls the folder of recordings that a report rests on.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def audience_options(command: _Command) -> _Command:
+    """Add the options that say who reads the reports, and when."""
+    day = click.option(
+        "--as-of",
+        metavar="DATE",
+        callback=_parse_day,
+        help="Show students what a rubric lets them see on this day, as 2026-12-01; by default today.",
+    )
+    audience = click.option(
+        "--audience",
+        type=click.Choice([audience.value for audience in Audience]),
+        help="Who reads all reports; by default students read those for platforms, and instructors the others.",
+    )
+    return audience(day(command))
+
+
+def readers(audience: str | None, day: str) -> Readers:
+    """Return who reads the reports, as the options of `audience_options` say."""
+    return Readers(None if audience is None else Audience(audience), day)
+
+
+def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
+    del ctx, param
+    if value is None:
+        return date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+    try:
+        if date.fromisoformat(value).isoformat() == value:
+            return value
+    except ValueError:
+        pass
+    raise click.BadParameter(f"expected a date such as 2026-12-01, found {value!r}")
 
 
 def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
@@ -50,7 +88,7 @@ def exit_code(report: Report, min_score: Fraction | None) -> int:
     """Return what the exit code says about a report.
 
     Args:
-        report: The result.
+        report: The result, as far as whoever sees the exit code may see it.
         min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
     """
     if not report.final:

@@ -19,11 +19,13 @@ from grader.model.exercise import Exercise
 from grader.model.report import Report
 from grader.options import UNUSABLE, exit_code
 from grader.recording.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
+from grader.reports.audience import told
 from grader.reports.changes import Change, change
 from grader.reports.delivery import Output
 from grader.reports.destination import write_whole
-from grader.reports.formats import FORMATS, Layout
+from grader.reports.formats import Layout, rendered
 from grader.reports.json_report import dumps, report_to_json
+from grader.reports.readers import ANYBODY, Readers
 from grader.reports.rejudged import Result
 from grader.reproducing import command_words
 from grader.session import Request, read_exercises
@@ -65,12 +67,14 @@ class Wanted:
         reports: Whether results hold the report as JSON.
         changes: Whether results hold what changed.
         min_score: See `exit_code`.
+        readers: Who reads all that, and when.
     """
 
     files: tuple[Output, ...] = ()
     reports: bool = False
     changes: bool = False
     min_score: Fraction | None = None
+    readers: Readers = ANYBODY
 
 
 def judgement(
@@ -178,27 +182,29 @@ def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Result:
     try:
         evidence = open_evidence(folder)
         report = rejudge(evidence, how)
-        _write(name, report, wanted.files)
+        _write(name, report, wanted)
     except GraderError as error:
         return Result(name, problem=error.message, code=UNUSABLE)
     except OSError as error:
         return Result(name, problem=f"its report cannot be written: {error.strerror or error}", code=UNUSABLE)
+    seen = told(report, wanted.readers)
     return Result(
         name,
-        score=float(report.score),
-        max_score=float(report.max_score),
-        code=exit_code(report, wanted.min_score),
+        score=float(seen.score),
+        max_score=float(seen.max_score),
+        code=exit_code(seen, wanted.min_score),
         change=what_changed(name, evidence, report) if wanted.changes else None,
-        report=dumps(report) if wanted.reports else "",
+        report=dumps(seen) if wanted.reports else "",
     )
 
 
-def _write(name: str, report: Report, files: Sequence[Output]) -> None:
-    for output in files:
+def _write(name: str, report: Report, wanted: Wanted) -> None:
+    for output in wanted.files:
         if output.path is not None:
             path = output.path / f"{name}{ENDINGS.get(output.format, '.json')}"
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, FORMATS[output.format](report, Layout(_WIDTH, colour=False)).encode())
+            text = rendered(output.format, report, Layout(_WIDTH, colour=False), wanted.readers)
+            write_whole(path, text.encode())
 
 
 def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.options import EVIDENCE, PATH, exit_code, parse_outputs, parse_percent
+from grader.options import EVIDENCE, PATH, audience_options, exit_code, parse_outputs, parse_percent, readers
 from grader.reports.delivery import Output, deliver, prepared, show
 from grader.reports.formats import FORMATS, ILLUSTRATED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from grader.rejudging import Judgement
+    from grader.rejudging import Judgement, Wanted
+    from grader.reports.readers import Readers
 
 
 @click.command(name="rejudge")
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 @click.option("--diff", "show_changes", is_flag=True, help="Print what changed since grading, dropped marks first.")
 @click.option("--verify", is_flag=True, help="Make sure that recordings show what is judged; slower.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes for a class; by default one a core.")
+@audience_options
 def command(  # noqa: PLR0913  one parameter an option
     *,
     evidence: tuple[Path, ...],
@@ -53,6 +55,8 @@ def command(  # noqa: PLR0913  one parameter an option
     show_changes: bool,
     verify: bool,
     jobs: int | None,
+    audience: str | None,
+    as_of: str,
 ) -> int:
     """Judge kept EVIDENCE again, of one submission or of a whole class, without running anything.
 
@@ -66,6 +70,9 @@ def command(  # noqa: PLR0913  one parameter an option
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
+    for_whom = readers(audience, as_of)
+    if show_changes and for_whom.only_students:
+        raise click.BadParameter("--diff tells reasons as they are: it is for instructors")
     how = rejudging.judgement(
         tuple(dict.fromkeys(exercises)),
         rubrics,
@@ -74,42 +81,39 @@ def command(  # noqa: PLR0913  one parameter an option
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])
     if one and not show_changes:
-        return _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score)
-    return _class(evidence, how, outputs, min_score, as_json=as_json, show_changes=show_changes, jobs=jobs)
+        return _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score, for_whom)
+    wanted = rejudging.Wanted(
+        tuple(outputs),
+        reports=as_json and not show_changes,
+        changes=show_changes,
+        min_score=min_score,
+        readers=for_whom,
+    )
+    return _class(evidence, how, wanted, as_json=as_json, jobs=jobs)
 
 
-def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None) -> int:
+def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
     """Deliver the report of one submission as grading does."""
     from grader import rejudging  # noqa: PLC0415  as above
     from grader.recording.evidence.store import open_evidence  # noqa: PLC0415
+    from grader.reports.audience import told  # noqa: PLC0415
 
     wanted = prepared(outputs)
     report = rejudging.rejudge(open_evidence(folder), how)
-    deliver(report, wanted)
-    return exit_code(report, min_score)
+    deliver(report, wanted, for_whom)
+    return exit_code(told(report, for_whom), min_score)
 
 
-def _class(  # noqa: PLR0913  as above
-    evidence: Sequence[Path],
-    how: Judgement,
-    outputs: Sequence[Output],
-    min_score: Fraction | None,
-    *,
-    as_json: bool,
-    show_changes: bool,
-    jobs: int | None,
-) -> int:
+def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None) -> int:
     """Print what became of every submission, and write one file for each of them and each format."""
     from grader import rejudging  # noqa: PLC0415  as above
     from grader.reports.rejudged import render_changes, render_results, results_to_json  # noqa: PLC0415  as above
 
-    if any(output.path is None for output in outputs):
+    if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
-    reports = as_json and not show_changes
-    wanted = rejudging.Wanted(tuple(outputs), reports=reports, changes=show_changes, min_score=min_score)
     results = rejudging.rejudge_class(rejudging.named_evidence(evidence), how, wanted, jobs=jobs)
     if as_json:
-        show(lambda _: results_to_json(results, changes=show_changes), for_people=False)
+        show(lambda _: results_to_json(results, changes=wanted.changes), for_people=False)
     else:
-        show(lambda _: render_changes(results) if show_changes else render_results(results), for_people=True)
+        show(lambda _: render_changes(results) if wanted.changes else render_results(results), for_people=True)
     return next(rejudging.codes(results))

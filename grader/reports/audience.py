@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 from grader.model.exercise import Location, Outcome
-from grader.model.feedback import DUE_DATE, OPEN, PUBLISHED, Audience, Shows, strictest
+from grader.model.feedback import DUE_DATE, OPEN, PUBLISHED, Shows, strictest
 from grader.model.figure import Chart, Excerpt, Figure
 from grader.model.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.reports.readers import Readers
 from grader.reports.wording import points
 from grader.reports.wordless import without_numbers
 
@@ -21,22 +22,9 @@ _LEFT_OUT = "pictures, the graph and whatever else would show more than the crit
 _CLOCK = "the reason is not shown"
 
 
-@dataclass(frozen=True, slots=True)
-class Reader:
-    """Who reads a report, and when.
-
-    Attributes:
-        audience: Who.
-        day: The day, as `2026-12-01`, by which dates in a rubric are over or not.
-    """
-
-    audience: Audience
-    day: str
-
-
-def for_reader(report: Report, reader: Reader) -> Report:
-    """Return a report as a reader may see it; instructors see everything."""
-    return report if reader.audience is Audience.INSTRUCTOR else for_student(report, reader.day)
+def told(report: Report, readers: Readers) -> Report:
+    """Return what a run may tell besides its reports, such as scores on a line or an exit code."""
+    return for_student(report, readers.day) if readers.only_students else report
 
 
 def withholds(report: Report, day: str) -> bool:

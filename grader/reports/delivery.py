@@ -15,7 +15,8 @@ from grader.model.errors import GraderError
 from grader.model.report import Report
 from grader.reports.destination import check_writable, write_whole
 from grader.reports.escape import encoded
-from grader.reports.formats import FORMATS, WRITTEN_EARLY, Layout, check_surroundings
+from grader.reports.formats import WRITTEN_EARLY, Layout, check_surroundings, rendered
+from grader.reports.readers import ANYBODY, Readers
 
 _FILE_WIDTH = 100
 # Longer lines are hard to read, however wide the terminal is.
@@ -51,18 +52,23 @@ def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
     return (*files, *(printed or [Output("text")]))
 
 
-def deliver(report: Report, outputs: Sequence[Output]) -> None:
+def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
     """Deliver every report; one that cannot be does not keep the others back.
+
+    Args:
+        report: The whole of it.
+        outputs: The formats, and where they go.
+        readers: Who reads them, and when.
 
     Raises:
         GraderError: A report could not be written.
     """
-    problems = [problem for output in outputs if (problem := _delivered(report, output))]
+    problems = [problem for output in outputs if (problem := _delivered(report, output, readers))]
     if problems:
         raise problems[0]
 
 
-def early_delivery(outputs: Sequence[Output]) -> Callable[[Report], None] | None:
+def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Callable[[Report], None] | None:
     """Return what writes partial reports to the files whose platform may end this run at any time; None without any.
 
     A report that cannot be written is passed over: the whole one will say why.
@@ -71,7 +77,7 @@ def early_delivery(outputs: Sequence[Output]) -> Callable[[Report], None] | None
 
     def write(report: Report) -> None:
         with suppress(GraderError):
-            deliver(report, files)
+            deliver(report, files, readers)
 
     return write if files else None
 
@@ -106,9 +112,9 @@ def _check(output: Output) -> None:
         raise _unwritable(output, error) from error
 
 
-def _delivered(report: Report, output: Output) -> GraderError | None:
+def _delivered(report: Report, output: Output, readers: Readers) -> GraderError | None:
     try:
-        _write(report, output)
+        _write(report, output, readers)
     except OSError as error:
         return _unwritable(output, error)
     return None
@@ -119,12 +125,12 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
     return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
 
 
-def _write(report: Report, output: Output) -> None:
-    render = FORMATS[output.format]
+def _write(report: Report, output: Output, readers: Readers) -> None:
     if output.path is not None:
-        write_whole(output.path, render(report, Layout(_FILE_WIDTH, colour=False)).encode("utf-8"))
+        text = rendered(output.format, report, Layout(_FILE_WIDTH, colour=False), readers)
+        write_whole(output.path, text.encode("utf-8"))
     else:
-        show(lambda layout: render(report, layout), for_people=output.format == "text")
+        show(lambda layout: rendered(output.format, report, layout, readers), for_people=output.format == "text")
 
 
 def _coloured(stream: TextIO) -> bool:

@@ -6,7 +6,9 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from grader.model.feedback import Audience
 from grader.model.report import Report
+from grader.reports.readers import ANYBODY, Readers
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,28 @@ FORMATS: dict[str, Callable[[Report, Layout], str]] = {
     "classroom50": _classroom50,
     "classroom": _classroom,
 }
+
+
+def rendered(format_: str, report: Report, layout: Layout, readers: Readers = ANYBODY) -> str:
+    """Return a report in a format, with what its reader may see of it.
+
+    Args:
+        format_: One of `FORMATS`.
+        report: The whole of it.
+        layout: How a text is laid out.
+        readers: Who reads it, and when.
+    """
+    if readers.of(format_) is Audience.INSTRUCTOR:
+        return FORMATS[format_](report, layout)
+    if format_ == "gradescope":  # the platform itself hides tests, and shows some of them later
+        from grader.reports.gradescope import render_gradescope  # noqa: PLC0415  as above
+
+        return render_gradescope(report, day=readers.day)
+    from grader.reports.audience import for_student  # noqa: PLC0415  as above
+
+    return FORMATS[format_](for_student(report, readers.day), layout)
+
+
 #: Formats that show pictures, which take about as long to draw as judging takes.
 ILLUSTRATED = frozenset({"html"})
 #: Formats whose platform ends a run that takes too long, and then takes what is there.

@@ -25,7 +25,7 @@ _WORD = re.compile(r"[^\s(),;:=\[\]{}<>|\"'`/±*\u00d7\u2018-\u201f]+")
 _SIGNS = "+-\N{MINUS SIGN}"
 _WORDS_FOR_VALUES = ("nan", "inf", "infinity")
 _ONE = rf"(?:{_NUMBER}|{'|'.join(sorted(set(_UNITS.values()), key=len, reverse=True))})"
-_ROW = re.compile(rf"{_ONE}(?:(?: ?[±/*:,\u00d7] ?| to | and | or )+{_ONE})+")
+_ROW = re.compile(rf"{_ONE}(?:(?: ?[±/*,\u00d7] ?|:| to | and | or ){_ONE})+")
 _WITH_UNIT = re.compile(rf"{_NUMBER} ?({'|'.join(sorted(map(re.escape, _UNITS), key=len, reverse=True))})(?![\w/])")
 
 

@@ -92,7 +92,8 @@ def arguments() -> list[str]:
     """Return what was chosen when this autograder was exported; by default, all exercises."""
     path = HERE / "settings.json"
     chosen = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    words = ["--no-progress", "--isolation", chosen.get("isolation", "auto")]
+    # Students can read the release, its files and the log.
+    words = ["--no-progress", "--isolation", chosen.get("isolation", "auto"), "--audience", "student"]
     for exercise in chosen.get("exercises", ()):
         words += ["--exercise", exercise]
     for rubric in chosen.get("rubrics", ()):

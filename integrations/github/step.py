@@ -44,6 +44,7 @@ def main() -> int:
 def command(environment: Mapping[str, str], folder: Path) -> list[str]:
     """Return the command that the inputs ask for; its reports go to a folder that no student can name."""
     words = [program(environment), "--no-progress", "--isolation", environment.get("INPUT_ISOLATION") or "auto"]
+    words += ["--audience", "student"]  # summary, annotations, log and artifact are all theirs to read
     for exercise in re.split(r"[\s,]+", environment.get("INPUT_EXERCISES", "")):
         words += ["--exercise", exercise] if exercise else []
     for line in environment.get("INPUT_RUBRIC", "").splitlines():

@@ -1,0 +1,37 @@
+"""Who reads the reports of a run, by format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.model.feedback import Audience
+
+#: Formats for platforms that show them to students.
+READ_BY_STUDENTS = frozenset({"github", "gradescope", "prairielearn", "classroom50", "classroom"})
+
+
+@dataclass(frozen=True, slots=True)
+class Readers:
+    """Who reads the reports of a run, and when.
+
+    Attributes:
+        audience: Who reads all of them; None for students where a platform shows a format to them, else instructors.
+        day: The day, as `2026-12-01`, by which dates in a rubric are over or not; before all of them if it is empty.
+    """
+
+    audience: Audience | None = None
+    day: str = ""
+
+    def of(self, format_: str) -> Audience:
+        """Return who reads a format."""
+        usual = Audience.STUDENT if format_ in READ_BY_STUDENTS else Audience.INSTRUCTOR
+        return self.audience or usual
+
+    @property
+    def only_students(self) -> bool:
+        """Whether nothing of the run is for instructors, so that not even an exit code may tell more."""
+        return self.audience is Audience.STUDENT
+
+
+#: Nobody is named, so formats say who reads them.
+ANYBODY = Readers()
