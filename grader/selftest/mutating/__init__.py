@@ -1,0 +1,1 @@
+"""Makes mutants and variants of a program; pure: source in, source out."""

@@ -1,0 +1,227 @@
+"""A program as operators see it: its syntax tree with lines, parents and constants, and how a change becomes source."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar, cast
+
+import libcst as cst
+from libcst import matchers as m
+from libcst.metadata import CodeRange, MetadataWrapper, ParentNodeProvider, PositionProvider
+
+Node = TypeVar("Node", bound=cst.CSTNode)
+#: A node and what takes its place: another node, several, or nothing.
+Edit = tuple[cst.CSTNode, cst.CSTNode | cst.FlattenSentinel[Any] | cst.RemovalSentinel]
+
+#: Parameters of what rclpy creates entities with, in order.
+CREATORS: Mapping[str, tuple[str, ...]] = {
+    "create_publisher": ("msg_type", "topic", "qos_profile"),
+    "create_subscription": ("msg_type", "topic", "callback", "qos_profile"),
+    "create_service": ("srv_type", "srv_name", "callback"),
+    "create_client": ("srv_type", "srv_name"),
+    "create_timer": ("timer_period_sec", "callback"),
+    "create_rate": ("frequency",),
+}
+#: What a program sleeps with; the period is the first argument.
+SLEEPS = ("sleep",)
+#: Methods of an rclpy logger.
+LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One way to change a program.
+
+    Attributes:
+        at: Where it is; gives the line.
+        detail: What is changed into what, one line.
+        edits: Nodes of the program and what takes their place.
+    """
+
+    at: cst.CSTNode
+    detail: str
+    edits: tuple[Edit, ...]
+
+
+class Program:
+    """A parsed program.
+
+    Args:
+        source: Its text.
+
+    Raises:
+        libcst.ParserSyntaxError: It is no Python.
+    """
+
+    def __init__(self, source: str) -> None:
+        wrapper = MetadataWrapper(cst.parse_module(source))
+        self.module = wrapper.module
+        self._places = cast("Mapping[cst.CSTNode, CodeRange]", wrapper.resolve(PositionProvider))
+        self._parents = cast("Mapping[cst.CSTNode, cst.CSTNode]", wrapper.resolve(ParentNodeProvider))
+
+    def code(self, node: cst.CSTNode) -> str:
+        """Return the text of a node."""
+        return self.module.code_for_node(node)
+
+    def line(self, node: cst.CSTNode) -> int:
+        """Return the line that a node begins in, from 1."""
+        return self._places[node].start.line
+
+    def all(self, kind: type[Node], inside: cst.CSTNode | None = None) -> list[Node]:
+        """Return the nodes of a kind, in the order of the text."""
+        found = cast("Sequence[Node]", m.findall(inside or self.module, m.MatchIfTrue(lambda n: isinstance(n, kind))))
+        return sorted(found, key=self._start)
+
+    def _start(self, node: cst.CSTNode) -> tuple[int, int]:
+        start = self._places[node].start
+        return start.line, start.column
+
+    def above(self, node: cst.CSTNode) -> Iterator[cst.CSTNode]:
+        """Yield what a node lies in, inside out."""
+        while (parent := self._parents.get(node)) is not None:
+            yield parent
+            node = parent
+
+    def enclosing(self, node: cst.CSTNode, kind: type[Node]) -> Node | None:
+        """Return the innermost node of a kind around a node."""
+        return next((above for above in self.above(node) if isinstance(above, kind)), None)
+
+    def calls(self, *names: str) -> list[cst.Call]:
+        """Return the calls of functions or methods of these names; all calls without one."""
+        return [call for call in self.all(cst.Call) if not names or called(call) in names]
+
+    def constant(self, expression: cst.BaseExpression | None) -> cst.BaseExpression | None:
+        """Return where the value of an expression is written: itself, or what its name was assigned once."""
+        if not isinstance(expression, (cst.Name, cst.Attribute)):
+            return expression
+        values = self._assigned.get(self.code(expression), [])
+        return values[0] if len(values) == 1 else expression
+
+    @cached_property
+    def _assigned(self) -> Mapping[str, list[cst.BaseExpression]]:
+        values: dict[str, list[cst.BaseExpression]] = {}
+        for assign in self.all(cst.Assign):
+            for target in assign.targets:
+                values.setdefault(self.code(target.target), []).append(assign.value)
+        return values
+
+    @cached_property
+    def callbacks(self) -> list[cst.FunctionDef]:
+        """The functions that are handed to timers, subscriptions, services and futures."""
+        handed = [argument(call, "callback") for call in self.calls(*CREATORS)]
+        handed += [call.args[0] for call in self.calls("add_done_callback") if call.args]
+        names = {last_name(arg.value) for arg in handed if arg is not None}
+        return [function for function in self.all(cst.FunctionDef) if function.name.value in names]
+
+    def handed_to(self, creator: str) -> list[cst.FunctionDef]:
+        """Return the functions that are handed to what creates one kind of entity."""
+        handed = (argument(call, "callback") for call in self.calls(creator))
+        names = {last_name(arg.value) for arg in handed if arg is not None}
+        return [function for function in self.callbacks if function.name.value in names]
+
+    def importing(self, line: str) -> tuple[Edit, ...]:
+        """Return the edits that add an import; none if the program has it."""
+        imports = [
+            s for s in self.module.body if m.matches(s, m.SimpleStatementLine(body=[m.Import() | m.ImportFrom()]))
+        ]
+        if not imports or any(self.code(statement).strip() == line for statement in imports):
+            return ()
+        added = cst.parse_statement(line)
+        return ((imports[-1], cst.FlattenSentinel([added, imports[-1]])),)
+
+    def changed(self, edits: Sequence[Edit]) -> str:
+        """Return the source with edits made."""
+        replacements: dict[cst.CSTNode, Any] = {}
+        for old, new in edits:
+            before = replacements.get(old)
+            replacements[old] = new if before is None else _joined(before, new)
+        return self.module.visit(_Replacing(replacements)).code
+
+
+class _Replacing(cst.CSTTransformer):
+    def __init__(self, replacements: Mapping[cst.CSTNode, Any]) -> None:
+        super().__init__()
+        self._replacements = replacements
+
+    def on_leave(self, original_node: Any, updated_node: Any) -> Any:
+        return self._replacements.get(original_node, updated_node)
+
+
+def _joined(one: Any, other: Any) -> Any:
+    """Return two insertions before the same statement as one."""
+    return cst.FlattenSentinel([*list(one)[:-1], *list(other)])
+
+
+def called(call: cst.Call) -> str:
+    """Return the last name of what is called; empty if it has none."""
+    return last_name(call.func)
+
+
+def last_name(expression: cst.BaseExpression) -> str:
+    """Return `b` for `a.b` and for `b`; empty for anything without a name."""
+    if isinstance(expression, cst.Attribute):
+        return expression.attr.value
+    return expression.value if isinstance(expression, cst.Name) else ""
+
+
+def argument(call: cst.Call, name: str) -> cst.Arg | None:
+    """Return the argument of a creator that a parameter's name or place gives; None if there is none."""
+    for arg in call.args:
+        if arg.keyword is not None and arg.keyword.value == name:
+            return arg
+    names = CREATORS.get(called(call), ())
+    place = names.index(name) if name in names else len(call.args)
+    plain = [arg for arg in call.args if arg.keyword is None and not arg.star]
+    return plain[place] if place < len(plain) else None
+
+
+def expression(text: str) -> cst.BaseExpression:
+    """Return an expression from its text."""
+    return cst.parse_expression(text)
+
+
+def statement(text: str) -> Any:
+    """Return a statement from its text."""
+    return cst.parse_statement(text)
+
+
+def text_of(node: cst.CSTNode | None) -> str | None:
+    """Return the value of a plain string; None for anything else."""
+    if not isinstance(node, cst.SimpleString) or isinstance(node.evaluated_value, bytes):
+        return None
+    return node.evaluated_value
+
+
+def string(text: str) -> cst.SimpleString:
+    """Return a string literal, in double quotes."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return cst.SimpleString(f'"{escaped}"')
+
+
+def is_docstring(program: Program, node: cst.CSTNode) -> bool:
+    """Whether a string is a statement of its own."""
+    return isinstance(next(program.above(node), None), cst.Expr)
+
+
+def number_of(node: cst.CSTNode | None) -> float | int | None:
+    """Return the value of a number literal; None for anything else."""
+    return node.evaluated_value if isinstance(node, (cst.Integer, cst.Float)) else None
+
+
+def number(value: float) -> cst.BaseExpression:
+    """Return a literal for a number, without the noise of binary fractions."""
+    text = repr(value) if isinstance(value, int) else repr(float(f"{value:.12g}"))
+    return expression(text)
+
+
+def into(before: str, after: str) -> str:
+    """Return `before -> after`, short and on one line."""
+    return f"{short(before)} -> {short(after)}"
+
+
+def short(text: str, limit: int = 40) -> str:
+    """Return a text as one short line."""
+    line = " ".join(text.split())
+    return line if len(line) <= limit else f"{line[: limit - 1]}…"
