@@ -212,7 +212,6 @@ app.add_command(doctor.command)
 app.add_command(export.command)
 app.add_command(rubric.command)
 app.add_command(selftest.command)
-app.add_command(selftest.command)
 
 
 def main() -> None:
