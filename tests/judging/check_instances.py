@@ -23,4 +23,6 @@ INSTANCES: dict[str, Check] = {
     "answers_together": CHECKS["answers_together"]("/temperature", "/fan_speed", 25, 100, 0),
     "bidirectional_graph": CHECKS["bidirectional_graph"]("/temperature", "/fan_speed"),
     "field_function": CHECKS["field_function"]("/joint_commands", "sin(0.1 * n)"),
+    "logs_every": CHECKS["logs_every"]("velocity_publisher.py", "/cmd_vel", 20, "linear.x"),
+    "logs_values": CHECKS["logs_values"]("temperature_sensor.py", "/fan_speed", unit_factors=(1.0, 2.0)),
 }

@@ -3,6 +3,8 @@
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.log_rhythm import LogsEvery
+from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.rate import TopicRate
@@ -26,6 +28,8 @@ CHECKS: dict[str, type] = {
     "answers_together": AnswersTogether,
     "bidirectional_graph": BidirectionalGraph,
     "field_function": FieldFunction,
+    "logs_every": LogsEvery,
+    "logs_values": LogsValues,
 }
 
 __all__ = ["CHECKS"]

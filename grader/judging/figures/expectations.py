@@ -9,12 +9,15 @@ from typing import Any
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.log_rhythm import LogsEvery
+from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.judging.printed import times
 from grader.judging.wording import number, span, unit_of
 from grader.model.exercise import Check
 from grader.model.quantities import seconds
@@ -93,6 +96,15 @@ def _function(check: FieldFunction) -> str:
     return f"{check.field} = {check.formula} in every message on {check.topic}, n being 0 in the first one"
 
 
+def _rhythm(check: LogsEvery) -> str:
+    return f"one log of {check.process} for every {check.every} messages on {check.topic}; printing alone is half of it"
+
+
+def _logged_values(check: LogsValues) -> str:
+    products = " and ".join(map(times, check.unit_factors))
+    return f"{check.process} logs {products} for each message on {check.topic}; printing alone is half of it"
+
+
 _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
     {
         Publishes: _publishes,
@@ -109,5 +121,7 @@ _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
         AnswersTogether: _together,
         BidirectionalGraph: _graph,
         FieldFunction: _function,
+        LogsEvery: _rhythm,
+        LogsValues: _logged_values,
     }
 )

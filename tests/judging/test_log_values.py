@@ -1,0 +1,156 @@
+"""Angles received in radians, logged in radians and in degrees: rightly in many ways, and wrongly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+from tracing import FLOAT64, Recording
+
+from grader.judging.checks.log_values import LogsValues
+from grader.judging.findings import FAULT_KEY
+from grader.model.errors import HarnessError
+from grader.model.trace import ClockKind
+
+DEGREES = 180 / math.pi
+CHECK = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(1.0, DEGREES))
+ANGLES = [0.0, -0.0, 1.0, -1.0, 3.0417, *(round(1.1 * math.sin(0.37 * k + 0.2), 4) for k in range(35))]
+
+
+def hearing(
+    write: Callable[[float], str] | None = None,
+    printed: bool = False,
+    late_s: float = 0.0,
+    when: Callable[[int], bool] = lambda k: True,
+    angles: list[float] = ANGLES,
+    clock: ClockKind = ClockKind.VIRTUAL,
+) -> Recording:
+    rec = Recording(6.0, clock, "simple_subscriber.py").log(0.0, "Joint Command Subscriber started")
+    rec.endpoint("subscription", "/joint_commands", FLOAT64, "/joint_command_subscriber")
+    for k, angle in enumerate(angles):
+        rec.deliver(1.0 + 0.1 * k, "/joint_commands", {"data": angle}, FLOAT64)
+        text = write(angle) if write is not None and when(k) else ""
+        for part in filter(None, text.split("|")):
+            at = 1.0 + 0.1 * k + late_s
+            rec.line(at, part) if printed else rec.log(at, part)
+    return rec
+
+
+def chapter(angle: float) -> str:
+    return f"Received joint command: {angle:.3f} rad ({angle * (180.0 / 3.14159):.1f}°)"
+
+
+RIGHT: dict[str, Callable[[float], str]] = {
+    "chapter": chapter,
+    "math.degrees": lambda a: f"{a} rad = {math.degrees(a)} deg",
+    "short pi, all digits": lambda a: f"{a} rad = {a * 180 / 3.1416} deg",
+    "two records": lambda a: f"radians: {a:.4f}|degrees: {math.degrees(a):.2f}",
+    "two lines": lambda a: f"rad={a:.2f}\ndeg={math.degrees(a):.1f}",
+    "degrees first": lambda a: f"{math.degrees(a):.2f}° ({a:.2f})",
+    "whole degrees": lambda a: f"{a:.2f} rad, {round(math.degrees(a))} deg",
+    "cut off": lambda a: f"{math.trunc(a * 100) / 100} rad, {int(math.degrees(a))} deg",
+    "short": lambda a: f"{a:g} {math.degrees(a):.4g}",
+    "scientific": lambda a: f"{a:.3e} rad {math.degrees(a):.3e} deg",
+    "signed": lambda a: f"{a:+.3f} / {math.degrees(a):+.1f}",
+    "decimal comma": lambda a: f"{a:.3f} rad ({math.degrees(a):.1f} Grad)".replace(".", ","),
+    "with a count": lambda a: f"message 17: {a:.3f} rad, {math.degrees(a):.1f}°",
+    "as a dictionary": lambda a: str({"rad": a, "deg": math.degrees(a)}),
+    "wrapped beside": lambda a: f"{a:.3f} rad = {math.degrees(a):.1f} deg = {math.degrees(a) % 360:.1f} deg",
+}
+
+
+@pytest.mark.parametrize("write", RIGHT.values(), ids=RIGHT)
+def test_right_conversions_are_met_however_they_are_written(write: Callable[[float], str]) -> None:
+    """To the precision printed, in one record or in two."""
+    finding = CHECK.judge(hearing(write).trace())
+    assert finding.credit == 1, finding.reason
+    assert "40 of 40 messages" in finding.reason
+
+
+def test_a_queue_that_is_emptied_later_leaves_nothing_out() -> None:
+    """Up to a second late, with every number there."""
+    assert CHECK.judge(hearing(RIGHT["math.degrees"], late_s=0.35).trace()).credit == 1
+    assert CHECK.judge(hearing(RIGHT["math.degrees"], late_s=1.2).trace()).credit == 0
+
+
+def test_the_wall_clock_may_be_a_little_off() -> None:
+    """A log may be stamped before its message."""
+    assert CHECK.judge(hearing(chapter, late_s=-0.01, clock=ClockKind.WALL).trace()).credit == 1
+
+
+WRONG: dict[str, tuple[Callable[[float], str], str]] = {
+    "only radians": (lambda a: f"angle {a:.3f} rad", "57.2958 times the value is not there, only the value itself"),
+    "only degrees": (lambda a: f"angle {math.degrees(a):.3f}", "the value itself is not there"),
+    "gradians": (lambda a: f"{a:.3f} rad ({a * 200 / math.pi:.1f})", "gradians"),
+    "inverted": (lambda a: f"{a:.3f} rad ({math.radians(a):.4f})", "inverse"),
+    "pi is 3": (lambda a: f"{a:.3f} rad ({a * 180 / 3:.2f})", "3 for pi"),
+    "not divided": (lambda a: f"{a:.3f} rad ({a * 180:.1f})", "not divided by pi"),
+    "ten times": (lambda a: f"{a:.3f} rad ({math.degrees(a) * 10:.1f})", "instead there is 572.9"),
+    "whole radians": (lambda a: f"{int(a)} rad ({math.degrees(a):.1f})", "whole number"),
+    "absolute": (lambda a: f"{abs(a):.3f} rad ({abs(math.degrees(a)):.1f})", "sign is lost"),
+    "negative": (lambda a: f"{-a:.3f} rad ({-math.degrees(a):.1f})", "the other sign"),
+    "wrapped": (lambda a: f"{a:.3f} rad ({math.degrees(a) % 360:.1f})", "expected -1 and -57.2958"),
+    "constant": (lambda a: "got 0.5 rad (28.6)", "expected"),
+    "no number": (lambda a: "got a message", "expected"),
+    "nan": (lambda a: f"{a} rad ({math.nan})", "expected"),
+}
+
+
+@pytest.mark.parametrize(("write", "said"), WRONG.values(), ids=WRONG)
+def test_wrong_conversions_are_named(write: Callable[[float], str], said: str) -> None:
+    """With what was expected and what was found for the first message."""
+    finding = CHECK.judge(hearing(write).trace())
+    assert finding.credit == 0
+    assert said in finding.reason
+    assert "expected" in finding.reason
+
+
+def test_messages_that_are_left_out_are_counted() -> None:
+    """Every tenth is not each; a share may be enough where the rubric says so."""
+    rec = hearing(chapter, when=lambda k: k % 2 == 0)
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert "20 of 40 messages of /joint_commands are not logged rightly" in finding.reason
+    assert "once for each message" in CHECK.judge(hearing(chapter, when=lambda k: k % 10 == 0).trace()).hint
+    half = LogsValues("simple_subscriber.py", "/joint_commands", unit_factors=(1.0, DEGREES), share=0.5)
+    assert half.judge(rec.trace()).credit == 1
+
+
+def test_printing_is_half() -> None:
+    """Also where some are logged and the rest is printed."""
+    finding = CHECK.judge(hearing(chapter, printed=True).trace())
+    assert finding.credit == Fraction(1, 2)
+    assert "self.get_logger().info" in finding.hint
+    mixed = hearing(chapter, when=lambda k: k < 20)
+    for k, angle in enumerate(ANGLES[20:], 20):
+        mixed.line(1.0 + 0.1 * k, chapter(angle))
+    assert CHECK.judge(mixed.trace()).credit == Fraction(1, 2)
+    assert CHECK.judge(hearing(WRONG["gradians"][0], printed=True).trace()).credit == 0
+
+
+def test_a_crash_is_the_reason_and_nothing_sent_is_ours() -> None:
+    """Before the first message or between two."""
+    early = Recording(6.0, process="simple_subscriber.py").crashed(0.0)
+    assert FAULT_KEY in CHECK.judge(early.trace()).evidence
+    later = hearing(chapter, when=lambda k: k < 20).crashed(3.05)
+    finding = CHECK.judge(later.trace())
+    assert (finding.credit, FAULT_KEY in finding.evidence) == (0, True)
+    deaf = Recording(6.0).endpoint("subscription", "/joint_commands", FLOAT64)
+    with pytest.raises(HarnessError):
+        CHECK.judge(deaf.trace())
+
+
+def test_no_subscription_is_explained() -> None:
+    """The nearest one is named."""
+    rec = Recording(6.0).endpoint("subscription", "/joint_command", FLOAT64)
+    assert "/joint_command" in CHECK.judge(rec.trace()).reason
+    assert CHECK.judge(Recording().trace()).credit == 0
+
+
+def test_plain_values_are_asked_by_default() -> None:
+    """Without factors, the value itself."""
+    check = LogsValues("simple_subscriber.py", "/joint_commands")
+    assert check.judge(hearing(WRONG["only radians"][0]).trace()).credit == 1
+    assert check.judge(hearing(WRONG["only degrees"][0]).trace()).credit == 0
