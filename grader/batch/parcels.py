@@ -22,7 +22,7 @@ MAX_ANSWER_FILES = 1_000
 
 # Names of files are bytes: what a student calls a file need not be text.
 Files = tuple[tuple[bytes, bytes], ...]
-_Parcel = TypeVar("_Parcel", "Terms", "Errand", "Answer", "_Reading")
+_Parcel = TypeVar("_Parcel", "Terms", "Errand", "Answer", "Fitness", "_Reading")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +85,29 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class Fitness:
+    """Whether a machine can grade.
+
+    Attributes:
+        machine: Which one, for people.
+        unfit: Why it can grade nothing; empty if it can.
+        hint: One thing to do about that.
+        remarks: What an instructor must know of its sandbox.
+    """
+
+    machine: str
+    unfit: str = ""
+    hint: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class _Reading:
     files: Files
     notes: tuple[bytes, ...]
 
 
-def pack(parcel: Terms | Errand | Answer) -> bytes:
+def pack(parcel: Terms | Errand | Answer | Fitness) -> bytes:
     """Return a parcel as bytes."""
     return msgspec.msgpack.encode(parcel)
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from grader.batch.cluster.extra import require_dask
 from grader.model.containment import TIERS
 from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED
 from grader.reports.escape import encoded, shown
 
 if TYPE_CHECKING:
     from grader.batch.summary import Graded
+    from grader.batch.tasks import MakeScheduler
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
 _RERUNS = ("changed", "failed", "undecided", "all")
@@ -27,6 +30,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--roster", type=PATH, metavar="CSV", help="The people of the class, as any platform exports them.")
 @click.option("--adjust", "adjustments", type=PATH, metavar="YAML", help="Late days, other scores, what to ignore.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
 @click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
@@ -51,6 +55,7 @@ def command(  # noqa: PLR0913  one parameter an option
     roster: Path | None,
     adjustments: Path | None,
     jobs: int | None,
+    scheduler: str | None,
     rerun: str,
     exercises: tuple[str, ...],
     every: bool,
@@ -75,6 +80,8 @@ def command(  # noqa: PLR0913  one parameter an option
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
+    if scheduler is not None:
+        require_dask()
     from grader.batch.course import grade_class  # noqa: PLC0415  the rest of the grader
     from grader.batch.outputs import platforms  # noqa: PLC0415  as above
     from grader.batch.request import Course  # noqa: PLC0415  as above
@@ -106,13 +113,24 @@ def command(  # noqa: PLR0913  one parameter an option
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
     )
     try:
-        with shown_watcher(wanted=not no_progress) as watcher:
-            graded = grade_class(course, watcher, _warn)
+        with _graders(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
+            graded = grade_class(course, watcher, _warn, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
         return INTERRUPTED
     _print(graded, as_json=as_json)
     return _code(graded)
+
+
+def _graders(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
+    """Return what grades: this machine, or a cluster for as long as it is needed."""
+    if scheduler is None:
+        from grader.batch.local import LocalScheduler  # noqa: PLC0415  as above
+
+        return nullcontext(LocalScheduler)
+    from grader.batch.cluster.connecting import connected  # noqa: PLC0415  an optional library
+
+    return connected(scheduler, jobs, _warn)
 
 
 def _print(graded: Graded, *, as_json: bool) -> None:
