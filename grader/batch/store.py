@@ -128,7 +128,7 @@ class Store:
             shutil.rmtree(old, ignore_errors=True)
             place.rename(old)
         fresh.rename(place)
-        _sync(self._students)
+        _sync_one(self._students)
         shutil.rmtree(old, ignore_errors=True)
 
     def recover(self) -> None:
@@ -188,8 +188,13 @@ def _read(path: Path) -> Standing | None:
 def _sync(folder: Path) -> None:
     """Make the names in a folder, and below it, survive a power failure."""
     for root, _, _ in os.walk(folder):
-        descriptor = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        _sync_one(root)
+
+
+def _sync_one(folder: Path | str) -> None:
+    """Make the names in one folder survive, without those below: in the folder of all students they are many."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
