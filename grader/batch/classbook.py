@@ -43,6 +43,7 @@ class Row:
         problem: Why there is no report, or why the last attempt came to nothing; may be empty.
         standing: What lies in the folder for results; None if there is nothing.
         report: Its report; None if there is none.
+        handed_back: Its report as far as students may see it; None if there is none.
         adjusted: The score, with what was decided about it.
         marked_late: Whether the platform marked it as late.
         outdated: Whether the result is of other files or another rubric than those of now.
@@ -56,6 +57,7 @@ class Row:
     problem: str = ""
     standing: Standing | None = None
     report: ReportData | None = None
+    handed_back: ReportData | None = None
     adjusted: Adjusted = field(default_factory=Adjusted)
     marked_late: bool = False
     outdated: bool = False
@@ -118,6 +120,7 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
     kept: Mapping[str, Kept],
     keys: Mapping[str, str],
     report_of: Callable[[str], ReportData | None],
+    handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
 ) -> Classbook:
     """Put a class together.
@@ -129,6 +132,7 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
         kept: Name -> what lies in the folder for results.
         keys: Name -> what the key of a result of now is; empty if that is not known.
         report_of: Reads the report of a submission.
+        handed_back_of: Reads it as far as students may see it.
         foreign: Names of results of nobody.
 
     Raises:
@@ -143,7 +147,8 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
         rows.append(_row(entry, matching, found, report, keys.get(entry.name, "")))
         raw = exactly(report["score"]) if report is not None and report["final"] else None
         adjusted = adjust(raw, decisions.get(entry.name, Decision()), adjustments)
-        rows[-1] = _with(rows[-1], adjusted, twins.get(entry.name, ()))
+        handed_back = handed_back_of(entry.name) if report is not None else None
+        rows[-1] = replace(rows[-1], handed_back=handed_back, adjusted=adjusted, twin_of=twins.get(entry.name, ()))
     rows += [_missing(person, adjustments) for person in matching.missing]
     late = [row.name for row in rows if row.marked_late and not row.adjusted.days_late]
     remarks = [f"marked as late by the platform, but no late days are named: {', '.join(late)}"] if late else []
@@ -199,7 +204,3 @@ def _missing(person: Person, adjustments: Adjustments) -> Row:
     called = _handles(person)
     decision = next((d for who, d in adjustments.students.items() if fold_handle(who) in called), Decision())
     return Row("", person.name, person, Status.MISSING, adjusted=adjust(None, decision, adjustments))
-
-
-def _with(row: Row, adjusted: Adjusted, twins: tuple[str, ...]) -> Row:
-    return replace(row, adjusted=adjusted, twin_of=twins)

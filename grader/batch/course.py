@@ -31,7 +31,7 @@ from grader.batch.store import Store, open_store
 from grader.batch.summary import Graded, summary_json
 from grader.batch.tasks import MakeScheduler
 from grader.batch.watching import Watcher
-from grader.batch.worker import GRADESCOPE, REPORT
+from grader.batch.worker import GRADESCOPE, HANDED_BACK, REPORT
 from grader.model.errors import GraderError, HarnessError, SubmissionError
 from grader.model.exercise import Exercise
 from grader.recording.leftovers import scratch_folder
@@ -56,7 +56,7 @@ def grade_class(
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
-    exercises = read_exercises(course.grading)
+    exercises = read_exercises(course.grading, course.sources)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
     adjustments = Adjustments() if course.adjustments is None else read_adjustments(course.adjustments)
@@ -114,6 +114,7 @@ def _book(
         kept={name: store.kept(name) for name in names},
         keys=keys,
         report_of=lambda name: _report(store.place(name) / REPORT),
+        handed_back_of=lambda name: _report(store.place(name) / HANDED_BACK),
         foreign=[name for name in store.names() if name not in names],
     )
 

@@ -146,11 +146,16 @@ def export_gradescope(book: Classbook, results: Mapping[str, str]) -> Export:
 
 
 def feedback(row: Row) -> str:
-    """Return what a student is told in one line: the score, what was decided, and each lost point with its reason."""
+    """Return what a student is told in one line: the score, what was decided, and each lost point with its reason.
+
+    The score is the mark, which the platform shows as well; reasons are those that students may see.
+    """
     parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points." if row.report else ""]
     parts.append(_decision(row))
     parts += [
-        _lost(criterion) for exercise in (row.report or _NOTHING)["exercises"] for criterion in exercise["criteria"]
+        _lost(criterion)
+        for exercise in (row.handed_back or _NOTHING)["exercises"]
+        for criterion in exercise["criteria"]
     ]
     return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
 

@@ -19,7 +19,7 @@ class Task:
         name: Name of the entry.
         label: What the source calls it.
         submission: Path of what was handed in.
-        into: Folder that is not there yet: receives `report.json`, `report.html`, `gradescope.json` and `evidence/`.
+        into: Folder that is not there yet: receives what `worker.PARTS` names.
         exercises: Exercise ids to grade; empty for all of the rubrics.
         rubrics: Rubric files; empty for the built-in ones.
         odom_bag: An /odom recording to play instead of the project's own.

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import date
 from typing import Any
 
 import msgspec
@@ -23,13 +24,18 @@ from grader.batch.tasks import Task
 from grader.keeping import Keeper
 from grader.model.errors import GraderError, SubmissionError
 from grader.model.report import Report
+from grader.reports.audience import for_student
 from grader.reports.destination import write_whole
 from grader.reports.gradescope import render_gradescope
 from grader.reports.html.render import render_html
 from grader.reports.json_report import dumps
 from grader.session import Progress, Request, grade
 
-REPORT, PAGE, GRADESCOPE, EVIDENCE = "report.json", "report.html", "gradescope.json", "evidence"
+REPORT, PAGE, EVIDENCE = "report.json", "report.html", "evidence"
+#: What students may be given: what the rubric lets them see on the day of grading.
+HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE = "feedback.json", "feedback.html", "gradescope.json"
+#: All that a result consists of.
+PARTS = (REPORT, PAGE, EVIDENCE, HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE)
 #: Where a page in `students/NAME/` finds the files that all pages share.
 ASSETS = "../../assets"
 _SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
@@ -81,7 +87,8 @@ def _graded(task: Task, progress: Progress) -> Standing:
     keeper = Keeper([task.into / EVIDENCE], request)
     report = grade(request, progress, keeper.hear)
     progress("writing the results")
-    for name, text in _files(report, task).items():
+    today = date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+    for name, text in _files(report, task, today).items():
         write_whole(task.into / name, text.encode())
     keeper.write(report)
     given = report.reproduce
@@ -96,11 +103,15 @@ def _graded(task: Task, progress: Progress) -> Standing:
     )
 
 
-def _files(report: Report, task: Task) -> Mapping[str, str]:
+def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
+    assets = None if task.standalone else ASSETS
+    page, seen = render_html(report, assets=assets), for_student(report, today)
     return {
         REPORT: dumps(report),
-        PAGE: render_html(report, assets=None if task.standalone else ASSETS),
-        GRADESCOPE: render_gradescope(report),
+        PAGE: page,
+        HANDED_BACK: dumps(seen),
+        HANDED_BACK_PAGE: page if seen is report else render_html(seen, assets=assets),
+        GRADESCOPE: render_gradescope(report, day=today),
     }
 
 

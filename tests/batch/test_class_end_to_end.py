@@ -70,7 +70,7 @@ def test_results_are_whole(class_, tmp_path):
     for name in CLASS:
         place = results / "students" / name
         assert {p.name for p in place.iterdir()} == {
-            "report.json", "report.html", "gradescope.json", "evidence", "result.json"
+            "report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json", "evidence", "result.json"
         }  # fmt: skip
         page = (place / "report.html").read_text(encoding="utf-8")
         script = page.split('src="../../')[1].split('"')[0]

@@ -90,6 +90,18 @@ def test_moodle_has_grade_and_feedback_side_by_side(class_):
     assert len(graded.left_out["moodle"]) == 2
 
 
+def test_moodle_tells_only_what_students_may_see(class_):
+    """Reasons come from what is handed back, never from the instructor's report; without one there is the score."""
+    _, out = class_(moodle=True)
+    place = out / "students" / "bob" / "feedback.json"
+    place.write_text(place.read_text(encoding="utf-8").replace("as expected", "not shown"), encoding="utf-8")
+    class_(moodle=True)
+    assert rows(out / "moodle.csv")[2][2] == "4 of 10 points. [0/6] Publishes at 20 Hz: not shown"
+    place.unlink()
+    class_(moodle=True)
+    assert rows(out / "moodle.csv")[2][2] == "4 of 10 points."
+
+
 def test_moodle_unknown_users_are_named_beforehand(class_, tmp_path):
     """With what they could not be found by."""
     (tmp_path / "moodle.csv").write_text("Email address\nada@x.edu\nother@x.edu\n", encoding="utf-8")

@@ -1,5 +1,7 @@
 """What grading one submission comes to in its process: whose fault it is decides, and nothing of ours is a mark."""
 
+from fractions import Fraction
+
 import pytest
 
 from grader.batch import worker
@@ -7,6 +9,10 @@ from grader.batch.keys import Conditions
 from grader.batch.standing import State
 from grader.batch.tasks import Task
 from grader.model.errors import EnvironmentFault, HarnessError, SubmissionError
+from grader.model.exercise import Outcome
+from grader.model.feedback import Feedback, Shows
+from grader.model.report import Environment, ExerciseReport, Report, Verdict
+from grader.model.trace import ClockKind
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 
@@ -49,3 +55,19 @@ def test_the_same_reason_to_refuse_has_the_same_key(tmp_path, monkeypatch):
     same = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
     other = attempt(tmp_path, monkeypatch, SubmissionError("x: found two"))
     assert one.key == same.key != other.key
+
+
+def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path, monkeypatch):
+    """The instructor's files show everything; the student's keep back what the rubric withholds."""
+    secret = Verdict("b", "B", Outcome.NOT_MET, Fraction(0), Fraction(2), "hushhush")
+    exercise = ExerciseReport(
+        "e", "1", "E", True, ClockKind.VIRTUAL, "", (secret,), feedback={"b": Feedback(Shows.OUTCOME, "9999-12-31")}
+    )
+    environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
+    report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    into = tmp_path / "into"
+    worker.attempt(Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0), lambda step: None)
+    found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
+    assert found == {worker.REPORT, worker.PAGE}
+    assert {path.name for path in into.iterdir()} == set(worker.PARTS) - {worker.EVIDENCE}
