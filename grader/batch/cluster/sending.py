@@ -23,13 +23,13 @@ from grader.batch.parcels import (
 )
 from grader.batch.standing import Standing, State
 from grader.batch.tasks import Attempt, Task
-from grader.batch.worker import EVIDENCE, GRADESCOPE, PAGE, REPORT
+from grader.batch.worker import PARTS
 from grader.model.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.reading.submission import collect_submission
 from grader.session import Request, read_exercises, wanted_files
 
 AGAIN = "run the same command again"
-_PARTS = frozenset({REPORT, PAGE, GRADESCOPE, EVIDENCE})
+_PARTS = frozenset(PARTS)
 
 
 def terms_of(task: Task) -> Terms:
