@@ -36,6 +36,9 @@ from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, re
 #: Largest rubric file.
 MAX_BYTES = 256 * 1024
 
+#: How the names of files end that lie beside rubrics and are none: notes on their self-tests.
+NOTES = ".selftest.yaml"
+
 #: Mistakes listed at once.
 MAX_MISTAKES = 10
 
@@ -196,7 +199,7 @@ def builtin_rubrics() -> Mapping[str, Path]:
         RubricError: The rubrics are missing from this installation, or one of them has mistakes.
     """
     folder = shipped_folder()
-    paths = sorted(folder.glob("*.yaml"))
+    paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
     if not paths:
         raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
     exercises = [(read_rubric(path), path) for path in paths]

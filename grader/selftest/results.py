@@ -178,4 +178,6 @@ def one_line_change(before: str, after: str) -> str:
         if kind != "equal":
             removed += [line.strip() for line in old[a:b] if line.strip()]
             added += [line.strip() for line in new[c:d] if line.strip()]
+    if sorted(removed) == sorted(added):
+        return f"moved: {' ¶ '.join(removed)}"
     return f"{' ¶ '.join(removed) or '(nothing)'} => {' ¶ '.join(added) or '(nothing)'}"

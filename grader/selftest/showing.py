@@ -8,6 +8,7 @@ from io import StringIO
 from typing import Any
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
@@ -64,6 +65,7 @@ def _result(console: Console, result: Result) -> None:
     console.print(f"  recorded   {result.recordings} scenarios in {result.duration_s:.0f} s")
     console.print()
     console.print(_operators(result))
+    console.print()
     console.print(_criteria(result))
     _listed(console, "Survivors: nobody noticed", result.survivors, _BAD)
     _listed(console, "Correct variants that lose points", result.marked_down, _BAD)
@@ -73,7 +75,7 @@ def _result(console: Console, result: Result) -> None:
     _listed(console, "Explained survivors", [t for t in result.mutants if t.because], _QUIET)
     _listed(console, "Explained variants", [t for t in result.variants if t.because], _QUIET)
     for line in result.idle:
-        console.print(f"  {line}", style="yellow")
+        _put(console, 2, line, "yellow")
 
 
 def _count(result: Result) -> str:
@@ -88,7 +90,7 @@ def _count(result: Result) -> str:
 
 def _operators(result: Result) -> Table:
     """Return a row an operator."""
-    table = _table("operator", "made", "killed", "as expected", "by another", "explained", "undecided", "SURVIVED")
+    table = _table("operator", "made", "killed", "as said", "by other", "excused", "undecided", "SURVIVED")
     for name in dict.fromkeys(trial.operator for trial in result.mutants):
         own = [trial for trial in result.mutants if trial.operator == name]
         killed = [trial for trial in own if trial.fate is Fate.KILLED]
@@ -122,7 +124,7 @@ def _criteria(result: Result) -> Table:
 
 
 def _table(first: str, *others: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", show_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold", show_edge=False)
     table.add_column(f"  {first}", no_wrap=True)
     for name in others:
         table.add_column(name, justify="right")
@@ -136,20 +138,24 @@ def _listed(console: Console, title: str, trials: Iterable[Trial], style: str) -
     console.print()
     console.print(f"{title} ({len(found)})", style=style)
     for trial in found:
-        console.print(f"  {shown(trial.id, limit=200)}", style="bold" if style == _BAD else "")
-        console.print(Text(f"    {shown(trial.change, limit=400)}", style=_QUIET))
+        _put(console, 2, shown(trial.id, limit=200), "bold" if style == _BAD else "")
+        _put(console, 4, shown(trial.change, limit=400), _QUIET)
         if trial.because:
-            console.print(f"    because {shown(trial.because, limit=600)}")
+            _put(console, 4, f"because {shown(trial.because, limit=600)}")
         elif trial.fate is not Fate.SURVIVED:
             _reasons(console, trial.standing)
         if trial.expected and not trial.as_expected:
-            console.print(f"    expected {' or '.join(trial.expected)}")
+            _put(console, 4, f"expected {' or '.join(trial.expected)}")
 
 
 def _reasons(console: Console, standing: Standing) -> None:
     for id_, reason in standing.reasons.items():
         if standing.outcomes[id_] is not Outcome.BLOCKED:
-            console.print(f"    {id_}: {shown(reason, limit=300)}")
+            _put(console, 4, f"{id_}: {shown(reason, limit=300)}")
+
+
+def _put(console: Console, indent: int, text: str, style: str = "") -> None:
+    console.print(Padding(Text(text, style=style), (0, 0, 0, indent), expand=False))
 
 
 def _standing(standing: Standing) -> str:

@@ -9,12 +9,12 @@ import libcst as cst
 from grader.selftest.mutating.bodies import at_top
 from grader.selftest.mutating.program import SLEEPS, Change, Program, argument, expression, into
 
-#: What people make of a period: a slip of ten, milliseconds, the half, the double, a little off.
-_FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.1", "* 0.9")
+#: What people make of a period: a slip of ten, milliseconds, the half, the double, a quarter off.
+_FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.25", "* 0.75")
 
 
 def period(program: Program) -> Iterator[Change]:
-    """A period that is wrong by a factor: ten, two, milliseconds for seconds, or a tenth."""
+    """A period that is wrong by a factor: ten, two, milliseconds for seconds, or a quarter."""
     for given in _periods(program):
         before = program.code(given)
         inside = before if isinstance(given, (cst.Name, cst.Attribute, cst.BaseNumber)) else f"({before})"
