@@ -16,6 +16,7 @@ from grader.model.explanation import CheckExplanation, CriterionExplanation, Par
 from grader.model.quantities import Unit, duration
 from grader.model.scenario import MessageStream, NumberStream, Scenario, ServiceCalls, ServiceServer, Stimulus
 from grader.reading.manuals import Manual, manual_of
+from grader.reading.rubric_file import own_checks
 from grader.reading.units import format_quantity
 from grader.session import Request, read_exercises
 
@@ -39,9 +40,10 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
     if found:
         return list(found)
-    if name in CHECKS:
-        return [_check(name, [f"{e.id}/{c.id}" for e, c in pairs if check_name(c.check) == name])]
-    raise _unknown(name, [c.id for _, c in pairs])
+    checks = {**CHECKS, **{check_name(c): type(c.check) for _, c in pairs}}
+    if name in checks:
+        return [_check(name, checks[name], [f"{e.id}/{c.id}" for e, c in pairs if check_name(c) == name])]
+    raise _unknown(name, [*(c.id for _, c in pairs), *checks])
 
 
 def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
@@ -54,7 +56,7 @@ def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Return what every check asks, and which criteria of some rubrics use it.
+    """Return what every check asks, those of the rubrics' own included, and which criteria of the rubrics use it.
 
     Raises:
         RubricError: A rubric cannot be used.
@@ -62,13 +64,14 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     pairs = [(e, c) for e in read_exercises(Request("", rubrics=rubrics)) for c in e.criteria]
     used: dict[str, list[str]] = {}
     for e, c in pairs:
-        used.setdefault(check_name(c.check), []).append(f"{e.id}/{c.id}")
-    return [_check(name, used.get(name, [])) for name in CHECKS]
+        used.setdefault(check_name(c), []).append(f"{e.id}/{c.id}")
+    own = {name: kind for path in rubrics for name, kind in own_checks(path).items()}
+    return [_check(name, kind, used.get(name, [])) for name, kind in {**CHECKS, **own}.items()]
 
 
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
-    name = check_name(criterion.check)
+    name = check_name(criterion)
     manual = manual_of(type(criterion.check))
     return CriterionExplanation(
         id=criterion.id,
@@ -86,8 +89,7 @@ def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation
     )
 
 
-def _check(name: str, used_by: Sequence[str]) -> CheckExplanation:
-    kind = CHECKS[name]
+def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     manual = manual_of(kind)
     parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
@@ -153,8 +155,8 @@ def _stimulus(stimulus: Stimulus) -> str:
     return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
 
 
-def _unknown(name: str, criteria: Sequence[str]) -> GraderError:
-    known = list(dict.fromkeys([*criteria, *CHECKS]))
+def _unknown(name: str, names: Sequence[str]) -> GraderError:
+    known = list(dict.fromkeys(names))
     near = difflib.get_close_matches(name, known, n=OFFERED, cutoff=0.4)
     parts = [k for k in known if name.casefold() in k and k not in near] if len(name) > 2 else []
     offered = [*near, *parts][:OFFERED]

@@ -123,10 +123,19 @@ def grade(
         return judge_run(exercises, run, pictures=pictures)
 
 
-def read_exercises(request: Request) -> list[Exercise]:
-    """Return the exercises to grade, in rubric order; raises RubricError for an id that no rubric has."""
+def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[Exercise]:
+    """Return the exercises to grade, in rubric order.
+
+    Args:
+        request: What is to be graded.
+        submissions: What else students write, besides the submission; no check of a rubric's own is taken from there.
+
+    Raises:
+        RubricError: A rubric cannot be used, or none has an exercise that was asked for.
+    """
     paths: Sequence[Path] = request.rubrics or tuple(builtin_rubrics().values())
-    exercises = [read_rubric(path) for path in paths]
+    theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
+    exercises = [read_rubric(path, submissions=theirs) for path in paths]
     known = [exercise.id for exercise in exercises]
     for wanted in request.exercises:
         if wanted not in known:

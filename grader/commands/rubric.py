@@ -42,11 +42,17 @@ def _check(*, files: tuple[Path, ...]) -> int:
 
 
 @command.command(name="schema")
-def _schema() -> int:
-    """Print the JSON Schema of rubrics, with which editors complete and check them."""
-    from grader.reading.rubric_schema import schema_text  # noqa: PLC0415  as above
+@click.argument("rubric", metavar="[FILE]", required=False, type=PATH)
+def _schema(*, rubric: Path | None) -> int:
+    """Print the JSON Schema of rubrics, with which editors complete and check them.
 
-    text = schema_text()
+    That for a rubric FILE knows the checks of its own as well.
+    """
+    from grader.judging.checks import CHECKS  # noqa: PLC0415  as above
+    from grader.reading.rubric_file import own_checks  # noqa: PLC0415
+    from grader.reading.rubric_schema import schema_text  # noqa: PLC0415
+
+    text = schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))})
     show(lambda _: text, for_people=False)
     return ALL_MET
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from grader.judging.checks import CHECKS
+from grader.judging.contract import breach
 from grader.judging.findings import not_met
 from grader.judging.silence import fault_hint, first_fault, student_endpoints
 from grader.judging.wording import fault_sentence, quote
 from grader.model.errors import HarnessError
-from grader.model.exercise import Check, Criterion, Exercise, Finding
+from grader.model.exercise import Criterion, Exercise, Finding
 from grader.model.scenario import Scenario
 from grader.model.submission import Submission
 from grader.model.trace import Fault, FaultKind, Trace
@@ -33,9 +36,10 @@ class Answer:
     error: str = ""
 
 
-def check_name(check: Check) -> str:
-    """Return the name of a check in rubrics."""
-    return next((name for name, kind in CHECKS.items() if type(check) is kind), type(check).__name__)
+def check_name(criterion: Criterion) -> str:
+    """Return the name of a criterion's check in rubrics."""
+    known = (name for name, kind in CHECKS.items() if type(criterion.check) is kind)
+    return criterion.check_name or next(known, type(criterion.check).__name__)
 
 
 def ask(criterion: Criterion, exercise: Exercise, traces: Mapping[str, Trace], submission: Submission) -> Answer:
@@ -53,17 +57,27 @@ def ask(criterion: Criterion, exercise: Exercise, traces: Mapping[str, Trace], s
 
 
 def _judged(criterion: Criterion, scenario: Scenario, trace: Trace) -> Answer:
-    name = check_name(criterion.check)
+    name = check_name(criterion)
     try:
         finding = criterion.check.judge(trace)
     except HarnessError as error:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
-    except Exception as error:  # a check that fails must cost no points and must not end the report
+    except (Exception, SystemExit) as error:  # a check that fails must cost no points and must not end the report
         problem = f"the check {name} failed on this recording through no fault of the submission"
-        return Answer(problem=problem, error=f"{type(error).__name__}: {quote(str(error))}")
-    if not 0 <= finding.credit <= 1:
-        return Answer(problem=f"the check {name} gave a credit of {finding.credit}, expected 0 to 1")
+        return Answer(problem=problem, error=f"{_place(error)}{type(error).__name__}: {quote(str(error))}")
+    if name in CHECKS and 0 <= finding.credit <= 1:
+        return Answer(finding=_start_failure_first(finding, scenario, trace))
+    wrong = breach(finding)
+    if wrong:
+        return Answer(problem=f"the check {name} {wrong}")
+    finding = replace(finding, credit=Fraction(finding.credit))
     return Answer(finding=_start_failure_first(finding, scenario, trace))
+
+
+def _place(error: BaseException) -> str:
+    """Return where an error arose, as `file:line: ` without the file's folder, for whoever mends the check."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{frames[-1].filename.rsplit('/', 1)[-1]}:{frames[-1].lineno}: " if frames else ""
 
 
 def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> Finding:

@@ -92,7 +92,7 @@ class Bench:
         """Return the criterion of that id, else the first of the same scenario whose check has that name."""
         criteria = self.exercise.criteria
         by_id = next((c for c in criteria if c.id == name), None)
-        same = (c for c in criteria if c.scenario == criterion.scenario and check_name(c.check) == name)
+        same = (c for c in criteria if c.scenario == criterion.scenario and check_name(c) == name)
         return by_id or next(same, None)
 
     def _blocked(self, criterion: Criterion, needed: str, outcome: Outcome) -> Verdict:

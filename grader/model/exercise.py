@@ -74,6 +74,7 @@ class Criterion:
         hint: What to tell a student who did not meet it, if the check has nothing better.
         chapter: Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
         feedback: How much of its result a student is shown.
+        check_name: What the rubric calls its check; says nothing that the check does not.
     """
 
     id: str
@@ -85,6 +86,7 @@ class Criterion:
     hint: str = ""
     chapter: str = ""
     feedback: Feedback = OPEN
+    check_name: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,7 @@ class Exercise:
         files: File names a submission must hold, in order.
         scenarios: What is recorded, in order.
         criteria: What is judged, in order.
-        digest: `sha256:` over the rubric file's bytes.
+        digest: `sha256:` over the bytes of the rubric file and of the checks of its own.
         by_request: Whether it is graded only where somebody asks for it.
     """
 

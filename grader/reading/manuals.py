@@ -28,7 +28,10 @@ class Manual:
 
 def manual_of(kind: type) -> Manual:
     """Return the manual of a class; empty where it has no docstring."""
-    text, _, attributes = inspect.cleandoc(kind.__doc__ or "").partition(_HEADING)
+    written = kind.__doc__ or ""
+    # a dataclass without a docstring is given its signature for one
+    known = "" if written.startswith(f"{kind.__name__}(") else written
+    text, _, attributes = inspect.cleandoc(known).partition(_HEADING)
     paragraphs = [" ".join(p.split()) for p in text.split("\n\n") if p.strip()]
     return Manual(paragraphs[0] if paragraphs else "", "\n".join(paragraphs[1:]), _parameters(attributes))
 

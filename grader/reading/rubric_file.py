@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,6 +18,7 @@ from grader.model.limits import Limits
 from grader.model.scenario import Scenario, Span
 from grader.reading.check_parameters import build
 from grader.reading.feedback import feedback_of
+from grader.reading.own_checks import OwnFile, digest_of, load, named_files, own_files
 from grader.reading.quoting import shown
 from grader.reading.rubric_limits import limits_of
 from grader.reading.rubric_links import broken_links
@@ -30,6 +30,7 @@ from grader.reading.rubric_model import (
     rubric_model,
 )
 from grader.reading.rubric_stimuli import stimulus_of
+from grader.reading.rubric_types import CHECK_FILE
 from grader.reading.shipped import shipped_folder
 from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, read_yaml
 
@@ -62,12 +63,15 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
         super().__init__("\n".join(lines), "; ".join(hints))
 
 
-def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
-    """Read one rubric file.
+def read_rubric(
+    path: Path, *, checks: Mapping[str, type] = CHECKS, submissions: Sequence[Path] = ()
+) -> Exercise:
+    """Read one rubric file; where it names checks of its own, their files are run.
 
     Args:
         path: The file; messages show it as given.
-        checks: The table of checks that the rubric may use.
+        checks: The table of checks that the rubric may use, besides its own.
+        submissions: What students write: no check is taken from there.
 
     Returns:
         The exercise.
@@ -76,12 +80,9 @@ def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
     """
     content = _content(path)
-    try:
-        tree = read_yaml(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        _refuse(path, [_not_utf8(content, error)])
-    except YamlSyntaxError as error:
-        _refuse(path, [error.mistake])
+    tree = _tree(path, content)
+    files = own_files(path, _own_names(path, tree), submissions)
+    checks = {**checks, **load(files, checks)}
     rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
     mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
     criteria = tuple(_criteria(rubric, checks, tree, mistakes))
@@ -96,9 +97,38 @@ def read_rubric(path: Path, *, checks: Mapping[str, type] = CHECKS) -> Exercise:
         files=rubric.files,
         scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
         criteria=criteria,
-        digest=f"sha256:{hashlib.sha256(content).hexdigest()}",
+        digest=digest_of(content, files),
         by_request=rubric.exercise.by_request,
     )
+
+
+def own_check_files(path: Path) -> tuple[OwnFile, ...]:
+    """Return the files of checks that a rubric names, without running them; raises RubricError as reading it does."""
+    return own_files(path, _own_names(path, _tree(path, _content(path))))
+
+
+def own_checks(path: Path) -> Mapping[str, type]:
+    """Return the checks of a rubric's own by name, whether it uses them or not; raises RubricError as above."""
+    return load(own_check_files(path), CHECKS)
+
+
+def _tree(path: Path, content: bytes) -> YamlTree:
+    try:
+        return read_yaml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        _refuse(path, [_not_utf8(content, error)])
+    except YamlSyntaxError as error:
+        _refuse(path, [error.mistake])
+
+
+def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
+    """Return the files of checks that are named; raises RubricError for a name that leads elsewhere."""
+    names = named_files(tree.data)
+    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
+    if wrong:
+        text = "expected a Python file in the rubric's folder such as my_checks.py, found"
+        _refuse(path, [tree.values.get(("checks", n), TOP).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+    return names
 
 
 def _content(path: Path) -> bytes:
@@ -171,6 +201,7 @@ def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Crite
         hint=" ".join((shape.hint or "").split()),
         chapter=" ".join((shape.chapter or "").split()),
         feedback=feedback,
+        check_name=shape.check.chosen[0],
     )
 
 

@@ -13,6 +13,7 @@ from grader.reading.feedback import FeedbackField
 from grader.reading.rubric_limits import LimitsShape
 from grader.reading.rubric_stimuli import StimulusShape
 from grader.reading.rubric_types import (
+    CheckFile,
     Id,
     LongDuration,
     Number,
@@ -76,6 +77,7 @@ class RubricShape(Shape):
     format: Literal["grader/rubric/v1"] = Field(alias="schema")
     exercise: ExerciseShape
     files: tuple[PythonFile, ...] = Field(min_length=1)
+    checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None
     scenarios: tuple[ScenarioShape, ...] = Field(min_length=1)

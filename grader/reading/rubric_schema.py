@@ -24,9 +24,9 @@ def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_tidy(schema)}
 
 
-def schema_text() -> str:
-    """Return the schema as the shipped file holds it."""
-    return json.dumps(rubric_schema(), indent=2, ensure_ascii=False) + "\n"
+def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
+    """Return the schema as text; that of the grader's own checks is shipped."""
+    return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
 
 
 def _tidy(node: Any, *, names: bool = False) -> Any:

@@ -123,6 +123,11 @@ PythonFile = Annotated[
     str,
     Matching(r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"),
 ]
+#: Where a file of checks may lie: beside the rubric or below; never outside, never hidden.
+CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
+CheckFile = Annotated[
+    str, Matching(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
+]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
 Whole = Annotated[int, Strict()]

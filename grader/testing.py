@@ -1,0 +1,225 @@
+"""Helpers to test checks of one's own: traces made by hand, and a check put to them.
+
+    from grader.testing import TraceBuilder, judge
+
+    def test_a_steady_pump_is_met():
+        trace = TraceBuilder("pump.py").messages("/flow", "std_msgs/msg/Float32", {"data": 1.5}, rate_hz=10).trace()
+        assert judge(StartsEarly("/flow", within=500_000_000), trace).credit == 1
+
+Times are seconds since the scenario began. What a node did and what the grader did to it are put in any order; the
+trace is sorted as a recording is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from grader.judging.contract import breach
+from grader.judging.findings import met, not_met, partly
+from grader.model.exercise import Check, Finding
+from grader.model.quantities import NS_PER_S, nanoseconds
+from grader.model.trace import (
+    ClockKind,
+    Delivery,
+    Endpoint,
+    Fault,
+    FaultKind,
+    GraphSnapshot,
+    LogRecord,
+    Mark,
+    Message,
+    Observation,
+    OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
+    Trace,
+)
+
+__all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
+
+#: Order within one instant: the scenario, the grader, the graph, what nodes did.
+_PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
+
+#: Fields of a message, or what gives them by the message's number, from 0 on.
+Value = Mapping[str, Any] | Callable[[int], Mapping[str, Any]]
+
+
+def judge(check: Check, trace: Trace) -> Finding:
+    """Return what a check finds in a trace, after making sure that a report could be made of it.
+
+    Args:
+        check: The check; it is asked twice.
+        trace: The trace.
+
+    Raises:
+        ValueError: It gave something that is no good Finding, or another one when it was asked again.
+    """
+    finding = check.judge(trace)
+    wrong = breach(finding)
+    if wrong:
+        raise ValueError(f"{type(check).__name__} {wrong}")
+    if check.judge(trace) != finding:
+        raise ValueError(f"{type(check).__name__} found something else when it was asked again")
+    return finding
+
+
+@dataclass(slots=True)
+class TraceBuilder:
+    """Collects what was observed, and makes a trace of it; every method but the last gives the builder back.
+
+    A topic with messages has a publisher in the graph, whether it was named or not; a subscription has to be named.
+
+    Attributes:
+        process: File name of the student's process that things are said of.
+        node: Its node.
+        stop_s: When observation ends.
+        clock: Which clock the nodes ran on.
+    """
+
+    process: str = "node.py"
+    node: str = "/node"
+    stop_s: float = 10.0
+    clock: ClockKind = ClockKind.VIRTUAL
+    _seen: list[Observation] = field(default_factory=list, repr=False)
+    _ends: list[Endpoint] = field(default_factory=list, repr=False)
+    _services: list[ServiceEnd] = field(default_factory=list, repr=False)
+
+    def add(self, *observations: Observation) -> TraceBuilder:
+        """Add observations of any kind."""
+        self._seen.extend(observations)
+        return self
+
+    def message(self, t_s: float, topic: str, type_: str, value: Mapping[str, Any]) -> TraceBuilder:
+        """Add one message of the student's node, its fields nested by name."""
+        return self.add(Message(nanoseconds(t_s), topic, type_, value))
+
+    def messages(  # noqa: PLR0913  what, where and when
+        self, topic: str, type_: str, value: Value, *, rate_hz: float, start_s: float = 0.1, stop_s: float | None = None
+    ) -> TraceBuilder:
+        """Add messages of the student's node at a rate.
+
+        Args:
+            topic: Absolute name.
+            type_: e.g. `std_msgs/msg/Float32`.
+            value: Their fields, or a function of the message's number.
+            rate_hz: How many a second.
+            start_s: When the first is published.
+            stop_s: When they end; None for the end of the trace.
+        """
+        for number, t_ns in enumerate(self._times(rate_hz, start_s, stop_s)):
+            self.add(Message(t_ns, topic, type_, value(number) if callable(value) else value))
+        return self
+
+    def delivery(self, t_s: float, topic: str, type_: str, value: Mapping[str, Any]) -> TraceBuilder:
+        """Add one message that the grader published to the student's node."""
+        return self.add(Delivery(nanoseconds(t_s), topic, type_, value))
+
+    def deliveries(  # noqa: PLR0913  as above
+        self, topic: str, type_: str, value: Value, *, rate_hz: float, start_s: float = 0.1, stop_s: float | None = None
+    ) -> TraceBuilder:
+        """Add messages that the grader published at a rate; as for `messages`."""
+        for number, t_ns in enumerate(self._times(rate_hz, start_s, stop_s)):
+            self.add(Delivery(t_ns, topic, type_, value(number) if callable(value) else value))
+        return self
+
+    def log(self, t_s: float, text: str, severity: str = "INFO", line: int = 0) -> TraceBuilder:
+        """Add a record that the node wrote through its logger, from a line of its file if that is known."""
+        where = self.process if line else ""
+        logger = self.node.rsplit("/", 1)[-1]
+        return self.add(LogRecord(nanoseconds(t_s), self.process, severity, logger, text, where, line))
+
+    def printed(self, t_s: float, text: str, stream: str = "stdout") -> TraceBuilder:
+        """Add a line that the process wrote without the logger."""
+        return self.add(OutputLine(nanoseconds(t_s), self.process, stream, text))
+
+    def fault(
+        self, t_s: float, text: str = "ValueError: no", kind: FaultKind = FaultKind.EXCEPTION, line: int = 1
+    ) -> TraceBuilder:
+        """Add the end of the process: an exception, or another kind of fault, in a line of its file."""
+        return self.add(Fault(nanoseconds(t_s), self.process, kind, text, self.process if line else "", line))
+
+    def publisher(self, topic: str, type_: str, **attributes: Any) -> TraceBuilder:
+        """Add a publisher of the node to the graph; attributes are those of an Endpoint, such as `reliability`."""
+        return self._end("publisher", topic, type_, attributes)
+
+    def subscription(self, topic: str, type_: str, **attributes: Any) -> TraceBuilder:
+        """Add a subscription of the node to the graph; attributes as for `publisher`."""
+        return self._end("subscription", topic, type_, attributes)
+
+    def server(self, service: str, type_: str) -> TraceBuilder:
+        """Add a service that the node offers to the graph."""
+        self._services.append(ServiceEnd("service", service, type_, self.node))
+        return self
+
+    def client(self, service: str, type_: str) -> TraceBuilder:
+        """Add a client of the node to the graph."""
+        self._services.append(ServiceEnd("client", service, type_, self.node))
+        return self
+
+    def call(  # noqa: PLR0913  a request and its response
+        self,
+        t_s: float,
+        service: str,
+        type_: str,
+        request: Mapping[str, Any],
+        response: Mapping[str, Any] | None,
+        *,
+        answer_s: float = 0.0,
+        by_student: bool = False,
+    ) -> TraceBuilder:
+        """Add a service call, by the grader or by the student's client.
+
+        Args:
+            t_s: When it was sent.
+            service: Absolute name.
+            type_: e.g. `std_srvs/srv/Trigger`.
+            request: Fields of the request.
+            response: Fields of the response; None if there was none.
+            answer_s: How long after the request the response came.
+            by_student: Whether the student's node asked and the grader answered.
+        """
+        asks, answers = ("student", "grader") if by_student else ("grader", "student")
+        number = 1 + sum(isinstance(o, Request) and (o.service, o.sender) == (service, asks) for o in self._seen)
+        client = 0 if by_student else 1
+        self.add(Request(nanoseconds(t_s), service, type_, number, asks, client, request))
+        if response is not None:
+            when_ns = nanoseconds(t_s + answer_s)
+            self.add(Response(when_ns, service, type_, number, answers, client, response))
+        return self
+
+    def mark(self, t_s: float, name: str, detail: str = "") -> TraceBuilder:
+        """Add a moment of the scenario itself; `grader.model.trace.Mark` lists the names."""
+        return self.add(Mark(nanoseconds(t_s), name, detail))
+
+    def trace(self, scenario: str = "alone") -> Trace:
+        """Return the trace, its observations in the order of a recording."""
+        graph = self._graph()
+        ordered = sorted([*self._seen, *graph], key=lambda seen: (seen.t_ns, _PHASE.get(type(seen), 3)))
+        return Trace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered))
+
+    def _times(self, rate_hz: float, start_s: float, stop_s: float | None) -> list[int]:
+        start_ns, stop_ns = nanoseconds(start_s), nanoseconds(self.stop_s if stop_s is None else stop_s)
+        count = max(0, round((stop_ns - start_ns) * rate_hz / NS_PER_S) + 1)
+        times = [start_ns + round(number * NS_PER_S / rate_hz) for number in range(count)]
+        return [t_ns for t_ns in times if t_ns < stop_ns]
+
+    def _end(self, kind: str, topic: str, type_: str, attributes: Mapping[str, Any]) -> TraceBuilder:
+        known = {"node": self.node, "participant": 1, "reliability": "reliable", "durability": "volatile", "depth": 10}
+        self._ends.append(Endpoint(kind, topic, type_, **{**known, **attributes}))
+        return self
+
+    def _graph(self) -> list[GraphSnapshot]:
+        known = {(e.topic, e.type) for e in self._ends if e.kind == "publisher"}
+        spoken = dict.fromkeys((o.topic, o.type) for o in self._seen if isinstance(o, Message))
+        for topic, type_ in spoken:
+            if (topic, type_) not in known:
+                self.publisher(topic, type_)
+        if not self._ends and not self._services:
+            return []
+        ends = sorted(self._ends, key=lambda e: (e.kind, e.topic, e.node))
+        services = sorted(self._services, key=lambda e: (e.kind, e.service, e.node))
+        nodes = sorted({e.node for e in (*ends, *services)})
+        return [GraphSnapshot(0, tuple(nodes), tuple(ends), tuple(services))]

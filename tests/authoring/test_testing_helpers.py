@@ -1,0 +1,100 @@
+"""Traces made with grader.testing: what the checks that come with the grader find in them."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import pytest
+
+from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.model.exercise import Finding
+from grader.model.trace import FaultKind
+from grader.testing import TraceBuilder, judge, met
+
+FLOAT = "std_msgs/msg/Float32"
+
+
+def pump(**changes):
+    return TraceBuilder("pump.py", "/pump", **changes)
+
+
+def test_messages_at_a_rate_are_exactly_at_that_rate():
+    """A thirtieth of a second is no whole number of nanoseconds, and the rate holds all the same."""
+    trace = pump(stop_s=10.2).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=30).trace()
+    finding = judge(TopicRate("/flow", 30.0, 0.001, 10_000_000_000), trace)
+    assert finding.credit == 1, finding.reason
+    assert judge(Publishes("/flow", FLOAT), trace).credit == 1
+
+
+def test_values_may_follow_the_number_of_a_message():
+    """One that differs is found."""
+    trace = pump().messages("/flow", FLOAT, lambda n: {"data": 2.0 if n == 3 else 1.5}, rate_hz=10).trace()
+    finding = judge(FieldValues("/flow", {"data": 1.5}), trace)
+    assert (finding.credit, finding.evidence["wrong"], finding.evidence["first_wrong_s"]) == (0, 1, 0.4)
+
+
+def test_graph_logs_calls_and_faults_arrive_in_order():
+    """Whatever the order in which they were put, and with their process and lines."""
+    trace = (
+        pump()
+        .fault(5, "KeyError: 'x'", line=7)
+        .log(1, "pumping", line=3)
+        .printed(2, "hello")
+        .subscription("/level", FLOAT, reliability="best_effort")
+        .server("/empty", "std_srvs/srv/Trigger")
+        .call(3, "/empty", "std_srvs/srv/Trigger", {}, {"success": True}, answer_s=0.5)
+        .call(4, "/empty", "std_srvs/srv/Trigger", {}, None)
+        .delivery(0, "/level", FLOAT, {"data": 1.0})
+        .mark(0, "stream_starts", "/level")
+        .trace()
+    )
+    assert [type(o).__name__ for o in trace.observations] == [
+        *("Mark", "Delivery", "GraphSnapshot", "LogRecord", "OutputLine", "Request", "Response", "Request", "Fault")
+    ]
+    assert judge(Subscribes("/level", FLOAT), trace).credit == 1
+    assert judge(UsesLogger("pump.py"), trace).credit == 1
+    assert [(r.number, r.client) for r in trace.requests("/empty", "grader")] == [(1, 1), (2, 1)]
+    (fault,) = trace.faults("pump.py")
+    assert (fault.kind, fault.file, fault.line) == (FaultKind.EXCEPTION, "pump.py", 7)
+
+
+@dataclass(frozen=True)
+class Gives:
+    """A check that returns what it is given."""
+
+    finding: object
+
+    def judge(self, trace):
+        return self.finding
+
+
+@pytest.mark.parametrize(
+    ("finding", "wrong"),
+    [
+        (True, "returned a bool, expected a Finding"),
+        (Finding(0.5, "half"), "gave a credit of type float, expected a Fraction"),
+        (Finding(Fraction(3, 2), "more"), "gave a credit of 3/2, expected 0 to 1"),
+        (Finding(Fraction(1), 5), "gave a reason, hint or location of another type"),
+        (Finding(Fraction(1), "", {"x": {1, 2}}), "gave evidence that holds more than plain JSON values"),
+        (Finding(Fraction(1), "", location=("pump.py", 3)), "gave a reason, hint or location of another type"),
+    ],
+)
+def test_a_finding_that_no_report_could_show_is_refused(finding, wrong):
+    """With the words that an instructor would read in the report."""
+    with pytest.raises(ValueError, match=wrong):
+        judge(Gives(finding), pump().trace())
+
+
+def test_a_check_that_changes_its_mind_is_refused():
+    """Checks are pure: the same trace gives the same finding."""
+
+    class Counts:
+        asked = 0
+
+        def judge(self, trace):
+            self.asked += 1
+            return met(f"asked {self.asked} times")
+
+    with pytest.raises(ValueError, match="found something else when it was asked again"):
+        judge(Counts(), pump().trace())
