@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from tracing import ODOMETRY, TWIST
+from tracing import ODOMETRY, TRIGGER, TWIST
 
 from grader.judging.checks import CHECKS
+from grader.judging.rules import FieldRule
 from grader.model.exercise import Check
 from grader.model.quantities import NS_PER_S
 
@@ -25,4 +26,10 @@ INSTANCES: dict[str, Check] = {
     "field_function": CHECKS["field_function"]("/joint_commands", "sin(0.1 * n)"),
     "logs_every": CHECKS["logs_every"]("velocity_publisher.py", "/cmd_vel", 20, "linear.x"),
     "logs_values": CHECKS["logs_values"]("temperature_sensor.py", "/fan_speed", unit_factors=(1.0, 2.0)),
+    "service_available": CHECKS["service_available"]("/battery/get_status", TRIGGER),
+    "service_answers_all": CHECKS["service_answers_all"]("/battery/get_status"),
+    "service_response": CHECKS["service_response"](
+        "/battery/get_status", {"success": True, "message": FieldRule(pattern="Battery: .*")}
+    ),
+    "service_sequence": CHECKS["service_sequence"]("/battery/get_status", 84.5, -0.5, floor=0.0, reset_to=100.0),
 }

@@ -15,6 +15,7 @@ from test_fan_check import HONEST, WRONG
 from test_fan_check import each as each_temperature
 from test_graph_check import graph
 from test_sensor_checks import drawn, hearing, sensed
+from test_server_checks import BATTERY, answering
 from test_together_check import each
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, position_logs, twist, velocity
 from wordings import RIGHT
@@ -35,6 +36,9 @@ from grader.model.trace import (
     Mark,
     Message,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 
@@ -51,6 +55,7 @@ TRACES = {
     "inverted controller": each_temperature(WRONG["inverted"][0]),
     "together": each(),
     "graph": graph(),
+    "battery server": answering(60, clients=3),
     "empty": Recording(),
 }
 
@@ -67,6 +72,7 @@ VALUES = st.one_of(
     st.builds(lambda a, b: twist((a, 0, 0), (0, 0, b)), NUMBERS, NUMBERS),
     POSITIONS,
     st.just({"linear": 3, "pose": "\ud800"}),
+    st.builds(lambda s, m: {"success": s, "message": m}, NUMBERS, st.one_of(NUMBERS, st.text(max_size=9))),
 )
 TEXTS = st.one_of(st.text(max_size=40), st.builds(lambda a, b: f"x={a} y={b}", st.floats(), st.floats()))
 ENDPOINTS = st.builds(
@@ -79,6 +85,10 @@ ENDPOINTS = st.builds(
     st.sampled_from(["reliable", "best_effort", ""]),
     st.sampled_from(["volatile", "transient_local", ""]),
 )
+SENDERS = st.sampled_from(["grader", "student"])
+SERVICE_ENDS = st.builds(
+    ServiceEnd, st.sampled_from(["service", "client"]), st.sampled_from([BATTERY, "/b"]), TYPES, st.just("/a")
+)
 OBSERVATIONS = st.one_of(
     st.builds(Message, TIMES, NAMES, TYPES, VALUES),
     st.builds(Delivery, TIMES, NAMES, TYPES, VALUES),
@@ -86,6 +96,9 @@ OBSERVATIONS = st.one_of(
     st.builds(OutputLine, TIMES, FILES, st.sampled_from(["stdout", "stderr"]), TEXTS),
     st.builds(Fault, TIMES, FILES, st.sampled_from(list(FaultKind)), TEXTS),
     st.builds(Mark, TIMES, st.sampled_from(["stream_starts", "stream_stops", "limit"]), NAMES),
+    st.builds(Request, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
+    st.builds(Response, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
+    st.builds(lambda t, e: GraphSnapshot(t, (), (), tuple(e)), TIMES, st.lists(SERVICE_ENDS, max_size=3)),
     st.builds(lambda t, e: GraphSnapshot(t, (), tuple(e)), TIMES, st.lists(ENDPOINTS, max_size=4)),
 )
 

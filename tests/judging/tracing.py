@@ -20,6 +20,9 @@ from grader.model.trace import (
     Message,
     Observation,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 
@@ -27,6 +30,7 @@ TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"
 FLOAT32 = "std_msgs/msg/Float32"
 FLOAT64 = "std_msgs/msg/Float64"
+TRIGGER = "std_srvs/srv/Trigger"
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
 
 
@@ -39,6 +43,7 @@ class Recording:
     process: str = "node.py"
     items: list[Observation] = field(default_factory=list)
     ends: list[Endpoint] = field(default_factory=list)
+    services: list[ServiceEnd] = field(default_factory=list)
 
     def add(self, *observations: Observation) -> Recording:
         self.items.extend(observations)
@@ -105,7 +110,42 @@ class Recording:
 
     def snapshot(self, t_s: float, ends: Sequence[Endpoint]) -> Recording:
         nodes = tuple(sorted({e.node for e in ends}))
-        return self.add(GraphSnapshot(nanoseconds(t_s), nodes, tuple(ends)))
+        return self.add(GraphSnapshot(nanoseconds(t_s), nodes, tuple(ends), tuple(self.services)))
+
+    def service(
+        self, kind: str, service: str, type_: str = TRIGGER, node: str = "/node", t_s: float = 0.0
+    ) -> Recording:
+        """Add a server or a client to the graph, and the snapshot that shows it."""
+        self.services.append(ServiceEnd(kind, service, type_, node))
+        return self.snapshot(t_s, self.ends)
+
+    def request(
+        self,
+        t_s: float,
+        service: str,
+        number: int,
+        sender: str = "grader",
+        value: Mapping[str, Any] | None = None,
+        type_: str = TRIGGER,
+        client: int = 1,
+    ) -> Recording:
+        """Add a request; its client is 0 where a student asks."""
+        who = client if sender == "grader" else 0
+        return self.add(Request(nanoseconds(t_s), service, type_, number, sender, who, value or {}))
+
+    def response(
+        self,
+        t_s: float,
+        service: str,
+        number: int,
+        value: Mapping[str, Any],
+        sender: str = "student",
+        type_: str = TRIGGER,
+        client: int = 1,
+    ) -> Recording:
+        """Add the response to the request of that number."""
+        who = client if sender == "student" else 0
+        return self.add(Response(nanoseconds(t_s), service, type_, number, sender, who, value))
 
     def mark(self, t_s: float, name: str, detail: str) -> Recording:
         return self.add(Mark(nanoseconds(t_s), name, detail))

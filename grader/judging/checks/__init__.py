@@ -9,6 +9,8 @@ from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.judging.checks.service_sequence import ServiceSequence
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 
@@ -30,6 +32,10 @@ CHECKS: dict[str, type] = {
     "field_function": FieldFunction,
     "logs_every": LogsEvery,
     "logs_values": LogsValues,
+    "service_available": ServiceAvailable,
+    "service_answers_all": ServiceAnswersAll,
+    "service_response": ServiceResponse,
+    "service_sequence": ServiceSequence,
 }
 
 __all__ = ["CHECKS"]

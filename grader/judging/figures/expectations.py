@@ -15,9 +15,12 @@ from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.judging.checks.service_sequence import ServiceSequence
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 from grader.judging.printed import times
+from grader.judging.rules import told
 from grader.judging.wording import number, span, unit_of
 from grader.model.exercise import Check
 from grader.model.quantities import seconds
@@ -105,6 +108,26 @@ def _logged_values(check: LogsValues) -> str:
     return f"{check.process} logs {products} for each message on {check.topic}; printing alone is half of it"
 
 
+def _available(check: ServiceAvailable) -> str:
+    return f"the service {check.service} with type {check.type}"
+
+
+def _answers(check: ServiceAnswersAll) -> str:
+    return f"a response to every request on {check.service} within {number(seconds(check.within))} s"
+
+
+def _response(check: ServiceResponse) -> str:
+    return f"in every response of {check.service}: {told(check.fields)}"
+
+
+def _sequence(check: ServiceSequence) -> str:
+    said = (
+        f"{check.field} of {check.service} tells {number(check.first)} first, then {number(check.step)} more each time"
+    )
+    again = "" if check.reset_to is None else f"; {number(check.reset_to)} instead of what lies beyond"
+    return said + (f", not beyond {number(check.floor)}{again}" if check.floor is not None else "")
+
+
 _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
     {
         Publishes: _publishes,
@@ -123,5 +146,9 @@ _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
         FieldFunction: _function,
         LogsEvery: _rhythm,
         LogsValues: _logged_values,
+        ServiceAvailable: _available,
+        ServiceAnswersAll: _answers,
+        ServiceResponse: _response,
+        ServiceSequence: _sequence,
     }
 )

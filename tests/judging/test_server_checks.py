@@ -1,0 +1,253 @@
+"""A battery server: there, answering everybody, in the right words and numbers; and what students make of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import pytest
+from tracing import TRIGGER, Recording
+
+from grader.judging.checks.service_sequence import ServiceSequence
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
+from grader.judging.findings import FAULT_KEY
+from grader.judging.rules import FieldRule
+from grader.model.errors import HarnessError
+from grader.model.quantities import NS_PER_S
+from grader.model.trace import ClockKind
+
+BATTERY = "/battery/get_status"
+FORM = FieldRule(pattern=r"Battery: [0-9]+\.[0-9]% remaining", example="Battery: 84.5% remaining")
+AVAILABLE = ServiceAvailable(BATTERY, TRIGGER)
+RESPONSE = ServiceResponse(BATTERY, {"success": True, "message": FORM})
+SEQUENCE = ServiceSequence(BATTERY, first=84.5, step=-0.5, floor=0.0, reset_to=100.0)
+ALL = ServiceAnswersAll(BATTERY, NS_PER_S)
+
+
+def levels(start: float = 85.0, step: float = 0.5, reset: float = 100.0) -> Iterator[float]:
+    level = start
+    while True:
+        level -= step
+        if level < 0:
+            level = reset
+        yield level
+
+
+def status(level: float) -> dict[str, Any]:
+    return {"success": True, "message": f"Battery: {level:.1f}% remaining"}
+
+
+def asked(
+    values: Iterable[Mapping[str, Any] | None], clients: int = 1, period_s: float = 0.05, late_s: float = 0.0
+) -> Recording:
+    """A server that is asked from t = 1 s on, by several clients at the same instants; None is no response."""
+    rec = Recording(30.0, process="battery_service_server.py").service("service", BATTERY, TRIGGER, "/battery_monitor")
+    for k, value in enumerate(values):
+        t = 1.0 + period_s * (k // clients)
+        rec.request(t, BATTERY, k + 1, client=k % clients + 1)
+        if value is not None:
+            rec.response(t + late_s, BATTERY, k + 1, value, client=k % clients + 1)
+    return rec
+
+
+def answering(count: int = 210, write: Any = status, source: Iterator[float] | None = None, **kw: Any) -> Recording:
+    chosen = source or levels()
+    return asked([write(next(chosen)) for _ in range(count)], **kw)
+
+
+def test_the_chapters_server_meets_everything() -> None:
+    """More than two hundred calls, past the reset."""
+    trace = answering().trace()
+    for check in (AVAILABLE, RESPONSE, SEQUENCE, ALL):
+        finding = check.judge(trace)
+        assert finding.credit == 1, finding.reason
+    numbers = SEQUENCE.judge(trace).evidence["numbers"]
+    assert numbers[:2] == [84.5, 84.0]
+    assert numbers[168:172] == [0.5, 0.0, 100.0, 99.5]
+
+
+@pytest.mark.parametrize("clients", [2, 3, 5])
+def test_several_clients_share_one_number(clients: int) -> None:
+    """The calls of one instant may be answered in any order."""
+    values = [next(source) for source in [levels()] for _ in range(60)]
+    groups = [values[k : k + clients] for k in range(0, 60, clients)]
+    backwards = [status(v) for group in groups for v in reversed(group)]
+    trace = asked(backwards, clients=clients).trace()
+    assert SEQUENCE.judge(trace).credit == 1
+    assert f"of {clients} clients" in ALL.judge(trace).reason
+    own = asked([status(84.5 - 0.5 * (k // clients)) for k in range(60)], clients=clients).trace()
+    assert SEQUENCE.judge(own).credit == 0
+    assert "more than once" in SEQUENCE.judge(own).reason
+
+
+def test_a_lost_response_does_not_move_the_numbers() -> None:
+    """It is missing in the one check, and its number was used up in the other."""
+    source = levels()
+    values = [status(next(source)) for _ in range(40)]
+    trace = asked([None if k == 7 else v for k, v in enumerate(values)]).trace()
+    assert SEQUENCE.judge(trace).credit == 1
+    finding = ALL.judge(trace)
+    assert finding.credit == 0
+    assert finding.reason.startswith("t = 1.350 s, /battery/get_status: no response, expected one within 1.0 s")
+    assert "so for 1 of 40 requests" in finding.reason
+
+
+WRONG_NUMBERS = {
+    "told before lowered": (lambda: (85.0 - 0.5 * k for k in range(99)), "before the step is told", "first, then"),
+    "whole steps": (lambda: levels(step=1.0), "changes by -1 with each call, expected -0.5", ""),
+    "rises": (lambda: (85.5 + 0.5 * k for k in range(99)), "changes by 0.5", ""),
+    "constant": (lambda: (84.5 for _ in range(99)), "84.5 in every response", "attribute"),
+    "starts at 100": (lambda: levels(100.0), "the first number is 99.5", ""),
+    "reset to 85": (lambda: levels(reset=85.0), "85 after 0 in response 171, expected 100", ""),
+    "reset a step later": (lambda: (84.5 - 0.5 * k for k in range(300)), "-0.5 after 0 in response 171", ""),
+    "stops at 0": (lambda: (max(0.0, 84.5 - 0.5 * k) for k in range(300)), "0 after 0 in response 171", ""),
+    "every second call": (lambda: (84.5 - 0.5 * (k // 2) for k in range(300)), "more than once", "attribute"),
+    "no number": (lambda: (math.nan for _ in range(300)), "nan in response 1", ""),
+}
+
+
+@pytest.mark.parametrize(("source", "said", "hint"), WRONG_NUMBERS.values(), ids=WRONG_NUMBERS)
+def test_other_numbers_are_named(source: Any, said: str, hint: str) -> None:
+    """The first wrong response, and what the numbers do instead where that is plain."""
+    values = [v for v, _ in zip(source(), range(210), strict=False)]
+    finding = SEQUENCE.judge(asked(map(status, values)).trace())
+    assert finding.credit == 0
+    assert said in finding.reason
+    assert hint in finding.hint
+    texts = [status(v) for v in values if v >= 0]
+    assert not texts or RESPONSE.judge(asked(texts).trace()).credit == 1
+
+
+WRONG_TEXTS = {
+    "two decimals": lambda v: {"success": True, "message": f"Battery: {v:.2f}% remaining"},
+    "no percent sign": lambda v: {"success": True, "message": f"Battery: {v:.1f} remaining"},
+    "a space": lambda v: {"success": True, "message": f"Battery: {v:.1f} % remaining"},
+    "more text": lambda v: {"success": True, "message": f"Battery: {v:.1f}% remaining."},
+    "no success": lambda v: {"success": False, "message": f"Battery: {v:.1f}% remaining"},
+    "whole numbers": lambda v: {"success": True, "message": f"Battery: {v:.0f}% remaining"},
+    "empty": lambda v: {"success": True, "message": ""},
+    "one as a number": lambda v: {"success": 1, "message": f"Battery: {v:.1f}% remaining"},
+    "no field": lambda v: {"success": True},
+}
+
+
+@pytest.mark.parametrize("write", WRONG_TEXTS.values(), ids=WRONG_TEXTS)
+def test_other_words_are_named(write: Any) -> None:
+    """What is in the response, and what was expected."""
+    finding = RESPONSE.judge(answering(9, write).trace())
+    assert finding.credit == 0
+    assert finding.reason.startswith("t = 1.000 s, /battery/get_status: ")
+    assert "expected" in finding.reason
+    assert "wrong in 9 of 9 responses" in finding.reason
+    assert "\\." not in finding.reason
+
+
+def test_the_words_and_the_numbers_are_two_questions() -> None:
+    """Two decimals lose one of them only; a text without a number loses both."""
+    assert SEQUENCE.judge(answering(9, WRONG_TEXTS["two decimals"]).trace()).credit == 1
+    empty = SEQUENCE.judge(answering(9, WRONG_TEXTS["empty"]).trace())
+    assert "no number in ''" in empty.reason
+
+
+def test_a_field_at_its_default_was_forgotten() -> None:
+    """The hint says where it is set."""
+    hint = RESPONSE.judge(answering(9, WRONG_TEXTS["no success"]).trace()).hint
+    assert hint == "set response.success before the response is returned"
+    assert RESPONSE.judge(answering(9, WRONG_TEXTS["two decimals"]).trace()).hint == ""
+
+
+def test_a_number_may_be_a_field_or_found_by_a_pattern() -> None:
+    """Rising numbers work as well."""
+    rec = asked([{"sum": 2 * k} for k in range(9)])
+    assert ServiceSequence(BATTERY, 0, 2, field="sum").judge(rec.trace()).credit == 1
+    rec = asked([{"message": f"node 7 says {3 * k}!"} for k in range(9)])
+    assert ServiceSequence(BATTERY, 0, 3, pattern="says ([0-9]+)").judge(rec.trace()).credit == 1
+    assert ServiceSequence(BATTERY, 0, 3).judge(rec.trace()).credit == 0
+    rec = asked([{"message": str(min(k, 4))} for k in range(9)])
+    assert ServiceSequence(BATTERY, 0, 1, floor=4).judge(rec.trace()).credit == 1
+
+
+def test_a_server_that_is_not_there_is_explained() -> None:
+    """By another name, with another type, by a crash, or not at all."""
+    other = Recording(5).service("service", "/get_status", TRIGGER, "/battery_monitor")
+    assert "'/get_status'" not in AVAILABLE.judge(other.trace()).reason
+    assert "offers /get_status [std_srvs/srv/Trigger]" in AVAILABLE.judge(other.trace()).reason
+    typed = Recording(5).service("service", BATTERY, "std_srvs/srv/SetBool")
+    assert "of type std_srvs/srv/SetBool, expected std_srvs/srv/Trigger" in AVAILABLE.judge(typed.trace()).reason
+    crashed = AVAILABLE.judge(Recording(5).crashed(0.0).trace())
+    assert FAULT_KEY in crashed.evidence
+    assert "not in the ROS graph in 5.0 s" in AVAILABLE.judge(Recording(5).trace()).reason
+    for check in (RESPONSE, SEQUENCE, ALL):
+        finding = check.judge(other.trace())
+        assert (finding.credit, finding.blocked_by) == (0, "service_available")
+
+
+def test_a_server_that_nobody_asked_is_ours() -> None:
+    """Unless it ended before."""
+    there = Recording(5).service("service", BATTERY)
+    for check in (RESPONSE, SEQUENCE, ALL):
+        with pytest.raises(HarnessError):
+            check.judge(there.trace())
+    there.crashed(0.5)
+    for check in (RESPONSE, SEQUENCE, ALL):
+        assert FAULT_KEY in check.judge(there.trace()).evidence
+
+
+def test_an_answer_shows_a_server_without_a_graph() -> None:
+    """The graph is not looked at in every recording."""
+    rec = Recording(5).request(1, BATTERY, 1).response(1, BATTERY, 1, status(84.5))
+    assert AVAILABLE.judge(rec.trace()).credit == 1
+
+
+def test_a_callback_that_returns_nothing_answers_nobody() -> None:
+    """In silence or with an exception."""
+    silent = ALL.judge(asked([None] * 5).trace())
+    assert silent.credit == 0
+    assert "return response" in silent.hint
+    assert RESPONSE.judge(asked([None] * 5).trace()).blocked_by == "service_answers_all"
+    raised = ALL.judge(asked([None] * 5).crashed(1.0, "TypeError: no response", 20).trace())
+    assert FAULT_KEY in raised.evidence
+    assert FAULT_KEY in RESPONSE.judge(asked([None] * 5).crashed(1.0).trace()).evidence
+
+
+def test_a_slow_answer_is_late_on_one_clock_and_let_pass_on_the_other() -> None:
+    """A quarter of a second is the machine's."""
+    values = [status(v) for v, _ in zip(levels(), range(5), strict=False)]
+    for late_s, clock, credit in (
+        (1.0, ClockKind.VIRTUAL, 1),
+        (1.1, ClockKind.VIRTUAL, 0),
+        (1.2, ClockKind.WALL, 1),
+        (1.3, ClockKind.WALL, 0),
+    ):
+        rec = asked(values, late_s=late_s, period_s=2.0)
+        rec.clock = clock
+        assert ALL.judge(rec.trace()).credit == credit
+    late = ALL.judge(asked(values, late_s=1.5, period_s=2.0).trace())
+    assert "the response came after 1.500 s" in late.reason
+
+
+def test_what_cannot_have_been_answered_yet_is_left_out() -> None:
+    """A request at the very end is nobody's fault."""
+    rec = answering(5)
+    rec.request(29.9, BATTERY, 6)
+    assert ALL.judge(rec.trace()).credit == 1
+
+
+@pytest.mark.parametrize(
+    ("rule", "right", "wrong"),
+    [
+        (FieldRule(equals=1.5, tolerance=0.1), [1.4, 1.6, 1.5], [1.3, math.nan, "1.5", True, None, math.inf]),
+        (FieldRule(equals="a"), ["a"], ["b", 1, None]),
+        (FieldRule(equals="yes"), [True, "yes"], [False, 1, "no"]),
+        (FieldRule(equals=False), [False], [True, 0, 0.0, ""]),
+        (FieldRule(low=1), [1, 2, math.inf], [0.9, math.nan, "2", True]),
+        (FieldRule(high=1), [1, -5], [1.1, math.nan]),
+        (FieldRule(low=0, high=1, pattern="x"), [], [0.5, "x"]),
+        (FieldRule(pattern="a+"), ["aa"], ["ab", "", 1, "a" * 3000]),
+    ],
+)
+def test_a_rule_allows_what_it_says(rule: FieldRule, right: list[Any], wrong: list[Any]) -> None:
+    """Yes is no 1, and no number is in a range."""
+    assert all(map(rule.allows, right))
+    assert not any(map(rule.allows, wrong))
