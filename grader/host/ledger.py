@@ -9,6 +9,7 @@ import weakref
 from collections import Counter, deque
 from typing import Any
 
+from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 
@@ -24,6 +25,10 @@ BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 ARRIVAL_S = 1.0
 #: How long, in real time, a new endpoint is waited for to be matched.
 MATCH_S = 5.0
+#: How long, in real time, contexts may take to shut down at a signal.
+SHUTDOWN_S = 1.0
+#: Whether a context is alive, without a look that would let time pass.
+_CONTEXT_OK = Context.ok
 
 
 def type_name(interface: Any) -> str:
@@ -101,6 +106,7 @@ class Ledger:
             for endpoint in self.alive(kind)
             if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
         ]
+        claims += [{"kind": "node", "name": node.get_fully_qualified_name(), "type": ""} for node in self.nodes()]
         return claims + [claim for node in self.nodes() for claim in _parameters(node)]
 
     def nodes(self) -> list[Any]:
@@ -174,6 +180,13 @@ class Ledger:
         contexts = (reference() for reference in reversed(self.contexts))
         return next((context for context in contexts if context is not None and context.ok()), None)
 
+    def await_shutdown(self) -> None:
+        """Wait, in real time, until rclpy has shut down the contexts that a signal ends; not all are ended by one."""
+        deadline = originals.perf_counter() + SHUTDOWN_S
+        contexts = [context for reference in self.contexts if (context := reference()) is not None]
+        while any(map(_CONTEXT_OK, contexts)) and originals.perf_counter() < deadline:
+            originals.sleep(0.001)
+
     def handles(self) -> dict[int, Any]:
         """Return the receivers by the address of their handles, as a wait set knows them."""
         return {
@@ -194,6 +207,13 @@ class Ledger:
             originals.sleep(0.0005)
             missing = self._unmatched(expected)
         return missing
+
+    def await_absence(self, services: list[str]) -> None:
+        """Wait, in real time, until clients know that the servers of some services have gone."""
+        deadline = originals.perf_counter() + MATCH_S
+        clients = [client for client in self.alive("client") if service_name(client) in services]
+        while any(_matches("client", client) for client in clients) and originals.perf_counter() < deadline:
+            originals.sleep(0.0005)
 
     def _unmatched(self, expected: dict[str, dict[str, int]]) -> list[str]:
         missing = []

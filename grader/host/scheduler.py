@@ -85,7 +85,13 @@ class Scheduler:
             return
         strand.deadline_ns, strand.polls, strand.polled_in, strand.parked = deadline_ns, polls, self._round, True
         self._parked.append(strand)
-        self._hand_on(strand)
+        try:
+            self._hand_on(strand)
+        except BaseException:
+            if strand.parked:  # a signal handler raised while this strand looked for what runs next: it goes on
+                self._parked.remove(strand)
+                strand.parked = False
+            raise
 
     def wake(self, strand: Strand) -> None:
         """Make a parked strand runnable."""

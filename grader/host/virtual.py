@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: After the stop signal the host's own clock runs on, at most this far.
 STOPPING_NS = 60_000_000_000
+#: Real seconds in which a thread that waits for its turn hears of a signal.
+INTERRUPT_S = 0.02
 
 
 class VirtualTime:
@@ -127,6 +129,7 @@ class VirtualTime:
         self.running = True
         while "match" in answer and self._ledger is not None:
             missing = self._ledger.await_matches(answer["match"])
+            self._ledger.await_absence(answer.get("gone", []))
             answer = self._link.ask({"kind": "matched", "missing": missing})
         if answer.get("stop"):
             self._stopping = True
@@ -137,6 +140,22 @@ class VirtualTime:
         self._free_until_ns = answer["free_until_ns"]
         if self._ledger is not None and answer.get("arrivals"):
             self._ledger.expect(answer["arrivals"])
+        if answer.get("interrupt"):
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        """Get the stop signal as from Ctrl-C, while time stays with the grader.
+
+        The program's main thread hears of it here, or where it waits for its turn; rclpy shuts its contexts down in a
+        thread of its own, which is waited for: what the program sees must not depend on who is faster.
+        """
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            originals.sleep(INTERRUPT_S)
+        finally:
+            if self._ledger is not None:
+                self._ledger.await_shutdown()
+            self.scheduler.progress()
 
     def _may_go_on(self, wake_ns: int) -> bool:
         """Return whether time may move on unasked: nothing else happens until then, and nothing is to be told."""

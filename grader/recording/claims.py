@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from grader.recording.exchanges import PlannedMessages
+from grader.recording.service_ends import BACKGROUND_TYPES
 from grader.recording.student import Student
 
 #: Nobody sends more messages than this between two reports.
@@ -40,6 +42,25 @@ def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
         and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
         and (writer["manual"] or not reader["manual"])
     )
+
+
+def offered(stream: PlannedMessages) -> dict[str, Any]:
+    """Return the publisher of a stimulus of a fixed type as a process would claim it."""
+    return {
+        "name": stream.topic,
+        "type": stream.type,
+        "reliable": not stream.best_effort,
+        "latched": stream.latched,
+        "deadline_ns": 0,
+        "manual": False,
+    }
+
+
+def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
+    """Return whether a claim means that a service is there: its server, or the node that every such service has."""
+    if claim["kind"] == "node":
+        return interface.startswith(BACKGROUND_TYPES) and claim["name"] == service.rpartition("/")[0]
+    return (claim["kind"], claim["name"], claim["type"]) == ("service", service, interface)
 
 
 def takes_ordinary(reader: dict[str, Any]) -> bool:

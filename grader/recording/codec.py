@@ -21,6 +21,9 @@ from grader.model.trace import (
     Observation,
     Offer,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 
@@ -50,7 +53,12 @@ def observation_to_json(observation: Observation) -> list[Any]:
         return [kind, observation.t_ns, observation.topic, observation.type, plain(observation.value), cdr]
     if isinstance(observation, GraphSnapshot):
         ends = [[getattr(e, name) for name in Endpoint.__slots__] for e in observation.endpoints]
-        return ["graph", observation.t_ns, list(observation.nodes), ends]
+        services = [[getattr(e, name) for name in ServiceEnd.__slots__] for e in observation.services]
+        return ["graph", observation.t_ns, list(observation.nodes), ends, *([services] if services else [])]
+    if isinstance(observation, (Request, Response)):
+        kind = "request" if isinstance(observation, Request) else "response"
+        *fields, value, cdr = (getattr(observation, name) for name in Request.__slots__)
+        return [kind, *fields, plain(value), base64.b64encode(cdr).decode()]
     if isinstance(observation, Fault):
         fields = [getattr(observation, name) for name in Fault.__slots__]
         return ["fault", *fields[:2], observation.kind.value, *fields[3:6], list(observation.frames)]
@@ -123,8 +131,33 @@ def _line(fields: list[Any]) -> OutputLine:
 
 
 def _graph(fields: list[Any]) -> GraphSnapshot:
-    t_ns, nodes, ends = fields
-    return GraphSnapshot(_whole(t_ns), tuple(map(_text, _list(nodes))), tuple(_endpoint(e) for e in _list(ends)))
+    t_ns, nodes, ends, *rest = fields
+    (services,) = rest or ([],)
+    return GraphSnapshot(
+        _whole(t_ns),
+        tuple(map(_text, _list(nodes))),
+        tuple(_endpoint(e) for e in _list(ends)),
+        tuple(_service_end(e) for e in _list(services)),
+    )
+
+
+def _service_end(fields: list[Any]) -> ServiceEnd:
+    kind, service, interface, node = map(_text, fields)
+    return ServiceEnd(kind, service, interface, node)
+
+
+def _exchange(of: type[Request] | type[Response], fields: list[Any]) -> Request | Response:
+    t_ns, service, kind, number, sender, client, value, cdr = fields
+    return of(
+        _whole(t_ns),
+        _text(service),
+        _text(kind),
+        _whole(number),
+        _text(sender),
+        _whole(client),
+        lively(_mapping(value)),
+        _bytes(cdr),
+    )
 
 
 def _endpoint(fields: list[Any]) -> Endpoint:
@@ -198,6 +231,8 @@ def _mapping(value: Any) -> dict[str, Any]:
 READERS: Mapping[str, Callable[[list[Any]], Observation]] = {
     "message": _message,
     "delivery": _delivery,
+    "request": lambda fields: _exchange(Request, fields),
+    "response": lambda fields: _exchange(Response, fields),
     "log": _log,
     "line": _line,
     "graph": _graph,

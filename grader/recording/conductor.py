@@ -6,17 +6,30 @@ is left to do at that instant. Then time jumps to the next moment at which anybo
 
 from __future__ import annotations
 
+import bisect
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, Mark, Offer, Trace
-from grader.recording.claims import announce, compatible, counts, is_claim, readers_of, takes_ordinary
-from grader.recording.ending import ending_fault, reported_fault
+from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Offer, Trace
+from grader.recording.claims import (
+    announce,
+    compatible,
+    counts,
+    is_claim,
+    offered,
+    readers_of,
+    serves,
+    takes_ordinary,
+)
+from grader.recording.desk import Desk
+from grader.recording.ending import ending, never_stopped, reported_fault
+from grader.recording.exchanges import PlannedCalls, PlannedMessages
+from grader.recording.interfaces import built, message_class, plain_fields
 from grader.recording.observer import Observer, Taken, wait_until
 from grader.recording.plan import Plan
-from grader.recording.stimuli import Due, number_message, numeric_field, schedule
+from grader.recording.stimuli import APPEARANCES, BROADCASTS, Due, number_message, numeric_field, schedule
 from grader.recording.student import Student
 from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
 
@@ -64,10 +77,14 @@ class Conductor:
         self._now_ns = 0
         self._free_until_ns = 0
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
-        self._due = schedule(plan.numbers, plan.recordings)
+        self._due = schedule(plan)
         self._streams: dict[str, str] = {}
+        self._fixed: dict[str, PlannedMessages] = {}
         self._tape = Tape(plan.limits)
-        self._requesters: dict[str, list[Student]] = {}
+        nodes = lambda: self._tape.graph.nodes  # noqa: E731 - it changes
+        self._desk = Desk(plan, observer.services, self._tape, nodes=nodes, later=self._later)
+        self._starts_ns = dict(plan.starts_ns)
+        self._stop_ns = 0
         self._losses = 0
         self._steps = 0
 
@@ -77,25 +94,49 @@ class Conductor:
             student.ready_ns = student.measured_ns
         self._play(phase="before")
         for student in self._students:
-            self._step(student)
+            student.wake_ns = self._starts_ns.get(student.name)
+            if student.wake_ns is None:
+                self._step(student)
+        self._run_on()
+        if not any(s.ended for s in self._students):
+            self._look_at_graph()  # what has ended disappears from the graph at a moment that is nobody's
+        self._stop_ns = self._end_ns
+        unfit = self._unfit()
+        if self._plan.shutdown_ns and not (unfit or self._tape.full):
+            self._shut_down()
+        return Trace(
+            scenario=self._plan.scenario,
+            clock=ClockKind.VIRTUAL,
+            clock_reason=unfit,
+            stop_ns=self._stop_ns,
+            observations=tuple(self._tape.observations),
+            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+        )
+
+    def _run_on(self) -> None:
+        """Step through time until the end, or until nothing more can happen."""
         while not self._finished():
             self._settle()
             if self._now_ns >= self._end_ns:
                 break
             self._now_ns = self._next_ns()
-        if not any(s.ended for s in self._students):
-            self._look_at_graph()  # what has ended disappears from the graph at a moment that is nobody's
-        return Trace(
-            scenario=self._plan.scenario,
-            clock=ClockKind.VIRTUAL,
-            clock_reason=self._unfit(),
-            stop_ns=self._end_ns,
-            observations=tuple(self._tape.observations),
-            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
-        )
+
+    def _shut_down(self) -> None:
+        """Send every process the stop signal, as Ctrl-C does, and let time go on until all have ended."""
+        self._now_ns, self._due = self._stop_ns, []
+        self._end_ns = self._stop_ns + self._plan.shutdown_ns
+        for student in self._students:
+            if not student.ended:
+                student.stop_signalled = True
+                self._tape.add(Mark(self._now_ns, "stop_signal", student.name))
+                self._step(student)
+        self._run_on()
+        for student in self._students:
+            if not student.ended:
+                self._tape.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
 
     def _finished(self) -> bool:
-        return all(s.ended for s in self._students) and not self._due
+        return all(s.ended for s in self._students) and not any(d.action in BROADCASTS for d in self._due)
 
     def _next_ns(self) -> int:
         moments = [self._end_ns]
@@ -107,9 +148,13 @@ class Conductor:
         """Let everything happen that happens at this instant."""
         if self._now_ns >= self._end_ns:
             return
-        self._play()
-        while (student := self._next_student()) is not None and self._now_ns < self._end_ns:
-            self._step(student)
+        while self._now_ns < self._end_ns:
+            self._play()
+            student = self._next_student()
+            if student is not None:
+                self._step(student)
+            elif not self._due or self._due[0].t_ns > self._now_ns:
+                return
 
     def _next_student(self) -> Student | None:
         return next(
@@ -124,10 +169,16 @@ class Conductor:
     def _step(self, student: Student) -> None:
         """Tell one process the time and what is on its way, and handle its report."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
+        if self._starts_ns.pop(student.name, 0):
+            student.ready_ns = student.measured_ns
+            self._tape.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
         free_ns = EPOCH_NS + self._free_until_ns
-        student.tell({"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals})
+        answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
+        student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
+        student.stopping = student.stop_signalled
         self._hear(student)
+        self._dismiss_done()
         self._steps += 1
         if self._plan.stop_when_unfit and self._hopeless():
             self._end_ns = self._now_ns
@@ -174,7 +225,8 @@ class Conductor:
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
-                self._end(student, ending_fault(student.name, self._now_ns, report, self._plan.limits))
+                stopped = student.stop_signalled
+                self._end(student, ending(student.name, self._now_ns, report, self._plan, stopped=stopped))
                 return
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
@@ -191,6 +243,7 @@ class Conductor:
             self._tape.note(f"{student.name}: {some} on {where} did not arrive in time")
         sent = counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
+        self._collect_exchanges(sent)
         self._forward(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
@@ -226,6 +279,22 @@ class Conductor:
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._tape.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
+    def _collect_exchanges(self, sent: Mapping[str, int]) -> None:
+        """Wait until the requests and responses for the grader have been taken here, and write them down."""
+        expected = self._desk.expected(sent)
+        if not expected:
+            return
+
+        def complete() -> bool:
+            expected.subtract(self._desk.take())
+            return all(count <= 0 for count in expected.values())
+
+        if not wait_until(complete, SETTLE_S if self._losses < PATIENCE else IMPATIENT_S):
+            self._losses += 1
+            for channel in sorted(c for c, n in expected.items() if n > 0):
+                self._tape.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
+        self._desk.write_down(self._now_ns)
+
     def _record(self, message: Taken) -> None:
         if message.topic == self._plan.first_message_on and not self._tape.seen(message.topic):
             self._end_ns = self._now_ns + self._plan.duration_ns
@@ -243,38 +312,69 @@ class Conductor:
                 for student in self._students:
                     if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
                         announce(student.arrivals, channel, count)
-            elif kind == "request":
-                servers = [
-                    s for s in self._students if any(c["kind"] == "service" and c["name"] == name for c in s.claims)
-                ]
-                for student in servers:
-                    announce(student.arrivals, channel, count)
-                    self._requesters.setdefault(name, []).extend([sender] * count)
-            elif kind == "response":
-                waiting = self._requesters.get(name, [])
-                for _ in range(min(count, len(waiting))):
-                    announce(waiting.pop(0).arrivals, channel, 1)
+            elif kind in ("request", "response"):
+                self._announce_exchange(kind, name, count)
+
+    def _announce_exchange(self, kind: str, service: str, count: int) -> None:
+        """Tell processes of requests, or of responses, of which every client of the service gets all."""
+        for student in self._students:
+            ends = student.claims_of("service" if kind == "request" else "client", service)
+            if not student.ended and ends:
+                announce(student.arrivals, f"{kind} {service}", count)
 
     def _match(self) -> None:
         """Wait until every endpoint that the processes say they have is seen, watched and matched."""
         claims = [c for s in self._students if not s.ended for c in s.claims]
         ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        if not wait_until(lambda: self._sees(ends), SETTLE_S, pause_s=GRAPH_PAUSE_S):
+        if not wait_until(lambda: self._sees(claims), SETTLE_S, pause_s=GRAPH_PAUSE_S):
             self._tape.note("an endpoint that a node created was not seen in the graph")
         self._look_at_graph()
         unknown = self._observer.watch(self._tape.graph)
         self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in ends if c["kind"] == "publisher"]
         wait_until(lambda: all(self._watched(c, writers) for c in writers), SETTLE_S)
+        self._tell_all_matches()
+        for due in self._desk.ready(self._is_served):
+            self._later(Due(self._now_ns, due.action, due.topic, due.payload))
+
+    def _tell_all_matches(self) -> None:
+        """Have every process wait for the counterparts of its endpoints."""
+        claims = [c for s in self._students if not s.ended for c in s.claims]
         for student in self._students:
-            if not student.ended:
+            if not student.ended and student.claims:
                 self._tell_matches(student, claims)
 
-    def _sees(self, ends: list[dict[str, Any]]) -> bool:
-        graph = self._observer.graph(self._now_ns)
+    def _sees(self, claims: list[dict[str, Any]]) -> bool:
+        """Return whether the graph holds what the processes claim; nodes count only where they may be called."""
+        graph = self._graph_now()
         seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
+        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
         wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
-        return all(seen[key] >= count for key, count in wanted.items())
+        offered = {(e.kind, e.service, e.type) for e in graph.services}
+        exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
+        nodes = {c["name"] for c in claims if c["kind"] == "node" and self._plan.calls}
+        return (
+            all(seen[key] >= count for key, count in wanted.items())
+            and exchanging <= offered
+            and nodes <= set(graph.nodes)
+        )
+
+    def _graph_now(self) -> GraphSnapshot:
+        """Return the live graph, with services where a process has said that it has any."""
+        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
+        return self._observer.graph(self._now_ns, services=services or bool(self._tape.graph.services))
+
+    def _is_served(self, calls: PlannedCalls) -> bool:
+        """Return whether the server that some calls need is there and matched."""
+        service = self._desk.resolved(calls.service)
+        claims = [c for s in self._students if not s.ended for c in s.claims]
+        if service is None or not any(serves(c, service, calls.type) for c in claims):
+            return False
+        self._desk.meet(calls)
+        if wait_until(lambda: self._observer.services.met(service), SETTLE_S):
+            return True
+        self._tape.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
+        return False
 
     def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
         same = [
@@ -294,10 +394,11 @@ class Conductor:
             if count:
                 names = expected.setdefault(claim["kind"], {})
                 names[claim["name"]] = min(names.get(claim["name"], count), count)
-        if expected in ({}, student.told):
+        gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
+        if expected == student.told or not (expected or gone):
             return
         student.told = expected
-        student.tell({"match": expected})
+        student.tell({"match": expected, "gone": gone})
         answer = student.report()
         if answer is None or answer.get("kind") != "matched":
             self._bury(student)
@@ -315,13 +416,19 @@ class Conductor:
                 1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
             )
         if kind == "subscription":
-            stimulus = self._streams.get(name) == claim["type"] and takes_ordinary(claim)
+            fixed = self._fixed.get(name)
+            fits = takes_ordinary(claim) if fixed is None else compatible(offered(fixed), claim)
+            stimulus = self._streams.get(name) == claim["type"] and fits
             return int(stimulus) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
-        wanted = "service" if kind == "client" else "client"
-        return int(kind == "client" and any(c["kind"] == wanted and c["name"] == name for c in claims))
+        if kind != "client":
+            return 0
+        return int(
+            self._desk.serves(name, claim["type"])
+            or any((c["kind"], c["name"], c["type"]) == ("service", name, claim["type"]) for c in claims)
+        )
 
     def _look_at_graph(self) -> None:
-        self._tape.look(self._observer.graph(self._now_ns), self._observer.participants())
+        self._tape.look(self._graph_now(), self._observer.participants())
 
     def _write_output(self, student: Student, *, final: bool) -> None:
         self._tape.add(*student.output(self._now_ns, final=final))
@@ -333,28 +440,97 @@ class Conductor:
         self._write_output(student, final=True)
         self._end(student, death)
 
-    def _end(self, student: Student, *faults: Fault) -> None:
-        self._tape.add(*faults)
+    def _end(self, student: Student, *endings: Fault | Mark) -> None:
+        self._tape.add(*endings)
         student.ended = True
         student.wake_ns = None
         student.claims = []
 
     def _play(self, *, phase: str = "") -> None:
-        """Do what stimuli do at this instant; before the start, only what appears at once."""
+        """Do what stimuli do at this instant, of calls one at a time; before the start, only what appears at once."""
         while self._due and self._due[0].t_ns <= self._now_ns:
-            if phase and self._due[0].action != "appear":
+            if phase and self._due[0].action not in APPEARANCES:
                 return
-            self._do(self._due.pop(0))
+            due = self._due.pop(0)
+            self._do(due)
+            if due.action == "call":
+                return  # the next one follows when this one has arrived: so their order is always the same
+
+    def _later(self, due: Due) -> None:
+        """Have something done at a time, after everything else that is due then."""
+        bisect.insort(self._due, due, key=lambda d: d.t_ns)
 
     def _do(self, due: Due) -> None:
-        if due.action == "appear":
-            self._appear(due)
-        elif due.action == "disappear":
-            self._streams.pop(due.topic, None)
-            self._observer.withdraw(due.topic)
-            self._tape.add(Mark(self._now_ns, "stream_stops", due.topic))
+        action: dict[str, Callable[[Due], None]] = {
+            "appear": self._appear,
+            "offer": self._offer,
+            "publish": self._publish,
+            "say": self._say,
+            "disappear": self._disappear,
+            "serve": self._serve,
+            "dismiss": self._dismiss,
+            "answer": self._answer,
+            "meet": self._meet,
+            "call": self._call,
+        }
+        action[due.action](due)
+
+    def _disappear(self, due: Due) -> None:
+        self._streams.pop(due.topic, None)
+        self._fixed.pop(due.topic, None)
+        self._observer.withdraw(due.topic)
+        self._tape.add(Mark(self._now_ns, "stream_stops", due.topic))
+
+    def _meet(self, due: Due) -> None:
+        self._desk.meet(due.payload)
+
+    def _serve(self, due: Due) -> None:
+        self._desk.serve(self._now_ns, due.payload)
+        self._tell_all_matches()
+
+    def _dismiss(self, due: Due) -> None:
+        self._desk.dismiss(self._now_ns, due.payload)
+        self._tell_all_matches()
+
+    def _dismiss_done(self) -> None:
+        """Let servers go that have given their last answer, when it has arrived."""
+        for server in self._desk.done():
+            if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
+                self._dismiss(Due(self._now_ns, "dismiss", server.service, server))
+
+    def _answer(self, due: Due) -> None:
+        server, number = due.payload
+        if self._desk.answer(self._now_ns, server, number):
+            self._announce_exchange("response", server.service, 1)
+
+    def _call(self, due: Due) -> None:
+        """Send a request, or keep it until its server is there."""
+        if self._is_served(due.payload.calls):
+            service = self._desk.call(self._now_ns, due.payload)
+            self._announce_exchange("request", service, 1)
         else:
-            self._publish(due)
+            self._desk.wait(due)
+
+    def _offer(self, due: Due) -> None:
+        """Create the publisher of messages of a fixed type."""
+        stream = due.payload
+        self._fixed[due.topic] = stream
+        self._streams[due.topic] = stream.type
+        self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
+        readers = [c for s in self._students for c in readers_of(s, due.topic) if compatible(offered(stream), c)]
+        wait_until(lambda: self._observer.subscribers_matched(due.topic) >= len(readers), SETTLE_S)
+        self._tell_all_matches()
+        self._tape.add(Mark(self._now_ns, "stream_starts", due.topic))
+
+    def _say(self, due: Due) -> None:
+        """Publish one message of a fixed type."""
+        stream, fields = due.payload
+        message = built(message_class(stream.type), fields, due.topic)
+        self._tape.add(Delivery(self._now_ns, due.topic, stream.type, plain_fields(message)))
+        self._observer.publish(due.topic, message)
+        for student in self._students:
+            if any(compatible(offered(stream), c) for c in readers_of(student, due.topic)):
+                announce(student.arrivals, f"topic {due.topic}", 1)
 
     def _appear(self, due: Due) -> None:
         """Create a stimulus's publisher, of the type and durability that the students' subscriptions ask for."""
@@ -370,9 +546,7 @@ class Conductor:
         self._streams[topic] = interface
         readers = [c for c in asked if c["type"] == interface and takes_ordinary(c)]
         wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
-        for student in self._students:
-            if not student.ended and student.claims:
-                self._tell_matches(student, [c for s in self._students for c in s.claims])
+        self._tell_all_matches()
 
     def _publish(self, due: Due) -> None:
         """Publish one message of a stimulus and note for whom it is on its way."""

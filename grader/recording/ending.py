@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.model.limits import Limits
-from grader.model.quantities import size
-from grader.model.trace import Fault, FaultKind
+from grader.model.quantities import duration, size
+from grader.model.trace import Fault, FaultKind, Mark
 from grader.recording.isolation.start import OUTGROWN
+from grader.recording.plan import Plan
 
 KINDS = {kind.value: kind for kind in FaultKind}
 TEXT_CHARACTERS, PLACE_CHARACTERS, FRAMES = 500, 300, 20
@@ -18,6 +19,9 @@ NO_MEMORY = b"std::bad_alloc"
 _UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
 #: A process that had this share of the threads it may have, and then failed, wanted more.
 NEARLY_ALL = 0.9
+#: The exit code of a program that Ctrl-C has ended, and the exceptions that ROS programs end with then.
+STOPPED_CODE = 130
+NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
 
 
 def reported_fault(process: str, t_ns: int, data: Mapping[str, Any], limits: Limits) -> Fault:
@@ -42,6 +46,44 @@ def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Lim
         return reported_fault(process, t_ns, report["fault"], limits)
     code = report.get("code")
     return Fault(t_ns, process, FaultKind.EXITED, f"exited with code {code if type(code) is int else '?'}")
+
+
+def ending(process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, *, stopped: bool) -> Fault | Mark:
+    """Return the fault of a process that says how it ended, or the mark of an end that is none.
+
+    Args:
+        process: Name of the process.
+        t_ns: When.
+        report: What it says.
+        plan: Whether it is free to end, and its limits.
+        stopped: Whether it had got the stop signal.
+    """
+    if stopped and is_normal_stop(report):
+        return Mark(t_ns, "stopped", process)
+    if process in plan.may_exit and is_free_exit(report):
+        return Mark(t_ns, "exited", process)
+    return ending_fault(process, t_ns, report, plan.limits)
+
+
+def is_free_exit(report: Mapping[str, Any]) -> bool:
+    """Return whether a process says that it ended by itself and with code 0."""
+    return not isinstance(report.get("fault"), dict) and report.get("code") == 0
+
+
+def is_normal_stop(report: Mapping[str, Any]) -> bool:
+    """Return whether a process ended after the stop signal as ROS programs do.
+
+    rclpy shuts its contexts down at that signal, so a program that shuts down once more is told so.
+    """
+    fault = report.get("fault")
+    if isinstance(fault, dict):
+        return any(normal in str(fault.get("text", ""))[:TEXT_CHARACTERS] for normal in NORMAL_AT_STOP)
+    return report.get("code") in (0, STOPPED_CODE)
+
+
+def never_stopped(process: str, t_ns: int, patience_ns: int) -> Fault:
+    """Return the fault of a process that did not end after the stop signal."""
+    return Fault(t_ns, process, FaultKind.HUNG, f"did not end within {duration(patience_ns)} after Ctrl-C")
 
 
 def ended_by(signal: str) -> str:

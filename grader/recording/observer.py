@@ -6,8 +6,6 @@ never waits for an executor: messages are taken when the conductor asks for them
 
 from __future__ import annotations
 
-import importlib
-import re
 import secrets
 import time
 from collections import Counter
@@ -24,6 +22,8 @@ from rclpy.serialization import deserialize_message
 from grader.model.limits import Limits
 from grader.model.quantities import MIB, size
 from grader.model.trace import Endpoint, GraphSnapshot
+from grader.recording.interfaces import message_class, plain_fields
+from grader.recording.service_ends import ServiceEnds
 
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Deep enough for everything that can be published between two looks.
@@ -36,7 +36,6 @@ TOLD, NAME_CHARACTERS = 20, 200
 INFINITE_NS = 9_000_000_000_000_000_000
 #: What rclpy calls a node whose endpoints are known but whose name is not yet, or not any more.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +74,7 @@ class Observer:
         self._readers: dict[tuple[str, str, bool], Any] = {}
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
+        self.services = ServiceEnds(self.node)
         self._broken: Counter[str] = Counter()
         self._large: Counter[str] = Counter()
 
@@ -83,13 +83,20 @@ class Observer:
         self.node.destroy_node()
         self._context.shutdown()
 
-    def graph(self, t_ns: int) -> GraphSnapshot:
+    def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
         """Return the live graph without the grader's own node, everything sorted.
 
         An endpoint comes before the name of its node, and goes after it; without that name it is left out.
+
+        Args:
+            t_ns: What time it is.
+            services: Whether to look at services as well, which costs something.
         """
-        names = ((name, space) for name, space in self.node.get_node_names_and_namespaces() if name != self._name)
-        nodes = sorted({_full_name(name, space) for name, space in names if name != UNKNOWN_NODE})
+        names = [
+            pair for pair in self.node.get_node_names_and_namespaces() if pair[0] not in (self._name, UNKNOWN_NODE)
+        ]
+        nodes = sorted({_full_name(name, space) for name, space in names})
+        offered = self.services.graph(sorted(set(names))) if services else ()
         ends = []
         for topic, _ in sorted(self.node.get_topic_names_and_types(no_demangle=False)):
             if topic in BACKGROUND:
@@ -99,7 +106,7 @@ class Observer:
                 self._endpoint("subscription", topic, info) for info in self.node.get_subscriptions_info_by_topic(topic)
             ]
         students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
-        return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)))
+        return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
     def participants(self) -> int:
         """Return how many participants with endpoints of their own have appeared, without the grader's."""
@@ -190,13 +197,14 @@ class Observer:
             for topic, count in sorted(counts.items())[:TOLD]
         ]
 
-    def advertise(self, topic: str, interface: str, *, latched: bool) -> None:
-        """Create the publisher of a stimulus: reliable, and latched where a subscription asks for it."""
+    def advertise(self, topic: str, interface: str, *, latched: bool, best_effort: bool = False) -> None:
+        """Create the publisher of a stimulus: reliable unless it is to be less, latched where a subscription asks."""
         message = message_class(interface)
         if message is None:
             raise ValueError(interface)
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+        reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
+        qos = QoSProfile(depth=100, reliability=reliability, durability=durability)
         self._writers[topic] = self.node.create_publisher(message, topic, qos)
 
     def subscribers_matched(self, topic: str) -> int:
@@ -210,28 +218,6 @@ class Observer:
     def withdraw(self, topic: str) -> None:
         """Take the publisher of a stimulus out of the graph."""
         self.node.destroy_publisher(self._writers.pop(topic))
-
-
-def message_class(interface: str) -> Any:
-    """Return the class of a message type, or None if this machine has no such type."""
-    match = TYPE_NAME.fullmatch(interface)
-    if match is None:
-        return None
-    try:
-        return getattr(importlib.import_module(f"{match[1]}.msg"), match[2], None)
-    except ImportError:
-        return None
-
-
-def plain_fields(message: Any) -> Any:
-    """Return a message's fields as plain values, nested by name."""
-    if hasattr(message, "get_fields_and_field_types"):
-        return {name: plain_fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
-    if isinstance(message, (bool, int, float, str)):
-        return message
-    if isinstance(message, bytes):
-        return list(message)
-    return [plain_fields(item) for item in message]
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float = 0.0003) -> bool:

@@ -10,9 +10,33 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.model.limits import Limits
-from grader.model.scenario import Between, JustAbove, JustBelow, NumberSpec, NumberStream, OdometryStream, Scenario
+from grader.model.scenario import (
+    ActionGoal,
+    Between,
+    JustAbove,
+    JustBelow,
+    MessageStream,
+    NumberSpec,
+    NumberStream,
+    OdometryStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+)
 from grader.model.submission import Submission
 from grader.recording.bag import Odometry, window
+from grader.recording.exchanges import (
+    PlannedCalls,
+    PlannedGoal,
+    PlannedMessages,
+    PlannedServer,
+    from_json,
+    plan_calls,
+    plan_goal,
+    plan_messages,
+    plan_server,
+    to_json,
+)
 
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
 PlannedNumber = tuple[float, int]
@@ -58,6 +82,13 @@ class Plan:
         clock: `virtual` or `wall`.
         limits: How much the processes may use, and how much is taken down.
         stop_when_unfit: Whether a run on the virtual clock may end as soon as it is clear that it does no justice.
+        messages: Stimuli.
+        servers: Stimuli.
+        calls: Stimuli.
+        goals: Stimuli.
+        starts_ns: Name and time of the processes that start late.
+        may_exit: Names of the processes that are free to end.
+        shutdown_ns: How long processes may take to end after the stop signal; 0 if that is not looked at.
     """
 
     scenario: str
@@ -72,6 +103,22 @@ class Plan:
     clock: str
     limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
     stop_when_unfit: bool = False
+    messages: tuple[PlannedMessages, ...] = ()
+    servers: tuple[PlannedServer, ...] = ()
+    calls: tuple[PlannedCalls, ...] = ()
+    goals: tuple[PlannedGoal, ...] = ()
+    starts_ns: tuple[tuple[str, int], ...] = ()
+    may_exit: tuple[str, ...] = ()
+    shutdown_ns: int = 0
+
+
+#: The stimuli that are written the same way over the line, by their names in a plan.
+_EXCHANGES: Mapping[str, type[PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal]] = {
+    "messages": PlannedMessages,
+    "servers": PlannedServer,
+    "calls": PlannedCalls,
+    "goals": PlannedGoal,
+}
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
@@ -94,6 +141,9 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         for s in scenario.stimuli
         if isinstance(s, OdometryStream) and odometry is not None
     )
+    # each draws from a source of its own: one more stimulus changes no other
+    purposes = ("stimuli", exercise, scenario.id)
+    drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
     return Plan(
         scenario=scenario.id,
         processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
@@ -106,6 +156,13 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         recordings=recordings,
         clock=clock,
         limits=scenario.limits,
+        messages=tuple(plan_messages(s, source) for s, source in drawn if isinstance(s, MessageStream)),
+        servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
+        calls=tuple(plan_calls(s, source) for s, source in drawn if isinstance(s, ServiceCalls)),
+        goals=tuple(plan_goal(s, source) for s, source in drawn if isinstance(s, ActionGoal)),
+        starts_ns=scenario.starts_ns,
+        may_exit=scenario.may_exit,
+        shutdown_ns=scenario.shutdown_ns,
     )
 
 
@@ -159,8 +216,11 @@ def _recording(stream: OdometryStream, odometry: Odometry, seed: int) -> Planned
 def plan_to_json(plan: Plan) -> dict[str, Any]:
     """Return a plan as plain JSON values."""
     data: dict[str, Any] = {
-        name: getattr(plan, name) for name in Plan.__slots__ if name not in ("numbers", "recordings", "limits")
+        name: getattr(plan, name)
+        for name in Plan.__slots__
+        if name not in ("numbers", "recordings", "limits", *_EXCHANGES)
     }
+    data |= {name: [to_json(planned) for planned in getattr(plan, name)] for name in _EXCHANGES}
     data["limits"] = {name: getattr(plan.limits, name) for name in Limits.__slots__}
     data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
     data["recordings"] = [
@@ -188,6 +248,9 @@ def plan_from_json(data: Mapping[str, Any]) -> Plan:
     fields["recordings"] = tuple(
         PlannedRecording(**{**r, "messages": _messages(r["messages"])}) for r in data["recordings"]
     )
+    fields |= {name: tuple(from_json(kind, one) for one in data[name]) for name, kind in _EXCHANGES.items()}
+    fields["starts_ns"] = tuple((str(name), int(t_ns)) for name, t_ns in data["starts_ns"])
+    fields["may_exit"] = tuple(data["may_exit"])
     return Plan(**fields)
 
 

@@ -6,16 +6,32 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.recording.observer import message_class, plain_fields
-from grader.recording.plan import PlannedNumbers, PlannedRecording
+from grader.recording.exchanges import Call, PlannedMessages
+from grader.recording.interfaces import message_class, plain_fields
+from grader.recording.plan import Plan, PlannedNumbers, PlannedRecording
 
 #: The step that tells "just above" a limit for types with a fraction; whole numbers step by 1.
 FRACTION_STEP = 0.001
 
 
+#: What makes something appear; at the start it comes before everything else.
+APPEARANCES = frozenset({"appear", "offer", "serve", "meet"})
+#: What concerns topics, and happens whether or not anybody still listens.
+BROADCASTS = frozenset({"appear", "offer", "publish", "say", "disappear"})
+
+
 @dataclass(frozen=True, slots=True)
 class Due:
-    """One thing to do at a time: `appear`, `publish` or `disappear`; `payload` is what to publish."""
+    """One thing to do at a time.
+
+    Attributes:
+        t_ns: When.
+        action: On a topic `appear` (a publisher of the type that is asked for), `offer` (one of a fixed type),
+            `publish`, `say` (a message of that fixed type) or `disappear`; of a service `serve`, `dismiss` and `answer`
+            as its server, `meet` and `call` as its client.
+        topic: Name of the topic or service.
+        payload: What it needs: what to publish, the planned stimulus.
+    """
 
     t_ns: int
     action: str
@@ -23,11 +39,30 @@ class Due:
     payload: Any = None
 
 
-def schedule(numbers: tuple[PlannedNumbers, ...], recordings: tuple[PlannedRecording, ...]) -> list[Due]:
+def schedule(plan: Plan) -> list[Due]:
     """Return everything that stimuli do, in order of time; number streams never disappear."""
-    due = [d for stream in numbers for d in _number_events(stream)]
-    due += [d for recording in recordings for d in _recording_events(recording)]
-    return sorted(due, key=lambda d: d.t_ns)
+    due = [d for stream in plan.numbers for d in _number_events(stream)]
+    due += [d for recording in plan.recordings for d in _recording_events(recording)]
+    due += [d for stream in plan.messages for d in _message_events(stream)]
+    for server in plan.servers:
+        due.append(Due(server.start_ns, "serve", server.service, server))
+        due += [Due(server.stop_ns, "dismiss", server.service, server)] if server.stop_ns else []
+    for calls in plan.calls:
+        due.append(Due(calls.start_ns, "meet", calls.service, calls))
+        for index in range(len(calls.requests)):
+            t_ns = calls.start_ns + index // calls.clients * calls.period_ns
+            due.append(Due(t_ns, "call", calls.service, Call(calls, index)))
+    return sorted(due, key=lambda d: (d.t_ns, d.t_ns == 0 and d.action not in APPEARANCES))
+
+
+def _message_events(stream: PlannedMessages) -> Iterator[Due]:
+    yield Due(stream.start_ns, "offer", stream.topic, stream)
+    for index in range(len(stream.values) * stream.repeats):
+        t_ns = stream.start_ns + index * stream.period_ns
+        if not stream.stop_ns or t_ns < stream.stop_ns:
+            yield Due(t_ns, "say", stream.topic, (stream, stream.values[index // stream.repeats]))
+    if stream.stop_ns:
+        yield Due(stream.stop_ns, "disappear", stream.topic)
 
 
 def _number_events(stream: PlannedNumbers) -> Iterator[Due]:

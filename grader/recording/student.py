@@ -63,6 +63,8 @@ class Student:
         most_threads: Most threads that it and its children had at once.
         stopped: Which limit it reached, in words; empty while it reached none.
         unsettled: Why its program does not settle, as it says; empty if it does.
+        stop_signalled: Whether it is to get, or has got, the stop signal.
+        stopping: Whether it has got it.
     """
 
     name: str
@@ -84,6 +86,8 @@ class Student:
     most_threads: int = 0
     stopped: str = ""
     unsettled: str = ""
+    stop_signalled: bool = False
+    stopping: bool = False
     notes: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
@@ -122,6 +126,11 @@ class Student:
             self.line.sendall(json.dumps(answer).encode() + b"\n")
         except OSError:
             return
+
+    def claims_of(self, kind: str, name: str) -> bool:
+        """Return whether it says that it has an endpoint of a kind and name; every node has some services."""
+        node = name.rpartition("/")[0] if kind == "service" else ""
+        return any((c["kind"], c["name"]) in ((kind, name), ("node", node)) for c in self.claims)
 
     def note(self, text: str) -> None:
         """Take down what it says that a reader must know; it may say no end of such things."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from grader.model.limits import Limits
 from grader.model.quantities import size
-from grader.model.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer
+from grader.model.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer, Request, Response
 from grader.recording.observer import Taken
 
 #: Of a trace nobody reads more notes than this, and of a note no longer names.
@@ -68,6 +68,24 @@ class Tape:
         elif not self.full:
             self.observations.append(Message(t_ns, taken.topic, taken.type, taken.value, taken.cdr))
 
+    def exchange(self, observation: Request | Response, size_bytes: int) -> None:
+        """Take down a request or response, or end the recording where it is one too many.
+
+        Args:
+            observation: It.
+            size_bytes: How much of it a student's node sent.
+        """
+        limits, service = self._limits, observation.service
+        self._messages[f"service {service}"] += 1
+        self._traffic_bytes += size_bytes
+        if self._messages[f"service {service}"] > limits.messages:
+            name = service[:NAME_CHARACTERS]
+            self.stop(observation.t_ns, f"more than {limits.messages:,} requests and responses of {name}")
+        elif self._traffic_bytes > limits.traffic_bytes:
+            self.stop(observation.t_ns, f"more than {size(limits.traffic_bytes)} of messages")
+        elif not self.full:
+            self.observations.append(observation)
+
     def look(self, graph: GraphSnapshot, participants: int) -> bool:
         """Take down the graph where it has changed.
 
@@ -78,13 +96,16 @@ class Tape:
         Returns:
             Whether it had changed and may be worked with.
         """
-        if (graph.nodes, graph.endpoints) == (self._graph.nodes, self._graph.endpoints):
+        last = self._graph
+        if (graph.nodes, graph.endpoints, graph.services) == (last.nodes, last.endpoints, last.services):
             return False
-        self._graph_parts += len(graph.nodes) + len(graph.endpoints)
+        self._graph_parts += len(graph.nodes) + len(graph.endpoints) + len(graph.services)
         if participants > self._limits.participants:
             self.stop(graph.t_ns, f"more than {self._limits.participants:,} DDS participants")
         elif max(len(graph.endpoints), len(graph.nodes)) > ENDPOINTS:
             self.stop(graph.t_ns, f"more than {ENDPOINTS:,} nodes, publishers or subscriptions at once")
+        elif len(graph.services) > ENDPOINTS:
+            self.stop(graph.t_ns, f"more than {ENDPOINTS:,} servers and clients at once")
         elif self._graph_parts > GRAPH_PARTS:
             self.stop(graph.t_ns, "the nodes changed the ROS graph too often")
         else:

@@ -7,16 +7,20 @@ have been, and the run says nothing about them.
 
 from __future__ import annotations
 
+import bisect
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from grader.model.quantities import NS_PER_MS
 from grader.model.trace import ClockKind, Delivery, Mark, Trace
-from grader.recording.ending import ending_fault, reported_fault
+from grader.recording.desk import Desk
+from grader.recording.ending import ending, never_stopped, reported_fault
+from grader.recording.exchanges import PlannedCalls
+from grader.recording.interfaces import built, message_class, plain_fields
 from grader.recording.observer import Observer, Taken
 from grader.recording.plan import Plan
-from grader.recording.stimuli import Due, number_message, numeric_field, schedule
+from grader.recording.stimuli import BROADCASTS, Due, number_message, numeric_field, schedule
 from grader.recording.student import Student
 from grader.recording.tape import Tape
 
@@ -44,10 +48,21 @@ class WallConductor:
         self._students = students
         self._observer = observer
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
-        self._due = schedule(plan.numbers, plan.recordings)
+        self._due = schedule(plan)
         self._streams: dict[str, str] = {}
         self._leaving: list[tuple[int, str]] = []
         self._tape = Tape(plan.limits)
+        nodes = lambda: self._tape.graph.nodes  # noqa: E731 - it changes
+        self._desk = Desk(plan, observer.services, self._tape, nodes=nodes, later=self._later)
+        self._starts_ns = dict(plan.starts_ns)
+        self._stop_ns = 0
+        self._exchanges: Mapping[str, Callable[[Due, int], None]] = {
+            "serve": self._serve,
+            "dismiss": self._dismiss,
+            "answer": self._answer,
+            "meet": self._meet,
+            "call": self._call,
+        }
         self._next_graph_ns = 0
         self._started = 0
         self.held_up_ns = 0
@@ -56,23 +71,44 @@ class WallConductor:
         """Run the plan to its end and return the trace."""
         self._started = time.monotonic_ns()
         for student in self._students:
-            student.tell({"now_ns": 0, "free_until_ns": 0})
-        before_ns = 0
-        while (now_ns := self._now_ns()) < self._end_ns and not self._finished():
-            self.held_up_ns = max(self.held_up_ns, now_ns - before_ns)
-            before_ns = now_ns
-            self._look(now_ns)
-            time.sleep(LOOK_S)
+            if student.name not in self._starts_ns:
+                student.tell({"now_ns": 0, "free_until_ns": 0})
+        self._run_on(0)
         self._look_at_graph(self._end_ns)
+        self._stop_ns = self._end_ns
+        if self._plan.shutdown_ns and not self._tape.full:
+            self._shut_down()
         return Trace(
             scenario=self._plan.scenario,
             clock=ClockKind.WALL,
-            stop_ns=self._end_ns,
+            stop_ns=self._stop_ns,
             clock_reason="it was asked for",
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             harness_problem=self._slip(),
         )
+
+    def _run_on(self, before_ns: int) -> None:
+        """Look again and again until the end, or until nothing more can happen."""
+        while (now_ns := self._now_ns()) < self._end_ns and not self._finished():
+            self.held_up_ns = max(self.held_up_ns, now_ns - before_ns)
+            before_ns = now_ns
+            self._look(now_ns)
+            time.sleep(LOOK_S)
+
+    def _shut_down(self) -> None:
+        """Send every process the stop signal, as Ctrl-C does, and look on until all have ended."""
+        now_ns = max(self._stop_ns, self._now_ns())
+        self._due, self._end_ns = [], now_ns + self._plan.shutdown_ns
+        for student in self._students:
+            if not student.ended:
+                student.stop_signalled = True
+                self._tape.add(Mark(now_ns, "stop_signal", student.name))
+                student.tell({"stop": True})
+        self._run_on(now_ns)
+        for student in self._students:
+            if not student.ended:
+                self._tape.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
 
     def _slip(self) -> str:
         """Say that the machine did not keep up, if it did not; a node that floods holds it up itself."""
@@ -84,14 +120,22 @@ class WallConductor:
         return time.monotonic_ns() - self._started
 
     def _finished(self) -> bool:
-        return all(s.ended for s in self._students) and not self._due
+        return all(s.ended for s in self._students) and not any(d.action in BROADCASTS for d in self._due)
 
     def _look(self, now_ns: int) -> None:
         while self._due and self._due[0].t_ns <= now_ns:
             self._do(self._due.pop(0), now_ns)
         while self._leaving and self._leaving[0][0] <= now_ns:
             self._observer.withdraw(self._leaving.pop(0)[1])
+        for due in self._desk.ready(self._is_served):
+            self._later(Due(now_ns, due.action, due.topic, due.payload))
+        self._desk.take()
+        self._desk.write_down(now_ns)
         for student in self._students:
+            if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
+                del self._starts_ns[student.name]
+                self._tape.add(Mark(now_ns, "process_starts", student.name))
+                student.tell({"now_ns": 0, "free_until_ns": 0})
             self._hear(student, now_ns)
         for taken in self._observer.take(MESSAGES_A_LOOK):
             self._record(now_ns, taken)
@@ -112,7 +156,7 @@ class WallConductor:
                 self._tape.add(reported_fault(student.name, now_ns, report, self._plan.limits))
             elif report.get("kind") == "exited":
                 self._tape.add(*student.output(now_ns, final=True))
-                self._tape.add(ending_fault(student.name, now_ns, report, self._plan.limits))
+                self._tape.add(ending(student.name, now_ns, report, self._plan, stopped=student.stop_signalled))
                 student.ended = True
         self._tape.add(*student.output(now_ns))
 
@@ -127,7 +171,7 @@ class WallConductor:
             self._end_ns = min(self._end_ns, now_ns)
 
     def _look_at_graph(self, now_ns: int) -> None:
-        changed = self._tape.look(self._observer.graph(now_ns), self._observer.participants())
+        changed = self._tape.look(self._observer.graph(now_ns, services=True), self._observer.participants())
         self._end_if_full(now_ns)
         if not changed:
             return
@@ -136,7 +180,19 @@ class WallConductor:
             self._follow_type(topic)
 
     def _do(self, due: Due, now_ns: int) -> None:
-        if due.action == "appear":
+        if due.action in self._exchanges:
+            self._exchanges[due.action](due, now_ns)
+        elif due.action == "offer":
+            stream = due.payload
+            self._withdraw_left(due.topic)
+            self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
+            self._tape.add(Mark(now_ns, "stream_starts", due.topic))
+        elif due.action == "say":
+            stream, fields = due.payload
+            message = built(message_class(stream.type), fields, due.topic)
+            self._tape.add(Delivery(now_ns, due.topic, stream.type, plain_fields(message)))
+            self._observer.publish(due.topic, message)
+        elif due.action == "appear":
             self._withdraw_left(due.topic)
             self._advertise(due.topic, due.payload)
             self._tape.add(Mark(now_ns, "stream_starts", due.topic))
@@ -146,6 +202,37 @@ class WallConductor:
             self._tape.add(Mark(now_ns, "stream_stops", due.topic))
         else:
             self._publish(due, now_ns)
+
+    def _later(self, due: Due) -> None:
+        bisect.insort(self._due, due, key=lambda d: d.t_ns)
+
+    def _is_served(self, calls: PlannedCalls) -> bool:
+        """Return whether the server that some calls need is there and matched."""
+        service = self._desk.meet(calls)
+        return service is not None and self._observer.services.met(service)
+
+    def _serve(self, due: Due, now_ns: int) -> None:
+        self._desk.serve(now_ns, due.payload)
+
+    def _meet(self, due: Due, now_ns: int) -> None:
+        del now_ns
+        self._desk.meet(due.payload)
+
+    def _call(self, due: Due, now_ns: int) -> None:
+        """Send a request, or keep it until its server is there."""
+        if self._is_served(due.payload.calls):
+            self._desk.call(now_ns, due.payload)
+        else:
+            self._desk.wait(due)
+
+    def _answer(self, due: Due, now_ns: int) -> None:
+        server, number = due.payload
+        self._desk.answer(now_ns, server, number)
+        if server in self._desk.done():  # it would take its last response with it
+            self._later(Due(now_ns + LINGER_NS, "dismiss", server.service, server))
+
+    def _dismiss(self, due: Due, now_ns: int) -> None:
+        self._desk.dismiss(now_ns, due.payload)
 
     def _withdraw_left(self, topic: str) -> None:
         """Let a publisher that stayed for its last message go before the next one on its topic comes."""

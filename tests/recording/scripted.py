@@ -105,6 +105,7 @@ class ScriptedStudent:
         self.measured_ns = self.ready_ns = 0
         self.unsettled = ""
         self.notes: list[str] = []
+        self.stop_signalled = self.stopping = False
         self.heard: list[dict[str, Any]] = []
         self.missing: Any = []
         self._written: list[str] = []
@@ -120,6 +121,10 @@ class ScriptedStudent:
     def times_ms(self) -> list[float]:
         """Return the times it was told, in virtual milliseconds."""
         return [(a["now_ns"] - EPOCH_NS) / MS for a in self.heard if "now_ns" in a]
+
+    def claims_of(self, kind: str, name: str) -> bool:
+        """Return whether it has an endpoint of a kind and name."""
+        return any((c["kind"], c["name"]) == (kind, name) for c in self.claims)
 
     def tell(self, answer: dict[str, Any]) -> None:
         """Take an answer of the conductor."""
@@ -173,8 +178,9 @@ class ScriptedObserver:
         self._watched: set[tuple[str, str, bool]] = set()
         self.published: list[tuple[str, Any]] = []
         self.advertised: list[tuple[str, str, bool]] = []
+        self.services: Any = None
 
-    def graph(self, t_ns: int) -> GraphSnapshot:
+    def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
         """Return the graph of all claims."""
         ends = [
             Endpoint(c["kind"], c["name"], c["type"], f"/{name[:-3]}", number, "reliable", "volatile")
@@ -215,7 +221,7 @@ class ScriptedObserver:
         taken, self._world.flying = self._world.flying, []
         return taken
 
-    def advertise(self, topic: str, interface: str, *, latched: bool) -> None:
+    def advertise(self, topic: str, interface: str, *, latched: bool, best_effort: bool = False) -> None:
         """Note a stimulus's publisher."""
         self.advertised.append((topic, interface, latched))
 

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from scripted import FLOAT, MS, numbers
+from scripted import FLOAT, MS, numbers, plan
 
 from grader.recording.plan import PlannedRecording
 from grader.recording.stimuli import number_message, numeric_field, schedule
@@ -14,7 +14,7 @@ from grader.recording.stimuli import number_message, numeric_field, schedule
 
 def test_numbers_follow_each_other_in_their_period():
     """Each as often as it is held; the publisher is there from the start and stays."""
-    due = schedule((numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),), ())
+    due = schedule(plan(numbers=(numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),)))
     assert [(d.t_ns // MS, d.action) for d in due] == [
         (0, "appear"),
         (500, "publish"),
@@ -28,9 +28,8 @@ def test_numbers_follow_each_other_in_their_period():
 def test_streams_are_merged_by_time_and_keep_their_order():
     """At one instant, the one named first goes first; a publisher appears before it publishes."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 500 * MS, 501 * MS, ((500 * MS, b"", {}),))
-    due = schedule(
-        (numbers((1.0, 0), topic="/a", start_ms=500), numbers((2.0, 0), topic="/b", start_ms=500)), (recording,)
-    )
+    streams = (numbers((1.0, 0), topic="/a", start_ms=500), numbers((2.0, 0), topic="/b", start_ms=500))
+    due = schedule(plan(numbers=streams, recordings=(recording,)))
     assert [(d.t_ns // MS, d.action, d.topic) for d in due] == [
         (0, "appear", "/a"),
         (0, "appear", "/b"),

@@ -1,0 +1,186 @@
+"""Planned messages, servers, calls and goals: stimuli whose every field is drawn, as plain JSON values."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from grader.model.scenario import (
+    ActionGoal,
+    Between,
+    Choose,
+    FieldSpec,
+    MessageStream,
+    ServiceCalls,
+    ServiceServer,
+    Written,
+)
+
+Planned = TypeVar("Planned", bound="PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal")
+Fields = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMessages:
+    """A message stream with every field drawn; see `grader.model.scenario.MessageStream`."""
+
+    topic: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    period_ns: int
+    repeats: int
+    best_effort: bool
+    latched: bool
+    values: tuple[Fields, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedServer:
+    """A server with every response drawn; see `grader.model.scenario.ServiceServer`."""
+
+    service: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    delay_ns: int
+    cycle: bool
+    answers: int
+    responses: tuple[Fields, ...]
+
+    def response(self, index: int) -> Fields | None:
+        """Return the fields of the response to a request, counted from 0; None if there is none."""
+        if not self.responses or (self.answers and index >= self.answers):
+            return None
+        return self.responses[index % len(self.responses) if self.cycle else min(index, len(self.responses) - 1)]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCalls:
+    """Calls with every request drawn, `clients` of them for each call in turn; see `ServiceCalls`."""
+
+    service: str
+    type: str
+    start_ns: int
+    period_ns: int
+    clients: int
+    requests: tuple[Fields, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One request that is to be sent: by which client of which calls, the how manieth of them."""
+
+    calls: PlannedCalls
+    index: int
+
+    @property
+    def client(self) -> int:
+        """Which client of these calls sends it, from 0."""
+        return self.index % self.calls.clients
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedGoal:
+    """A goal with every field drawn, and the identifier it goes by; see `grader.model.scenario.ActionGoal`."""
+
+    action: str
+    type: str
+    start_ns: int
+    cancel_after_ns: int
+    goal: Fields
+    uuid: tuple[int, ...]
+
+
+def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:
+    """Return a message stream with every field drawn."""
+    return PlannedMessages(
+        topic=stream.topic,
+        type=stream.type,
+        start_ns=stream.start_ns,
+        stop_ns=stream.stop_ns,
+        period_ns=stream.period_ns,
+        repeats=stream.repeats,
+        best_effort=stream.best_effort,
+        latched=stream.latched,
+        values=tuple(drawn_fields(value, draw) for value in stream.values),
+    )
+
+
+def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
+    """Return a server with every response drawn, each once: one that is given again is the same again."""
+    return PlannedServer(
+        service=server.service,
+        type=server.type,
+        start_ns=server.start_ns,
+        stop_ns=server.stop_ns,
+        delay_ns=server.delay_ns,
+        cycle=server.cycle,
+        answers=server.answers,
+        responses=tuple(drawn_fields(response, draw) for response in server.responses),
+    )
+
+
+def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
+    """Return calls with every request drawn, for each call and client anew."""
+    wanted = [calls.requests[call % len(calls.requests)] for call in range(calls.calls) for _ in range(calls.clients)]
+    return PlannedCalls(
+        service=calls.service,
+        type=calls.type,
+        start_ns=calls.start_ns,
+        period_ns=calls.period_ns,
+        clients=calls.clients,
+        requests=tuple(drawn_fields(request, draw) for request in wanted),
+    )
+
+
+def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
+    """Return a goal with every field drawn."""
+    return PlannedGoal(
+        action=goal.action,
+        type=goal.type,
+        start_ns=goal.start_ns,
+        cancel_after_ns=goal.cancel_after_ns,
+        goal=drawn_fields(goal.goal, draw),
+        uuid=tuple(draw.randbytes(16)),
+    )
+
+
+def drawn_fields(fields: Mapping[str, FieldSpec], draw: random.Random) -> Fields:
+    """Return the fields of a message with every value drawn."""
+    return {name: _drawn(value, draw) for name, value in fields.items()}
+
+
+def _drawn(value: FieldSpec, draw: random.Random) -> Any:
+    if isinstance(value, Mapping):
+        return drawn_fields(value, draw)
+    if isinstance(value, tuple):
+        return [_drawn(item, draw) for item in value]
+    if isinstance(value, Choose):
+        return draw.choice(value.options)
+    if isinstance(value, Written):
+        number = draw.uniform(value.number.low, value.number.high)
+        return value.text.replace("{}", f"{number:.{value.decimals}f}")
+    return drawn_number(value, draw) if isinstance(value, Between) else value
+
+
+def drawn_number(spec: Between, draw: random.Random) -> int | float:
+    """Return a number: a whole one between whole ones, otherwise one of as many decimals as tell a hundredth apart."""
+    if float(spec.low).is_integer() and float(spec.high).is_integer():
+        return draw.randint(int(spec.low), int(spec.high))
+    decimals = max(2, 2 - math.floor(math.log10(spec.high - spec.low)))
+    return round(draw.uniform(spec.low, spec.high), decimals)
+
+
+def to_json(planned: PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal) -> dict[str, Any]:
+    """Return a planned stimulus as plain JSON values."""
+    return {name: getattr(planned, name) for name in type(planned).__slots__}
+
+
+def from_json(kind: Callable[..., Planned], data: Mapping[str, Any]) -> Planned:
+    """Return the planned stimulus that `to_json` was given; the supervisor's word is trusted."""
+    fields: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
+    return kind(**fields)
