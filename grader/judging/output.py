@@ -26,6 +26,10 @@ _INTERPRETER = re.compile(
 
 def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     """Return the records of a process without those that rclpy or what is below it wrote."""
+    return trace.once((student_records, process), lambda: _student_records(trace, process))
+
+
+def _student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     return tuple(r for r in trace.records(process) if r.t_ns < trace.stop_ns and not _of_ros(r))
 
 
@@ -37,6 +41,10 @@ def _of_ros(record: LogRecord) -> bool:
 
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     """Return the lines that a process printed; tracebacks, interpreter warnings and blank lines are not printing."""
+    return trace.once((printed_lines, process), lambda: _printed_lines(trace, process))
+
+
+def _printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     faults = [" ".join(f.text.split()) for f in trace.faults(process)]
     lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
     # the text of an exception may go on over several lines, at the margin like printed ones

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Generic, TypeVar
@@ -13,6 +13,7 @@ from grader.model.quantities import NS_PER_MS
 from grader.model.trace import ClockKind, Delivery, Message, Trace
 
 T = TypeVar("T")
+Carrier = TypeVar("Carrier", Message, Delivery)
 
 #: How far two clock readings of one moment may lie apart.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
@@ -78,22 +79,31 @@ def carries_number(type_: str) -> bool:
 
 def published(trace: Trace, topic: str) -> tuple[Message, ...]:
     """Return what the student's nodes published on a topic while it was observed."""
-    return _published(Same(trace), topic)
+    return trace.once((published, topic), lambda: _observed(trace, trace.messages(topic)))
 
 
-@lru_cache(maxsize=8)
-def _published(trace: Same[Trace], topic: str) -> tuple[Message, ...]:
-    return tuple(m for m in trace.value.messages(topic) if m.t_ns < trace.value.stop_ns)
+def _observed(trace: Trace, messages: tuple[Carrier, ...]) -> tuple[Carrier, ...]:
+    return tuple(m for m in messages if m.t_ns < trace.stop_ns)
 
 
-def readings(messages: tuple[Message, ...] | tuple[Delivery, ...]) -> tuple[Reading, ...]:
+def delivered(trace: Trace, topic: str) -> tuple[Delivery, ...]:
+    """Return what the grader published on a topic while it was observed."""
+    return trace.once((delivered, topic), lambda: _observed(trace, trace.deliveries(topic)))
+
+
+def published_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
+    """Return the numbers that the student's nodes published on a topic while it was observed."""
+    return trace.once((published_numbers, topic), lambda: _readings(published(trace, topic)))
+
+
+def delivered_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
+    """Return the numbers that the grader published on a topic while it was observed."""
+    return trace.once((delivered_numbers, topic), lambda: _readings(delivered(trace, topic)))
+
+
+def _readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
     """Return the numbers of those messages that carry one."""
-    return _readings(Same(messages))
-
-
-@lru_cache(maxsize=8)
-def _readings(messages: Same[tuple[Message, ...] | tuple[Delivery, ...]]) -> tuple[Reading, ...]:
-    found = ((m.t_ns, number_of(m)) for m in messages.value)
+    found = ((m.t_ns, number_of(m)) for m in messages)
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
 
 
@@ -107,13 +117,11 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
 
     What was sent before `heard_from_ns`, when nobody listened, is left out, unless that is everything.
     """
-    return _held(Same(trace), topic, heard_from_ns)
+    return trace.once((held, topic, heard_from_ns), lambda: _held(trace, topic, heard_from_ns))
 
 
-@lru_cache(maxsize=8)
-def _held(this: Same[Trace], topic: str, heard_from_ns: int) -> tuple[Held, ...]:
-    trace = this.value
-    sent = [r for r in readings(trace.deliveries(topic)) if r.t_ns < trace.stop_ns]
+def _held(trace: Trace, topic: str, heard_from_ns: int) -> tuple[Held, ...]:
+    sent = delivered_numbers(trace, topic)
     heard = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
     for reading in heard:

@@ -6,7 +6,7 @@ Times are integer nanoseconds since the scenario started. Within one instant obs
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, TypeVar
@@ -249,6 +249,8 @@ class Mark:
 
 
 Kind = TypeVar("Kind")
+Known = TypeVar("Known")
+Carried = TypeVar("Carried", Message, Delivery)
 Observation = Message | Delivery | Request | Response | LogRecord | OutputLine | GraphSnapshot | Fault | Offer | Mark
 
 
@@ -273,24 +275,43 @@ class Trace:
     clock_reason: str = ""
     notes: tuple[str, ...] = ()
     harness_problem: str = ""
-    _kinds: dict[type, tuple[Any, ...]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def once(self, key: Hashable, work: Callable[[], Known]) -> Known:
+        """Return what follows from this trace alone: worked out when first asked for, then kept as long as the trace.
+
+        Args:
+            key: Says what is worked out, and from which parameters.
+            work: Pure, and does not hold on to the trace in what it returns.
+        """
+        if key not in self._known:
+            self._known[key] = work()
+        known: Known = self._known[key]
+        return known
 
     def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
-        """Return the observations of a kind, in order; they are sorted out when first asked for."""
-        if not self._kinds:
-            sorted_out: dict[type, list[Observation]] = {}
-            for observation in self.observations:
-                sorted_out.setdefault(type(observation), []).append(observation)
-            self._kinds.update((of, tuple(found)) for of, found in sorted_out.items())
-        return self._kinds.get(kind, ())
+        """Return the observations of a kind, in order."""
+        found: tuple[Kind, ...] = self.once("kinds", self._by_kind).get(kind, ())
+        return found
+
+    def _by_kind(self) -> dict[type, tuple[Any, ...]]:
+        sorted_out: dict[type, list[Observation]] = {}
+        for observation in self.observations:
+            sorted_out.setdefault(type(observation), []).append(observation)
+        return {kind: tuple(found) for kind, found in sorted_out.items()}
 
     def messages(self, topic: str | None = None) -> tuple[Message, ...]:
         """Return the messages published by student nodes, on one topic or on all."""
-        return tuple(o for o in self.of(Message) if topic in (None, o.topic))
+        return self._on(Message, topic)
 
     def deliveries(self, topic: str) -> tuple[Delivery, ...]:
         """Return what the grader published on a topic."""
-        return tuple(o for o in self.of(Delivery) if o.topic == topic)
+        return self._on(Delivery, topic)
+
+    def _on(self, kind: type[Carried], topic: str | None) -> tuple[Carried, ...]:
+        if topic is None:
+            return self.of(kind)
+        return self.once((kind, topic), lambda: tuple(o for o in self.of(kind) if o.topic == topic))
 
     def requests(self, service: str, sender: str) -> tuple[Request, ...]:
         """Return the requests of a service that `student` or `grader` sent."""

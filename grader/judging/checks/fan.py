@@ -11,7 +11,7 @@ from typing import Any, Literal
 from grader.judging.findings import met, not_met
 from grader.judging.lateness import lag_ns
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
-from grader.judging.values import Held, Reading, held, last_of_instant, published, readings
+from grader.judging.values import Held, Reading, held, last_of_instant, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
@@ -67,11 +67,12 @@ class ThresholdResponse:
         mine = [h for h in inputs if self._on_side(h.value)]
         if not mine:
             return self._nothing_asked(trace)
-        answers = last_of_instant(readings(messages))
+        answers = last_of_instant(published_numbers(trace, self.output))
         if not answers:
             type_ = messages[0].type
             return self._once(not_met(f"{self.output}: {quote(type_)} carries no number", {"type": type_}))
-        violations = [v for v in (self._violation(h, answers, trace) for h in mine) if v is not None]
+        grace_ns = _grace(answers)
+        violations = [v for v in (self._violation(h, answers, trace, grace_ns) for h in mine) if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
             return self._violated(trace, violations, inputs, answers, evidence)
@@ -95,8 +96,7 @@ class ThresholdResponse:
     def _right(self, got: float, value: float) -> bool:
         return within(got, self._expected(value), _EXACT)
 
-    def _violation(self, asked: Held, answers: Sequence[Reading], trace: Trace) -> _Violation | None:
-        grace_ns = _grace(answers)
+    def _violation(self, asked: Held, answers: Sequence[Reading], trace: Trace, grace_ns: int) -> _Violation | None:
         during = [a for a in answers if asked.start_ns <= a.t_ns < asked.stop_ns]
         wrong = [a for a in during if a.t_ns > asked.start_ns + grace_ns and not self._right(a.value, asked.value)]
         if wrong:

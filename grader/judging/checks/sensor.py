@@ -19,7 +19,7 @@ from grader.judging.silence import (
     heard_from_ns,
     student_endpoints,
 )
-from grader.judging.values import Held, Reading, carries_number, held, published, readings
+from grader.judging.values import Held, Reading, carries_number, held, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
@@ -58,7 +58,7 @@ class RandomInRange:
         if not messages:
             silent = explain_no_message(trace, self.topic)
             return not_met(silent.reason, silent.evidence, blocked_by="topic_rate")
-        values = readings(messages)
+        values = published_numbers(trace, self.topic)
         if len(values) < len(messages):
             return not_met(f"{self.topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
         return self._outside(values) or self._computed(values) or self._drawn(values)
@@ -164,7 +164,9 @@ class LogsReceived:
         return not_met(f"{fault_sentence(fault)}; nothing was logged after it", hint=fault_hint(fault), fault=fault)
 
     def _missing(self, values: Sequence[Held], outputs: Iterable[LogRecord | OutputLine], trace: Trace) -> list[Held]:
-        shown = [(o.t_ns, _numbers_in(o.text)) for o in outputs]
+        outputs = tuple(outputs)
+        read = {text: _numbers_in(text) for text in {o.text for o in outputs}}
+        shown = [(o.t_ns, read[o.text]) for o in outputs]
         missing = []
         for value in values:
             stop_ns = value.stop_ns + (_LATE_NS if value.stop_ns < trace.stop_ns else 1)

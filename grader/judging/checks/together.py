@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from bisect import bisect_left, bisect_right
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,7 +13,7 @@ from typing import Any
 from grader.judging.findings import met, not_met
 from grader.judging.lateness import steps_behind
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
-from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, readings
+from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, seconds, within
@@ -69,9 +70,10 @@ class AnswersTogether:
         for topic, messages in ((self.input, sent), (self.output, answered)):
             if not messages:
                 return self._silent(trace, topic)
-            if len(readings(messages)) < len(messages):
+            if len(published_numbers(trace, topic)) < len(messages):
                 return not_met(f"{topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
-        inputs, answers = readings(sent), last_of_instant(readings(answered))
+        inputs = published_numbers(trace, self.input)
+        answers = last_of_instant(published_numbers(trace, self.output))
         evidence = self._evidence(inputs, answers)
         return (
             self._wrong_answer(trace, inputs, answers, evidence)
@@ -104,8 +106,9 @@ class AnswersTogether:
     def _wrong_answer(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
+        times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
         for answer in answers:
-            recent = _recent(inputs, answer.t_ns, JITTER_NS[trace.clock])
+            recent = _recent(inputs, times, answer.t_ns, jitter_ns)
             if not recent or any(within(answer.value, self._expected(r.value), _EXACT) for r in recent):
                 continue
             value, unit = recent[-1].value, unit_of(self.input)
@@ -158,11 +161,12 @@ class AnswersTogether:
     def _stopped_controller(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
+        times = [a.t_ns for a in answers]
         for asked in inputs:
             if asked.t_ns + _SPEAK_NS >= trace.stop_ns:
                 break
-            later = bisect_left(answers, asked.t_ns, key=_time)
-            if later < len(answers) and answers[later].t_ns <= asked.t_ns + _SPEAK_NS:
+            later = bisect_left(times, asked.t_ns)
+            if later < len(answers) and times[later] <= asked.t_ns + _SPEAK_NS:
                 continue
             before = answers[:later]
             # before its first answer nobody knows what a controller that publishes on change believes
@@ -191,7 +195,7 @@ class AnswersTogether:
             return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence)
         # a timer of 1 s may miss what is rare; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
-        asked = {w for w in expected if expected.count(w) > often}
+        asked = {w for w, count in Counter(expected).items() if count > often}
         given = {a.value for a in answers}
         lacking = sorted(w for w in asked if not any(within(g, w, _EXACT) for g in given))
         if not lacking:
@@ -213,18 +217,14 @@ def _stays(inputs: Sequence[Reading]) -> bool:
     return len(steps) >= _FEWEST_TO_STAY and max(values) - min(values) <= _STEPS_IN_RANGE * statistics.median(steps)
 
 
-def _recent(inputs: Sequence[Reading], t_ns: int, jitter_ns: int) -> list[Reading]:
+def _recent(inputs: Sequence[Reading], times: Sequence[int], t_ns: int, jitter_ns: int) -> Sequence[Reading]:
     """Return the inputs that were current at some moment of the quarter second up to and including `t_ns`.
 
     On the wall clock an input may reach the controller, and its answer the observer, before the input does.
     """
-    stop = bisect_right(inputs, t_ns + jitter_ns, key=_time)
-    start = bisect_right(inputs, t_ns - _CURRENT_NS, hi=stop, key=_time)
-    return list(inputs[max(0, start - 1) : stop])
-
-
-def _time(reading: Reading) -> int:
-    return reading.t_ns
+    stop = bisect_right(times, t_ns + jitter_ns)
+    start = bisect_right(times, t_ns - _CURRENT_NS, hi=stop)
+    return inputs[max(0, start - 1) : stop]
 
 
 def _kept_apart(trace: Trace, topic: str) -> Finding | None:

@@ -14,7 +14,7 @@ from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.diagnosis.silence import silent_topic, timer_code
 from grader.judging.diagnosis.source import Source, chain, last_name, subtree
 from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for, publish_calls, reached, roots
-from grader.judging.values import published, readings
+from grader.judging.values import published, published_numbers
 from grader.judging.wording import number
 from grader.model.quantities import within
 
@@ -173,7 +173,7 @@ def _wrong_answer(case: Case) -> Clue | None:
     if found is None:
         return None
     source, check = found
-    strange = {r.value for r in readings(published(case.trace, check.output))}
+    strange = {r.value for r in published_numbers(case.trace, check.output)}
     strange -= {check.above, check.otherwise}
     if len(strange) != 1:
         return None
@@ -215,7 +215,7 @@ def _one_branch(case: Case) -> Clue | None:
     if found is None:
         return None
     source, check = found
-    given = {r.value for r in readings(published(case.trace, check.output))}
+    given = {r.value for r in published_numbers(case.trace, check.output)}
     item = made_for(source, "publisher", check.output)
     if given not in ({check.above}, {check.otherwise}):
         return None

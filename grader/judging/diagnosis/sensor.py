@@ -11,7 +11,7 @@ from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.diagnosis.source import Source, chain, last_name
 from grader.judging.diagnosis.wiring import made, made_for, reached, roots
-from grader.judging.values import published, readings
+from grader.judging.values import published_numbers
 from grader.judging.wording import number
 
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
@@ -138,7 +138,7 @@ def _not_drawn(case: Case) -> Clue | None:
     if found is None or case.evidence("pattern") is None or draws(found[0]):
         return None
     source, check = found
-    values = readings(published(case.trace, check.topic))
+    values = published_numbers(case.trace, check.topic)
     places = [g for leaf in ("data", "temperature") for g in given_leaf(source, leaf)]
     if len(places) != 1 or not values:
         return None

@@ -9,7 +9,7 @@ from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.figures.drawing import happenings, plain_topic, series, written_in_lane
 from grader.judging.output import printed_lines, student_records
-from grader.judging.values import Reading, held, published, readings
+from grader.judging.values import Reading, delivered_numbers, held, published_numbers
 from grader.judging.wording import counted, number, unit_of
 from grader.model.figure import Band, Chart, Level, Look, Moment, Panel, Point, Series, Tone
 from grader.model.quantities import seconds
@@ -18,7 +18,7 @@ from grader.model.trace import Trace
 
 def range_chart(check: RandomInRange, trace: Trace) -> Chart | None:
     """Return the numbers on a topic in the range that they may come from, or None without numbers."""
-    values = readings(published(trace, check.topic))
+    values = published_numbers(trace, check.topic)
     if not values:
         return None
     unit = unit_of(check.topic).strip()
@@ -40,8 +40,8 @@ def range_chart(check: RandomInRange, trace: Trace) -> Chart | None:
 
 def response_chart(check: ThresholdResponse, trace: Trace) -> Chart | None:
     """Return the numbers given to a controller and its answers under them, or None if nothing was given."""
-    sent = [r for r in readings(trace.deliveries(check.input)) if r.t_ns < trace.stop_ns]
-    answers = readings(published(trace, check.output))
+    sent = delivered_numbers(trace, check.input)
+    answers = published_numbers(trace, check.output)
     if not sent:
         return None
     asked = held(trace, check.input)
@@ -58,8 +58,8 @@ def response_chart(check: ThresholdResponse, trace: Trace) -> Chart | None:
 
 def together_chart(check: AnswersTogether, trace: Trace) -> Chart | None:
     """Return what the student's two nodes said to each other, or None if the first was silent."""
-    inputs = readings(published(trace, check.input))
-    answers = readings(published(trace, check.output))
+    inputs = published_numbers(trace, check.input)
+    answers = published_numbers(trace, check.output)
     if not inputs:
         return None
     above = sum(r.value > check.threshold for r in inputs)
@@ -74,7 +74,7 @@ def together_chart(check: AnswersTogether, trace: Trace) -> Chart | None:
 
 def received_chart(check: LogsReceived, trace: Trace) -> Chart | None:
     """Return the numbers given to a node and what it wrote meanwhile, or None if nothing was given."""
-    sent = [r for r in readings(trace.deliveries(check.topic)) if r.t_ns < trace.stop_ns]
+    sent = delivered_numbers(trace, check.topic)
     if not sent:
         return None
     records, lines = student_records(trace, check.process), printed_lines(trace, check.process)

@@ -37,8 +37,9 @@ def path_chart(check: LogsPosition, trace: Trace) -> Chart | None:
     printed = Analysis() if logged.right else printed_positions(trace, check.process, track)
     pairs = _pairs(printed if printed.right else logged)
     shown = [pair for pair in pairs if _near(pair.point, track)]
-    path = [(p.at(X), p.at(Y)) for p in track.poses]
-    lines = [series(f"path on {check.topic}", path, tone=Tone.FAINT, texts=[moment(p.t_ns) for p in track.poses])]
+    poses = track.poses
+    path = [(p.x, p.y) for p in poses]
+    lines = [series(f"path on {check.topic}", path, tone=Tone.FAINT, texts=[moment(p.t_ns) for p in poses])]
     lines += _dots("logged, agrees", [p for p in shown if p.right], Tone.GOOD)
     lines += _dots("logged, does not agree", [p for p in shown if not p.right], Tone.BAD)
     return Chart(
@@ -112,7 +113,7 @@ def _dots(name: str, pairs: Sequence[_Logged], tone: Tone) -> list[Series]:
 
 def _about(topic: str, track: Track, pairs: Sequence[_Logged], hidden: int) -> str:
     right = sum(p.right for p in pairs)
-    first, last = track.poses[0], track.poses[-1]
+    first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
     said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
     said += f"{_place(last.at(X), last.at(Y))}. "
     if not pairs:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from grader.judging.output import printed_lines, student_records
 from grader.judging.positions.matching import Entry, Group, Text, blocks, grouped, matched, single_texts
@@ -49,12 +48,8 @@ class Analysis:
 
 def logged_positions(trace: Trace, process: str, track: Track) -> Analysis:
     """Return the positions that a process wrote through its logger."""
-    return _logged(Same(trace), process, Same(track))
-
-
-@lru_cache(maxsize=1)
-def _logged(trace: Same[Trace], process: str, track: Same[Track]) -> Analysis:
-    return _analysed(student_records(trace.value, process), track.value, trace.value.clock)
+    key = (logged_positions, process, Same(track))
+    return trace.once(key, lambda: _analysed(student_records(trace, process), track, trace.clock))
 
 
 def printed_positions(trace: Trace, process: str, track: Track) -> Analysis:

@@ -139,7 +139,7 @@ def _single(groups: Sequence[Group], track: Track) -> Cause | None:
 
 def _follows(group: Group, place: int, path: str, track: Track) -> bool:
     """Return whether the number at a place shows a changing number of the current pose nearly always."""
-    shown = [any(e.numbers[place].shows(track.poses[k].at(path)) for k in track.current(e.t_ns)) for e in group.entries]
+    shown = [any(e.numbers[place].shows(track.pose(k).at(path)) for k in track.current(e.t_ns)) for e in group.entries]
     changes = len({e.numbers[place].value for e in group.entries}) > 1
     return changes and sum(shown) >= _SURE * len(shown)
 
@@ -158,7 +158,7 @@ def _constant(groups: Sequence[Group], track: Track) -> Cause | None:
 
 def _constant_cause(entry: Entry, pair: Pair, track: Track) -> Cause:
     first, second = _pair(entry, pair)
-    start = track.poses[0]
+    start = track.pose(0)
     text = f"the logged values never change: ({number(first.value)}, {number(second.value)})"
     if first.shows(start.at(X)) and second.shows(start.at(Y)):
         hint = "store the newest message in the callback, each time"
@@ -185,7 +185,7 @@ def _stale(groups: Sequence[Group], track: Track) -> Cause | None:
 def _lag_ns(entry: Entry, pair: Pair, track: Track) -> int | None:
     first, second = _pair(entry, pair)
     for k in reversed(range(track.current(entry.t_ns).stop)):
-        pose = track.poses[k]
+        pose = track.pose(k)
         if first.shows(pose.at(X)) and second.shows(pose.at(Y)):
             return entry.t_ns - pose.t_ns
     return None
@@ -203,7 +203,7 @@ def _first_difference(analysis: Analysis, track: Track) -> Cause:
 
 
 def _difference(entry: Entry, track: Track) -> str:
-    pose = track.poses[track.current(entry.t_ns).stop - 1]
+    pose = track.pose(track.current(entry.t_ns).stop - 1)
     there = f"({pose.at(X):.3f}, {pose.at(Y):.3f}) m"
     return f"at {moment(entry.t_ns)} the log says '{quote(entry.text, 80)}', the position was {there}"
 

@@ -24,6 +24,8 @@ _NUMBER = re.compile(
 )
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])([0-9]+),([0-9]+)(?![0-9]*[.,][0-9])")
 _NAME_BEFORE = re.compile(r"[A-Za-z_À-ɏ]+$")
+#: What stands before most numbers, and ends no name; so nothing more has to be looked at.
+_NO_NAME = frozenset(" =:,([")
 _UNIT_AFTER = re.compile(r"\s?(cm|mm)(?![A-Za-z0-9])")
 _PER_METRE = {"cm": 0.01, "mm": 0.001}
 
@@ -61,6 +63,8 @@ def clean(text: str) -> str:
 
 def with_decimal_points(text: str) -> str | None:
     """Return the text with `1,25` read as `1.25`, or None if nothing in it can be read so."""
+    if "," not in text:
+        return None
     changed = _DECIMAL_COMMA.sub(r"\1.\2", text)
     return changed if changed != text else None
 
@@ -78,15 +82,16 @@ def printed_numbers(text: str) -> tuple[Printed, ...]:
 
 
 def _read(text: str, match: re.Match[str]) -> Printed | None:
-    if match["hex"]:
+    hexadecimal, sign, _, part, only, power, odd = match.groups()
+    if hexadecimal:
         return None
-    if match["odd"]:
+    if odd:
         return Printed(float(match[0]), 0.0, match.start(), match.end())
-    if not match["sign"] and _belongs_to_name(text, match):
+    if not sign and _belongs_to_name(text, match):
         return None
-    decimals = len(match["part"] or match["only"] or "")
+    decimals = len(part or only or "")
     # 0e9 is no way of saying "any number"
-    step = 10.0 ** min(0, int(match["power"] or 0) - decimals)
+    step = 10.0 ** min(0, int(power or 0) - decimals)
     scale = 1.0
     unit = _UNIT_AFTER.match(text, match.end())
     if unit:
@@ -95,6 +100,8 @@ def _read(text: str, match: re.Match[str]) -> Printed | None:
 
 
 def _belongs_to_name(text: str, match: re.Match[str]) -> bool:
+    if text[match.start() - 1 : match.start()] in _NO_NAME:
+        return False
     before = _NAME_BEFORE.search(text, max(0, match.start() - 40), match.start())
     if before is None:
         return False

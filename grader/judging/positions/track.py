@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from typing import Any
 
-from grader.judging.values import JITTER_NS, Same, field
+from grader.judging.values import JITTER_NS, delivered
+from grader.judging.values import field as number_in
 from grader.model.quantities import NS_PER_MS
 from grader.model.trace import Delivery, Trace
 
@@ -51,13 +51,14 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The poses played on a topic, in order, and when the stream began and ended."""
+    """The odometry played on a topic, in order, and when the stream began and ended."""
 
-    poses: tuple[Pose, ...]
+    deliveries: tuple[Delivery, ...]
     times_ns: tuple[int, ...]
     start_ns: int
     stop_ns: int
     jitter_ns: int
+    _made: dict[int, Pose] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def current(self, t_ns: int) -> range:
         """Return the indices of the poses that a log written at `t_ns` may show; empty before the first."""
@@ -65,32 +66,42 @@ class Track:
         start = bisect_left(self.times_ns, t_ns - STALE_NS) - 1
         return range(max(0, min(start, stop - 1)), stop)
 
+    def pose(self, index: int) -> Pose:
+        """Return one of the poses; each is made when first asked for, because half of them never are."""
+        pose = self._made.get(index)
+        if pose is None:
+            pose = self._made[index] = Pose.of(self.deliveries[index])
+        return pose
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """All poses."""
+        return tuple(map(self.pose, range(len(self.deliveries))))
+
     @property
     def moves(self) -> bool:
         """Whether the poses differ by more than a centimetre."""
-        xs = [p.at(X) for p in self.poses]
-        ys = [p.at(Y) for p in self.poses]
+        poses = self.poses
+        xs, ys = [p.x for p in poses], [p.y for p in poses]
         return bool(xs) and max(max(xs) - min(xs), max(ys) - min(ys)) > 0.01
 
 
 def track_of(trace: Trace, topic: str) -> Track | None:
     """Return the odometry that was played on a topic, or None if none was."""
-    return _track_of(Same(trace), topic)
+    return trace.once((track_of, topic), lambda: _track_of(trace, topic))
 
 
-@lru_cache(maxsize=1)
-def _track_of(this: Same[Trace], topic: str) -> Track | None:
-    trace = this.value
-    poses = tuple(Pose.of(d) for d in trace.deliveries(topic) if d.t_ns < trace.stop_ns)
-    if not poses:
+def _track_of(trace: Trace, topic: str) -> Track | None:
+    played = delivered(trace, topic)
+    if not played:
         return None
-    times = tuple(p.t_ns for p in poses)
+    times = tuple(d.t_ns for d in played)
     starts, stops = trace.marks("stream_starts", topic), trace.marks("stream_stops", topic)
     start_ns = min(starts[0].t_ns, times[0]) if starts else times[0]
     stop_ns = stops[-1].t_ns if stops else times[-1] + (times[-1] - times[0]) // max(1, len(times) - 1)
-    return Track(poses, times, start_ns, min(stop_ns, trace.stop_ns), JITTER_NS[trace.clock])
+    return Track(played, times, start_ns, min(stop_ns, trace.stop_ns), JITTER_NS[trace.clock])
 
 
 def _number(fields: Mapping[str, Any], path: str) -> float:
-    found = field(fields, path)
+    found = number_in(fields, path)
     return _NAN if found is None else found

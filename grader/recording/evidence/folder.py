@@ -95,9 +95,11 @@ def read(path: Path, most: int) -> bytes:
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(descriptor, "rb") as file:
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
                 raise EvidenceError(f"{path}: expected a file, found something that is no plain one")
-            data = file.read(most + 1)
+            # one byte more than there is tells whether it grows; to ask for `most` sets memory aside for all of it
+            data = file.read(min(status.st_size, most) + 1)
     except OSError as error:
         found = "nothing there" if error.errno in (errno.ENOENT, errno.ENOTDIR) else (error.strerror or str(error))
         raise EvidenceError(f"{path}: expected a file of kept evidence, found {found}") from error

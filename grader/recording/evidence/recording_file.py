@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import zstandard
@@ -149,7 +150,13 @@ def _unpressed(packed: bytes) -> bytes:
     size = zstandard.frame_content_size(packed)
     if not 0 <= size <= MOST_BYTES:
         raise EvidenceError(f"expected a trace of at most {MOST_BYTES >> 20} MiB, found {size} bytes")
-    return zstandard.decompress(packed)
+    return _decompressor().decompress(packed)
+
+
+@lru_cache(maxsize=1)
+def _decompressor() -> zstandard.ZstdDecompressor:
+    """Return the one that is used again and again: to make one takes longer than what it does."""
+    return zstandard.ZstdDecompressor()
 
 
 def _about(trace: Trace, facts: Mapping[str, str]) -> dict[str, Any]:
