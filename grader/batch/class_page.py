@@ -55,6 +55,7 @@ def _student(row: Row, run: RunOfClass) -> Student:
         adjustments=tuple(_adjustments(row)),
         remarks=tuple(without_folders(text, run.folders) for text in remarks(row)),
         report=row.report,
+        less=row.handed_back is not None and row.handed_back != row.report,
         counts=not adjusted.ignored,
     )
 

@@ -41,6 +41,7 @@ class Student:
         adjustments: What was decided, one sentence each, e.g. the penalty for late days.
         remarks: What somebody who reads the row must know.
         report: The report; None if there is none.
+        less: Whether students get to see less than the report.
         counts: Whether it counts at all.
     """
 
@@ -55,6 +56,7 @@ class Student:
     adjustments: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     report: ReportData | None = None
+    less: bool = False
     counts: bool = True
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from fractions import Fraction
 from functools import cache
 from urllib.parse import quote
@@ -14,13 +15,15 @@ from grader.reports import wording
 from grader.reports.class_page import bundle
 from grader.reports.class_page.causes import Cause, causes
 from grader.reports.class_page.contents import ClassPage, PageLink, ReportData
-from grader.reports.class_page.counts import distribution, exercise_counts
+from grader.reports.class_page.counts import Distribution, distribution, exercise_counts
 from grader.reports.class_page.payload import payload
 from grader.reports.escape import script_json, shown
 
 #: More causes than this are counted, not shown.
 MOST_CAUSES = 40
 REPORT_PAGE, REPORT_DATA = "report.html", "report.json"
+#: The same as far as students may see it.
+HANDED_BACK_PAGE = "feedback.html"
 
 
 def render_class(page: ClassPage, *, assets: str | None = None) -> str:
@@ -41,6 +44,7 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
         causes=found,
         most_causes=MOST_CAUSES,
         spread=spread,
+        tiles=_tiles(page, spread),
         outcomes=wording.OUTCOME_WORDS,
         common=bundle.common(),
         assets=assets,
@@ -87,6 +91,7 @@ def _template() -> Template:
         "exercise_points": exercise_points,
         "report_page": REPORT_PAGE,
         "report_data": REPORT_DATA,
+        "handed_back_page": HANDED_BACK_PAGE,
         "cause_anchor": _cause_anchor,
     }
     return templates.get_template("class.html")
@@ -96,6 +101,15 @@ def exercise_points(report: ReportData | None, id_: str) -> Fraction | None:
     """Return the points that a report has for an exercise; None if it is not in it."""
     exercises = () if report is None else report["exercises"]
     return next((Fraction(str(e["score"])) for e in exercises if e["id"] == id_), None)
+
+
+def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
+    """Return the figures that are looked at first, with what they are."""
+    standing = Counter(student.status for student in page.students)
+    found = spread.final or spread.raw
+    scores = [("mean", _percent(found[0])), ("median", _percent(found[1]))] if found else []
+    full = [("full score", str(spread.bins[-1].final))] if found else []
+    return [*scores, *full, *((status, str(count)) for status, count in standing.most_common())]
 
 
 def _cause_anchor(cause: Cause) -> str:

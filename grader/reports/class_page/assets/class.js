@@ -30,17 +30,52 @@
     exercise: (head) => data.students.map((student) => student.exercises[Number(head.dataset.index)]),
   };
 
+  // ---- rows: of a large class only the first are laid out, more when they are wanted
+  const AT_ONCE = 200;
+  const more = byId("more");
+  let sorted = [...rows.keys()];
+  let fitting = rows.map(() => true);
+  let wanted = [];
+  let limit = AT_ONCE;
+
+  function show(most = AT_ONCE) {
+    const before = limit === most ? wanted : [];
+    limit = most;
+    wanted = sorted.filter((index) => fitting[index]);
+    if (wanted.length === before.length && wanted.every((index, k) => index === before[k])) return;
+    body.replaceChildren(...wanted.slice(0, limit).map((index) => rows[index]));
+    count();
+  }
+
+  function extend() {
+    body.append(...wanted.slice(limit, limit + AT_ONCE).map((index) => rows[index]));
+    limit += AT_ONCE;
+    count();
+  }
+
+  function count() {
+    const left = wanted.length - limit;
+    more.hidden = !(left > 0);
+    more.textContent = `Show more rows (${left} left)`;
+    table.setAttribute("aria-rowcount", String(wanted.length + 1));
+  }
+
+  more.addEventListener("click", extend);
+  new IntersectionObserver((seen) => { if (seen.some((one) => one.isIntersecting) && !more.hidden) extend(); }).observe(more);
+  window.addEventListener("beforeprint", () => show(rows.length));
+  window.addEventListener("afterprint", () => show());
+
   // Rows without a value come last, whichever way the others go; equal ones go by name.
   function sort(head, descending) {
     const values = keys[head.dataset.sort](head);
     const way = descending ? -1 : 1;
-    const sorted = [...rows.keys()].sort((a, b) => {
+    sorted = [...rows.keys()].sort((a, b) => {
       if (values[a] === null || values[b] === null) return (values[a] === null) - (values[b] === null) || names[a] - names[b];
       return way * (values[a] - values[b]) || names[a] - names[b] || a - b;
     });
     for (const other of table.tHead.querySelectorAll("th[data-sort]")) other.removeAttribute("aria-sort");
     head.setAttribute("aria-sort", descending ? "descending" : "ascending");
-    body.replaceChildren(...sorted.map((index) => rows[index]));
+    show();
   }
 
   for (const head of table.tHead.querySelectorAll("th[data-sort]")) {
@@ -81,15 +116,11 @@
   }
 
   function filter() {
-    const fits = matching();
-    let count = 0;
-    data.students.forEach((student, index) => {
-      const fit = fits(student, index);
-      count += fit;
-      if (rows[index].hidden === fit) rows[index].hidden = !fit;
-    });
+    fitting = data.students.map(matching());
+    show();
     const which = cause === null ? "" : ` with cause ${cause + 1}`;
-    byId("shown").textContent = count === rows.length ? `${count} rows` : `${count} of ${rows.length} rows${which}`;
+    const all = wanted.length === rows.length;
+    byId("shown").textContent = all ? `${rows.length} rows` : `${wanted.length} of ${rows.length} rows${which}`;
   }
 
   function only(change) {
@@ -160,8 +191,7 @@
     const short = (label) => (narrow ? label.replace(/ to .*/, "") : label);
     chart.setOption({
       animation: false,
-      grid: { left: 36, right: 8, top: data.changed ? 40 : 18, bottom: 44, outerBoundsMode: "none" },
-      legend: { show: data.changed, top: 0, left: 0, textStyle: FONT, selectedMode: false },
+      grid: { left: 36, right: 8, top: 20, bottom: 44, outerBoundsMode: "none" },
       xAxis: {
         type: "category",
         data: data.bins.map((bin) => short(bin[0])),
@@ -169,7 +199,7 @@
         nameLocation: "middle",
         nameGap: 28,
         nameTextStyle: FONT,
-        axisLabel: { ...FONT, interval: 0, fontSize: narrow ? 10 : 12, formatter: (text) => text.replace(" %", "") },
+        axisLabel: { ...FONT, interval: 0, hideOverlap: false, overflow: "none", fontSize: narrow ? 10 : 12, formatter: (text) => text.replace(" %", "") },
         axisLine: { lineStyle: { color: Charts.colour("axis") } },
         axisTick: { show: false },
       },
@@ -231,6 +261,7 @@
     window.addEventListener("afterprint", () => { printing = false; paint(width); });
   }
 
+  show();
   if (figure) draw();
   document.documentElement.dataset.ready = "yes";
 })();
