@@ -37,6 +37,7 @@ class Terms:
         recording: Its files, by their paths from there; that of a recording of one file is empty.
         standalone: Whether each HTML report holds its scripts.
         deadline_s: Real time after which an attempt is given up.
+        checks: Relative path and content of the rubrics' own files of checks.
     """
 
     conditions: Conditions
@@ -46,6 +47,7 @@ class Terms:
     recording: Files
     standalone: bool
     deadline_s: float
+    checks: Files = ()
 
 
 @dataclass(frozen=True, slots=True)

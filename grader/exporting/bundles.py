@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.exporting.parts import integration, pins, wheel, zipped
 from grader.model.errors import GraderError, RubricError
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.rubric_file import builtin_rubrics, own_check_files, read_rubric
 
 #: Files that are run; the others are read.
 _PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
@@ -77,14 +77,20 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
     _check(chosen)
     name, content = wheel()
     # Numbered: two rubrics may have one name in two folders, and names of files may be anything.
-    rubrics = {f"rubrics/{n}.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
+    rubrics = {f"rubrics/{n}/rubric.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
     settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
+    checks = {
+        f"rubrics/{n}/{file.name}": file.content
+        for n, path in enumerate(chosen.rubrics, start=1)
+        for file in own_check_files(path)
+    }
     return {
         "prepare": integration("prepare"),
         "settings.json": (json.dumps(settings, indent=2) + "\n").encode(),
         "constraints.txt": pins().encode(),
         name: content,
         **rubrics,
+        **checks,
     }
 
 

@@ -46,8 +46,8 @@ def test_rubrics_travel_under_names_of_ours():
     """The settings say where; a name of the course's own could be anything."""
     archive = opened(gradescope(Chosen(exercises=("odom_subscriber",), rubrics=(ROOT / "rubrics/exercise_2.yaml",))))
     chosen = json.loads(archive.read("settings.json"))
-    assert chosen == {"exercises": ["odom_subscriber"], "rubrics": ["rubrics/1.yaml"], "isolation": "auto"}
-    assert archive.read("rubrics/1.yaml") == (ROOT / "rubrics/exercise_2.yaml").read_bytes()
+    assert chosen == {"exercises": ["odom_subscriber"], "rubrics": ["rubrics/1/rubric.yaml"], "isolation": "auto"}
+    assert archive.read("rubrics/1/rubric.yaml") == (ROOT / "rubrics/exercise_2.yaml").read_bytes()
 
 
 def test_an_exercise_that_no_rubric_has_is_refused_at_once():

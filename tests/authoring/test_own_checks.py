@@ -14,6 +14,8 @@ from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
 from grader import cli
+from grader.batch.cluster.sending import checks_of
+from grader.exporting.bundles import Chosen, classroom50
 from grader.judging.judge import judge_exercise
 from grader.model.errors import RubricError
 from grader.model.exercise import Outcome
@@ -201,6 +203,25 @@ def test_a_check_without_a_docstring_is_odd(tmp_path):
     assert "has no docstring to explain it" not in command("rubric", "check", write_rubric(tmp_path)).stderr
     write_rubric(tmp_path, checks=CHECKS_FILE[:begin] + CHECKS_FILE[end:])
     assert "StartsEarly, which has no docstring to explain it" in command("rubric", "check", path).stderr
+
+
+def test_a_bundle_for_a_platform_holds_it(tmp_path):
+    """Beside its rubric, so that the rubric can be read from there."""
+    files = classroom50(Chosen(rubrics=(write_rubric(tmp_path),)))
+    for name in ("rubric.yaml", "pump_checks.py"):
+        path = tmp_path / "there" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(files[f"rubrics/1/{name}"])
+    assert read_rubric(tmp_path / "there" / "rubric.yaml").digest == read_rubric(tmp_path / "pump.yaml").digest
+
+
+def test_it_travels_to_a_cluster(tmp_path, monkeypatch):
+    """As bytes, with its path from where the class is graded."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "course").mkdir()
+    write_rubric(tmp_path / "course")
+    rubric = Path("course/pump.yaml")
+    assert [*checks_of([rubric])] == [(b"course/pump_checks.py", CHECKS_FILE.encode())]
 
 
 @pytest.mark.ros

@@ -98,7 +98,7 @@ def lay_out(terms: Terms, errand: Errand, scratch: Path) -> Task:
     """
     start = _start(terms, scratch)
     start.mkdir(parents=True)
-    for name, content in terms.rubrics:
+    for name, content in (*terms.rubrics, *terms.checks):
         _write(start, os.fsdecode(name), content, scratch)
     bag = os.fsdecode(terms.odom_bag)
     for name, content in terms.recording:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from grader.batch.standing import Standing, State
 from grader.batch.tasks import Attempt, Task
 from grader.batch.worker import PARTS
 from grader.model.errors import HarnessError, RecordingError, RubricError, SubmissionError
+from grader.reading.rubric_file import own_check_files
 from grader.reading.submission import collect_submission
 from grader.session import Request, read_exercises, wanted_files
 
@@ -38,11 +39,19 @@ def terms_of(task: Task) -> Terms:
         conditions=task.conditions,
         exercises=task.exercises,
         rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
+        checks=tuple(checks_of(task.rubrics)),
         odom_bag=b"" if task.odom_bag is None else travelling_name(task.odom_bag),
         recording=() if task.odom_bag is None else _recording(task.odom_bag),
         standalone=task.standalone,
         deadline_s=task.deadline_s,
     )
+
+
+def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
+    """Yield the files of checks that rubrics bring with them; they were looked at when the rubrics were read."""
+    for path in rubrics:
+        for file in own_check_files(path):
+            yield travelling_name(file.path), file.content
 
 
 def files_wanted(task: Task) -> Sequence[str]:
