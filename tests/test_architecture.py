@@ -11,7 +11,10 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
 #: All rooms but the host's, and but the commands: what stands at the top may use them.
-BELOW_COMMANDS = {"entry", "batch", "authoring", "exporting", "reports", "recording", "judging", "reading", "model"}
+BELOW_COMMANDS = {
+    *("entry", "batch", "authoring", "selftest", "exporting"),
+    *("reports", "recording", "judging", "reading", "model"),
+}
 #: Room -> rooms it may import. Entries are at the top, the vocabulary at the bottom.
 MAY_IMPORT = {
     "entry": BELOW_COMMANDS | {"commands"},
@@ -20,6 +23,8 @@ MAY_IMPORT = {
     "batch": {"batch", "entry", "reports", "recording", "reading", "model"},
     # A skeleton is written from what the reference does, and tried on it as a submission would be.
     "authoring": {"authoring", "entry", "reading", "judging", "model"},
+    # Mutants of a reference are recorded and judged as submissions are.
+    "selftest": {"selftest", "entry", "reports", "recording", "reading", "judging", "model"},
     "exporting": {"exporting", "reading", "model"},
     "reports": {"reports", "model"},
     "recording": {"recording", "model"},
@@ -102,9 +107,13 @@ def test_a_planted_violation_is_found(tmp_path):
     ]
 
 
+#: Rooms, and parts of rooms, that are pure.
+PURE = ("model", "judging", "reports", "selftest/mutating")
+
+
 def impurities(package):
     """Return every import in a pure room of what touches the world, as sentences."""
-    paths = sorted(path for room in ("model", "judging", "reports") for path in (package / room).rglob("*.py"))
+    paths = sorted(path for room in PURE for path in (package / room).rglob("*.py"))
     found = []
     for path in paths:
         name = path.relative_to(package).as_posix()
