@@ -16,6 +16,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from grader.model.errors import HarnessError
 from grader.model.trace import Trace
 from grader.recording.codec import trace_to_json
 from grader.recording.guard import Guard
@@ -148,6 +149,8 @@ def main() -> None:
         data = json.loads(command)
         try:
             answer: dict[str, Any] = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
+        except HarnessError as error:
+            answer = {"problem": error.message}
         except Exception:
             answer = {"problem": traceback.format_exc()[-4000:]}
         answers.write(json.dumps(answer) + "\n")

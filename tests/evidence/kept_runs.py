@@ -28,6 +28,9 @@ from grader.model.trace import (
     Observation,
     Offer,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 from grader.reading.rubric_file import read_rubric
@@ -66,7 +69,15 @@ OBSERVATIONS: Mapping[type, st.SearchStrategy[Any]] = {
     Delivery: st.builds(Delivery, _TIMES, _TEXTS, _TYPES, _VALUES, _CDR),
     LogRecord: st.builds(LogRecord, _TIMES, _TEXTS, _TEXTS, _TEXTS, _TEXTS, _TEXTS, st.integers(0, 2**40)),
     OutputLine: st.builds(OutputLine, _TIMES, _TEXTS, _TEXTS, _TEXTS),
-    GraphSnapshot: st.builds(GraphSnapshot, _TIMES, _several(_TEXTS), _several(_ENDS)),
+    Request: st.builds(Request, _TIMES, _TEXTS, _TYPES, st.integers(), _TEXTS, st.integers(), _VALUES, _CDR),
+    Response: st.builds(Response, _TIMES, _TEXTS, _TYPES, st.integers(), _TEXTS, st.integers(), _VALUES, _CDR),
+    GraphSnapshot: st.builds(
+        GraphSnapshot,
+        _TIMES,
+        _several(_TEXTS),
+        _several(_ENDS),
+        _several(st.builds(ServiceEnd, _TEXTS, _TEXTS, _TEXTS, _TEXTS)),
+    ),
     Fault: st.builds(
         Fault, _TIMES, _TEXTS, st.sampled_from(FaultKind), _TEXTS, _TEXTS, st.integers(0, 2**40), _several(_TEXTS)
     ),

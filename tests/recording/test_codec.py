@@ -24,6 +24,9 @@ from grader.model.trace import (
     Observation,
     Offer,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 from grader.recording.codec import observation_to_json, trace_from_json, trace_to_json
@@ -48,8 +51,14 @@ OBSERVATIONS = {
     LogRecord: st.builds(LogRecord, TIMES, TEXTS, TEXTS, TEXTS, TEXTS, TEXTS, LINES),
     OutputLine: st.builds(OutputLine, TIMES, TEXTS, TEXTS, TEXTS),
     GraphSnapshot: st.builds(
-        GraphSnapshot, TIMES, st.lists(TEXTS, max_size=3).map(tuple), st.lists(ENDPOINTS, max_size=3).map(tuple)
+        GraphSnapshot,
+        TIMES,
+        st.lists(TEXTS, max_size=3).map(tuple),
+        st.lists(ENDPOINTS, max_size=3).map(tuple),
+        st.lists(st.builds(ServiceEnd, TEXTS, TEXTS, TEXTS, TEXTS), max_size=3).map(tuple),
     ),
+    Request: st.builds(Request, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),
+    Response: st.builds(Response, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),
     Fault: st.builds(
         Fault, TIMES, TEXTS, st.sampled_from(FaultKind), TEXTS, TEXTS, LINES, st.lists(TEXTS, max_size=3).map(tuple)
     ),
@@ -120,6 +129,9 @@ SOUND = trace_to_json(
             Fault(4, "a.py", FaultKind.EXCEPTION, "text", "a.py", 1, ("a.py:1 in main",)),
             Offer(4, "a.py", "service", "/s", "t"),
             Mark(5, "limit", "why"),
+            GraphSnapshot(3, ("/a",), (), (ServiceEnd("client", "/s", "t", "/a"),)),
+            Request(4, "/s", "t", 1, "grader", 1, {"data": True}),
+            Response(4, "/s", "t", 1, "student", 1, {"message": math.inf}, b"\0\1\0\0"),
         ),
     )
 )
@@ -163,7 +175,7 @@ def assert_types(trace):
         assert type(o.t_ns) is int
         names = {name for name, kind in type(o).__annotations__.items() if kind == "str"}
         assert all(type(getattr(o, name)) is str for name in names)
-        if isinstance(o, (Message, Delivery)):
+        if isinstance(o, (Message, Delivery, Request, Response)):
             assert type(o.value) is dict
             assert type(o.cdr) is bytes
 
@@ -190,6 +202,12 @@ def assert_types(trace):
         (("observations", 4, 3), ["abcdefgh"]),
         (("observations", 5, 3), "surprise"),
         (("observations", 5, 7), "abc"),
+        (("observations", 8, 4), "abc"),
+        (("observations", 8, 4, 0), ["client", "/s", "t"]),
+        (("observations", 9, 4), 1.0),
+        (("observations", 9, 6), "1"),
+        (("observations", 9, 7), [1]),
+        (("observations", 10, 8), "no base64!"),
     ],
 )
 def test_damage_is_named(path, wrong):
@@ -224,5 +242,8 @@ def test_the_first_word_is_the_kind():
         "fault",
         "offer",
         "mark",
+        "graph",
+        "request",
+        "response",
     ]
     assert observation_to_json(Mark(5, "limit", "why")) == ["mark", 5, "limit", "why"]

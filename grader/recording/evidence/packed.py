@@ -27,14 +27,18 @@ from grader.model.trace import (
     Observation,
     Offer,
     OutputLine,
+    Request,
+    Response,
+    ServiceEnd,
     Trace,
 )
 from grader.recording.codec import FORMAT, lively, trace_from_json, trace_to_json
 
 #: Stands for bytes that are a message of the recording itself.
 THERE = "*"
-#: Place of the bytes in a packed message.
+#: Place of the bytes in what is packed of messages, and of requests and responses.
 _CDR = 5
+_PLACES = {"message": _CDR, "delivery": _CDR, "request": 8, "response": 8}
 _ODD_NUMBER = b'{"float":'
 
 
@@ -51,6 +55,21 @@ class _Message(_Row, tag="message"):
 
 
 class _Delivery(_Message, tag="delivery"):
+    pass
+
+
+class _Request(_Row, tag="request"):
+    t_ns: int
+    service: str
+    type: str
+    number: int
+    sender: str
+    client: int
+    value: dict[str, Any]
+    cdr: str
+
+
+class _Response(_Request, tag="response"):
     pass
 
 
@@ -84,10 +103,18 @@ class _End(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     liveliness: str
 
 
+class _Service(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    kind: str
+    service: str
+    type: str
+    node: str
+
+
 class _Graph(_Row, tag="graph"):
     t_ns: int
     nodes: list[str]
     endpoints: list[_End]
+    services: list[_Service] = []
 
 
 class _Fault(_Row, tag="fault"):
@@ -124,7 +151,7 @@ class _Packed(msgspec.Struct, forbid_unknown_fields=True):
     stop_ns: int
     notes: tuple[str, ...]
     harness_problem: str
-    observations: list[_Message | _Delivery | _Log | _Line | _Graph | _Fault | _Offer | _Mark]
+    observations: list[_Message | _Delivery | _Request | _Response | _Log | _Line | _Graph | _Fault | _Offer | _Mark]
 
 
 _DECODER = msgspec.json.Decoder(_Packed)
@@ -132,16 +159,23 @@ _fields = msgspec.structs.astuple
 
 
 def _graph(row: _Graph) -> GraphSnapshot:
-    return GraphSnapshot(row.t_ns, tuple(row.nodes), tuple(Endpoint(*_fields(end)) for end in row.endpoints))
+    services = tuple(ServiceEnd(*_fields(end)) for end in row.services)
+    return GraphSnapshot(row.t_ns, tuple(row.nodes), tuple(Endpoint(*_fields(end)) for end in row.endpoints), services)
 
 
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
     return lambda row: kind(row.t_ns, row.topic, row.type, row.value)
 
 
+def _exchange(kind: type[Request] | type[Response]) -> Callable[[Any], Observation]:
+    return lambda row: kind(row.t_ns, row.service, row.type, row.number, row.sender, row.client, row.value)
+
+
 _MAKERS: Mapping[type[_Row], Callable[[Any], Observation]] = {
     _Message: _without_bytes(Message),
     _Delivery: _without_bytes(Delivery),
+    _Request: _exchange(Request),
+    _Response: _exchange(Response),
     _Log: lambda row: LogRecord(*_fields(row)),
     _Line: lambda row: OutputLine(*_fields(row)),
     _Graph: _graph,
@@ -204,8 +238,9 @@ def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
     try:
         rows = json.loads(data)
         for index, row in enumerate(rows["observations"]):
-            if row[0] in ("message", "delivery"):
-                row[_CDR] = _base64(row[_CDR], cdrs, index)
+            place = _PLACES.get(row[0])
+            if place is not None:
+                row[place] = _base64(row[place], cdrs, index)
         return trace_from_json(rows)
     except HarnessError as error:
         raise EvidenceError(error.message) from error
@@ -221,7 +256,7 @@ def _base64(packed: str, cdrs: Sequence[bytes] | None, index: int) -> str:
 
 def _revived(observation: Observation) -> Observation:
     """Return an observation whose NaN and infinities are numbers again."""
-    if not isinstance(observation, (Message, Delivery)):
+    if not isinstance(observation, (Message, Delivery, Request, Response)):
         return observation
     try:
         return replace(observation, value=lively(observation.value))

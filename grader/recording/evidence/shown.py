@@ -9,7 +9,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import Delivery, Fault, GraphSnapshot, LogRecord, Mark, Message, Observation, Offer, OutputLine
+from grader.model.trace import (
+    Delivery,
+    Fault,
+    GraphSnapshot,
+    LogRecord,
+    Mark,
+    Message,
+    Observation,
+    Offer,
+    OutputLine,
+    Request,
+    Response,
+)
 from grader.recording.codec import observation_to_json, plain
 from grader.recording.evidence.interfaces import Unknown, check_readable, encode
 
@@ -17,13 +29,23 @@ STRING = "std_msgs/msg/String"
 LOG = "rcl_interfaces/msg/Log"
 ROSOUT = "/rosout"
 #: Observations that are no ROS messages, as JSON on topics of the grader's own.
-OUTPUT, GRAPH, FAULTS, OFFERS, MARKS = (f"/grader/{name}" for name in ("output", "graph", "faults", "offers", "marks"))
+OUTPUT, GRAPH, FAULTS, OFFERS, MARKS, CALLS = (
+    f"/grader/{name}" for name in ("output", "graph", "faults", "offers", "marks", "calls")
+)
 #: Messages whose bytes nobody can decode, or of a type that has no definition here.
 UNDECODED = "/grader/undecoded"
 #: What is known of the whole recording, once at its beginning.
 RUN = "/grader/run"
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
-_TOPICS = {OutputLine: OUTPUT, GraphSnapshot: GRAPH, Fault: FAULTS, Offer: OFFERS, Mark: MARKS}
+_TOPICS = {
+    OutputLine: OUTPUT,
+    GraphSnapshot: GRAPH,
+    Fault: FAULTS,
+    Offer: OFFERS,
+    Mark: MARKS,
+    Request: CALLS,
+    Response: CALLS,
+}
 _MOST_NS = 2**63 - 1
 
 
@@ -110,10 +132,13 @@ def _log(record: LogRecord) -> Shown:
 def _fields(observation: Observation) -> dict[str, Any]:
     """Return an observation by the names of its fields, without its time."""
     _, _, *values = observation_to_json(observation)
-    fields = dict(zip(type(observation).__slots__[1:], values, strict=True))
+    fields = dict(zip(type(observation).__slots__[1:], values, strict=False))
     if isinstance(observation, GraphSnapshot):
         ends = observation.endpoints
         fields["endpoints"] = [{name: getattr(e, name) for name in type(e).__slots__} for e in ends]
+        fields["services"] = [{name: getattr(e, name) for name in type(e).__slots__} for e in observation.services]
+    if isinstance(observation, (Request, Response)):
+        fields = {"what": type(observation).__name__.lower(), **fields}
     return fields
 
 
