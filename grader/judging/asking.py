@@ -28,12 +28,14 @@ class Answer:
         missing: Files of the scenario that the submission lacks.
         problem: Why nobody knows: our side's or the machine's failure.
         error: Class and text of an exception in a check, for whoever mends it; goes with `problem`.
+        hint: One thing to do about the problem; empty if nothing is very likely right.
     """
 
     finding: Finding | None = None
     missing: tuple[str, ...] = ()
     problem: str = ""
     error: str = ""
+    hint: str = ""
 
 
 def check_name(criterion: Criterion) -> str:
@@ -64,12 +66,16 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace) -> Answer:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
     except (Exception, SystemExit) as error:  # a check that fails must cost no points and must not end the report
         problem = f"the check {name} failed on this recording through no fault of the submission"
-        return Answer(problem=problem, error=f"{_place(error)}{type(error).__name__}: {quote(str(error))}")
+        said = f"{type(error).__name__}: {quote(str(error))}"
+        if not criterion.check_name or name in CHECKS:
+            return Answer(problem=problem, error=said)
+        said = f"{_place(error)}{said}"
+        return Answer(problem=problem, error=said, hint=f"mend the check that the rubric brings: {said}")
     if name in CHECKS and 0 <= finding.credit <= 1:
         return Answer(finding=_start_failure_first(finding, scenario, trace))
     wrong = breach(finding)
     if wrong:
-        return Answer(problem=f"the check {name} {wrong}")
+        return Answer(problem=f"the check {name} {wrong}", hint="mend the check that the rubric brings")
     finding = replace(finding, credit=Fraction(finding.credit))
     return Answer(finding=_start_failure_first(finding, scenario, trace))
 

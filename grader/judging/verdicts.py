@@ -45,7 +45,8 @@ class Bench:
             return self._missing(criterion, answer.missing)
         if answer.finding is None:
             evidence = {"error": answer.error} if answer.error else {}
-            return _without_points(criterion, Outcome.UNDECIDED, answer.problem, evidence=evidence)
+            problem, hint = answer.problem, answer.hint
+            return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
         needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
         if needed is not None:
             return self._blocked(criterion, needed, self._outcome(needed))

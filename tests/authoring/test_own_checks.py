@@ -153,6 +153,7 @@ def test_an_exception_leaves_the_criterion_undecided(tmp_path):
     found = verdict(write_rubric(tmp_path), TraceBuilder("pump.py").trace())
     assert (found.outcome, found.score) == (Outcome.UNDECIDED, 0)
     assert found.evidence["error"] == "pump_checks.py:29: LookupError: nobody thought of silence"
+    assert found.hint == f"mend the check that the rubric brings: {found.evidence['error']}"
 
 
 @pytest.mark.parametrize(
