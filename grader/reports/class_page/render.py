@@ -61,7 +61,7 @@ def result_link(folder: str, file: str, anchor: str = "") -> str:
         anchor: Id of an element in it.
     """
     path = page_link(PageLink("", f"students/{folder}/{file}")) if "/" not in folder and folder else ""
-    return f"{path}#{quote(anchor, safe='')}" if path and anchor else path
+    return f"{path}#{quote(anchor, safe='', errors='replace')}" if path and anchor else path
 
 
 def page_link(link: PageLink) -> str:
