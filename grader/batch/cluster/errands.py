@@ -124,7 +124,7 @@ def lay_out(terms: Terms, errand: Errand, scratch: Path) -> Task:
 
 def _start(terms: Terms, scratch: Path) -> Path:
     """Return where relative paths start from: so deep that those which lead up stay inside."""
-    names: Files = (*terms.rubrics, (terms.odom_bag, b""))
+    names: Files = (*terms.rubrics, *terms.checks, (terms.odom_bag, b""))
     up = max(name.split(b"/").count(b"..") for name, _ in names)
     return scratch.joinpath("files", *["up"] * up)
 
