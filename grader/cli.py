@@ -24,6 +24,7 @@ from grader.options import (
     UNDECIDED,
     UNUSABLE,
     audience_options,
+    drawn_by,
     exit_code,
     parse_outputs,
     parse_percent,
@@ -117,6 +118,8 @@ class _Everyday(click.Command):
     default="auto",
     help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
+@click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
+@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
@@ -133,6 +136,8 @@ def _grade(  # noqa: PLR0913  one parameter an option
     min_score: Fraction | None,
     clock: str,
     isolation: str,
+    student: str,
+    variant_key: Path | None,
     audience: str | None,
     as_of: str,
     no_progress: bool,
@@ -156,6 +161,9 @@ def _grade(  # noqa: PLR0913  one parameter an option
         odom_bag=odom_bag,
         clock=clock,
         isolation=isolation,
+        student=student.strip(),
+        variant_key=variant_key,
+        draw=drawn_by(student, variant_key),
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     keeper = keeping.Keeper(folders, request)

@@ -9,6 +9,8 @@ from typing import Any
 from grader.model.exercise import Exercise
 from grader.model.report import Report
 from grader.model.run import Run
+from grader.model.variant import Drawn
+from grader.reading.variants import Recorded
 from grader.recording.evidence.store import check_place, keep
 from grader.reports.json_report import dumps
 from grader.session import Request
@@ -42,22 +44,26 @@ class Keeper:
             return
         run, exercises = self._heard
         for folder in self._folders:
-            keep(folder, run, exercises, request=request_to_json(self._request), report=dumps(report).encode())
+            asked = request_to_json(self._request, exercises)
+            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
-def request_to_json(request: Request) -> dict[str, Any]:
-    """Return what a command to reproduce the report needs besides path, seed and rubrics."""
+def request_to_json(request: Request, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
+    """Return what a command to reproduce the report needs besides path, seed and rubrics, and what variants came to."""
     return {
         "exercises": list(request.exercises),
         "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
         "clock": request.clock,
         "isolation": request.isolation,
+        "student": request.student,
+        "variant_key": None if request.variant_key is None else str(request.variant_key),
+        "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
     }
 
 
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> Request:
     """Return the request that would record a kept run again, to be judged by these rubrics."""
-    bag = data.get("odom_bag")
+    bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
     return Request(
         submission=submission,
         exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
@@ -66,4 +72,7 @@ def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tup
         odom_bag=Path(str(bag)) if bag is not None else None,
         clock=str(data.get("clock", "auto")),
         isolation=str(data.get("isolation", "auto")),
+        student=student,
+        variant_key=None if key is None else Path(str(key)),
+        draw=Recorded(Drawn(student, data.get("variants", {}))),
     )

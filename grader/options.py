@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -16,6 +16,9 @@ from grader.model.report import Report
 from grader.reports.delivery import Output
 from grader.reports.formats import FORMATS
 from grader.reports.readers import Readers
+
+if TYPE_CHECKING:
+    from grader.variants import ByKey
 
 ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 #: What `-o` calls the folder of recordings that a report rests on.
@@ -43,6 +46,21 @@ def audience_options(command: _Command) -> _Command:
 def readers(audience: str | None, day: str) -> Readers:
     """Return who reads the reports, as the options of `audience_options` say."""
     return Readers(None if audience is None else Audience(audience), day)
+
+
+def drawn_by(student: str, key: Path | None) -> ByKey | None:
+    """Return what draws a student's variants; None if neither option is given.
+
+    Raises:
+        VariantError: The key or the id cannot be used.
+    """
+    if not student and key is None:
+        return None
+    if key is None or not student:
+        raise click.BadParameter("--student and --variant-key need each other")
+    from grader.variants import by_key  # noqa: PLC0415  reading, which --help does not need
+
+    return by_key(key, student)
 
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

@@ -18,6 +18,7 @@ from grader.model.errors import EvidenceError, GraderError
 from grader.model.exercise import Exercise
 from grader.model.report import Report
 from grader.options import UNUSABLE, exit_code
+from grader.reading.variants import First
 from grader.recording.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
 from grader.reports.audience import told
 from grader.reports.changes import Change, change
@@ -81,7 +82,7 @@ def judgement(
     chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
 ) -> Judgement:
     """Return how to judge; raises RubricError for a rubric that cannot be used or an exercise that none has."""
-    exercises = read_exercises(Request("", exercises=chosen, rubrics=rubrics))
+    exercises = read_exercises(Request("", exercises=chosen, rubrics=rubrics, draw=First()))
     return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
 
 
@@ -91,10 +92,10 @@ def rejudge(evidence: Evidence, how: Judgement) -> Report:
     Raises:
         EvidenceError: It is damaged, or holds no exercise that is asked for.
     """
-    exercises = _asked(evidence, how)
-    run = run_of(evidence, exercises, verify=how.verify)
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
+    exercises = _as_recorded(_asked(evidence, how), request)
+    run = run_of(evidence, exercises, verify=how.verify)
     if how.chosen:
         request = replace(request, exercises=how.chosen)
     again = replace(run.reproduce, command=command_words(request, kept.seed))
@@ -219,6 +220,14 @@ def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:
         message = f"{evidence.folder}: expected a rubric for {what}, found one for {', '.join(known)}"
         raise EvidenceError(message, "name the rubric it was graded by with --rubric")
     return [exercise for exercise in how.exercises if exercise.id in held]
+
+
+def _as_recorded(exercises: list[Exercise], request: Request) -> list[Exercise]:
+    """Return the exercises with the values that were this student's own when they were graded."""
+    if all(exercise.variant is None for exercise in exercises):
+        return exercises
+    wanted = tuple(exercise.id for exercise in exercises)
+    return read_exercises(replace(request, submission="", exercises=wanted))
 
 
 def _name(folder: Path, root: Path) -> str:

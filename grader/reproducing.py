@@ -41,6 +41,10 @@ def command_words(request: Request, seed: int) -> tuple[str, ...]:
     for rubric in request.rubrics:
         words += ["--rubric", str(rubric)]
     words += ["--seed", str(seed)]
+    if request.student:
+        words += ["--student", request.student]
+    if request.variant_key is not None:
+        words += ["--variant-key", str(request.variant_key)]
     if request.odom_bag is not None:
         words += ["--odom-bag", str(request.odom_bag)]
     if request.clock != "auto":

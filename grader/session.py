@@ -25,6 +25,7 @@ from grader.reading.rubric_file import builtin_rubrics, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_collected, stage_submission
+from grader.reading.variants import Draw
 from grader.recording.bag import Odometry, read_odometry
 from grader.recording.plan import plan_scenario, seed_of
 from grader.recording.recorder import Job
@@ -51,6 +52,9 @@ class Request:
         isolation: `auto`, `none` or the name of a tier.
         workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
         collected: What was read of the submission before, perhaps elsewhere; None to read it now.
+        student: Id of the student whose variants are graded; empty where nothing varies.
+        variant_key: File with the course key, as the user typed it; None if nobody did.
+        draw: What variants come to; None if nobody says, and then a rubric that has some is refused.
     """
 
     submission: str
@@ -63,6 +67,9 @@ class Request:
     isolation: str = "auto"
     workers: int | None = None
     collected: Collected | None = None
+    student: str = ""
+    variant_key: Path | None = None
+    draw: Draw | None = None
 
 
 class Progress(Protocol):
@@ -135,7 +142,7 @@ def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[E
     """
     paths: Sequence[Path] = request.rubrics or tuple(builtin_rubrics().values())
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
-    exercises = [read_rubric(path, submissions=theirs) for path in paths]
+    exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in paths]
     known = [exercise.id for exercise in exercises]
     for wanted in request.exercises:
         if wanted not in known:

@@ -13,6 +13,7 @@ from grader.model.exercise import Exercise
 from grader.model.report import ExerciseReport, ReportedFault, Verdict
 from grader.model.submission import Submission
 from grader.model.trace import ClockKind, Fault, GraphSnapshot, Trace
+from grader.model.variant import variant_notes
 
 
 def judge_exercise(
@@ -46,10 +47,11 @@ def judge_exercise(
         clock_reason=next((r for r in reasons if r), ""),
         verdicts=_explained(bench.verdicts(), exercise, traces, submission, sources),
         faults=_faults(recorded),
-        notes=_notes(recorded, submission, sources),
+        notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources)),
         graph=_graph(exercise, traces),
         feedback={c.id: c.feedback for c in exercise.criteria},
         situations={c.id: c.scenario for c in exercise.criteria},
+        variant=exercise.variant,
     )
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from grader.model.exercise import Exercise, Outcome
 from grader.model.report import ExerciseReport, Verdict
 from grader.model.trace import ClockKind
+from grader.model.variant import variant_notes
 
 
 def not_graded_yet(exercise: Exercise) -> ExerciseReport:
@@ -24,4 +25,6 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
         verdicts=tuple(verdicts),
         feedback={c.id: c.feedback for c in exercise.criteria},
         situations={c.id: c.scenario for c in exercise.criteria},
+        notes=variant_notes(exercise.variant),
+        variant=exercise.variant,
     )

@@ -6,6 +6,7 @@
       ├─ RecordingError    whoever named the /odom recording
       ├─ EvidenceError     whoever named the evidence
       ├─ ClassError        whoever describes a class: its submissions, roster, late days, places for results
+      ├─ VariantError      whoever names the student whose variant is meant, or the course key
       ├─ EnvironmentFault  whoever set up this machine (ROS, sandbox)
       └─ HarnessError      us or the machine, during a run
 
@@ -45,6 +46,10 @@ class EvidenceError(GraderError):
 
 class ClassError(GraderError):
     """What describes a class, or the place for its results, cannot be used; whoever named it must act."""
+
+
+class VariantError(GraderError):
+    """A student's variant cannot be drawn; whoever named the student or the course key must act."""
 
 
 class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here

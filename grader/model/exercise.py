@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from grader.model.feedback import OPEN, Feedback
 from grader.model.scenario import Scenario
 from grader.model.trace import Trace
+from grader.model.variant import Variant
 
 
 class Outcome(str, Enum):
@@ -103,6 +104,7 @@ class Exercise:
         criteria: What is judged, in order.
         digest: `sha256:` over the bytes of the rubric file and of the checks of its own.
         by_request: Whether it is graded only where somebody asks for it.
+        variant: The values that differ from student to student, as they are in here; None if none do.
     """
 
     id: str
@@ -114,3 +116,4 @@ class Exercise:
     criteria: tuple[Criterion, ...]
     digest: str
     by_request: bool = False
+    variant: Variant | None = None

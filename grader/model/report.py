@@ -12,6 +12,7 @@ from grader.model.exercise import Location, Outcome
 from grader.model.feedback import Feedback
 from grader.model.figure import Excerpt, Figure
 from grader.model.trace import ClockKind, GraphSnapshot
+from grader.model.variant import Variant
 
 SCHEMA = "grader/report/v1"
 
@@ -76,6 +77,7 @@ class ExerciseReport:
         expected: Criterion id -> what it asks for, in one phrase.
         feedback: Criterion id -> how much of its result a student is shown; no report shows this.
         situations: Criterion id -> scenario that it is judged on; no report shows this.
+        variant: The values that were this student's own; None if there are none.
     """
 
     id: str
@@ -93,6 +95,7 @@ class ExerciseReport:
     expected: Mapping[str, str] = field(default_factory=dict)
     feedback: Mapping[str, Feedback] = field(default_factory=dict)
     situations: Mapping[str, str] = field(default_factory=dict)
+    variant: Variant | None = None
 
     @property
     def score(self) -> Fraction:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from grader.judging.checks import CHECKS
 from grader.model.errors import RubricError
@@ -16,6 +17,7 @@ from grader.model.exercise import Check, Criterion, Exercise
 from grader.model.feedback import Feedback
 from grader.model.limits import Limits
 from grader.model.scenario import Scenario, Span
+from grader.model.variant import Variant
 from grader.reading.check_parameters import build
 from grader.reading.feedback import feedback_of
 from grader.reading.own_checks import OwnFile, digest_of, load, named_files, own_files
@@ -32,7 +34,20 @@ from grader.reading.rubric_model import (
 from grader.reading.rubric_stimuli import stimulus_of
 from grader.reading.rubric_types import CHECK_FILE
 from grader.reading.shipped import shipped_folder
+from grader.reading.variants import (
+    Draw,
+    First,
+    Options,
+    has_variants,
+    options_of,
+    tried,
+    variants_model,
+    varied_digest,
+    with_values,
+)
 from grader.reading.yaml_tree import TOP, Mistake, YamlSyntaxError, YamlTree, read_yaml
+
+_Model = TypeVar("_Model", bound=BaseModel)
 
 #: Largest rubric file.
 MAX_BYTES = 256 * 1024
@@ -64,7 +79,11 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
 
 
 def read_rubric(
-    path: Path, *, checks: Mapping[str, type] = CHECKS, submissions: Sequence[Path] = ()
+    path: Path,
+    *,
+    checks: Mapping[str, type] = CHECKS,
+    submissions: Sequence[Path] = (),
+    draw: Draw | None = None,
 ) -> Exercise:
     """Read one rubric file; where it names checks of its own, their files are run.
 
@@ -72,6 +91,7 @@ def read_rubric(
         path: The file; messages show it as given.
         checks: The table of checks that the rubric may use, besides its own.
         submissions: What students write: no check is taken from there.
+        draw: Says what variants come to; without it, a rubric that has some is refused.
 
     Returns:
         The exercise.
@@ -83,6 +103,34 @@ def read_rubric(
     tree = _tree(path, content)
     files = own_files(path, _own_names(path, tree), submissions)
     checks = {**checks, **load(files, checks)}
+    digest = digest_of(content, files)
+    if not has_variants(tree):
+        return _exercise(path, tree, checks, digest)
+    options = options_of(_validated(path, tree, variants_model()))
+    known = {option.name: option.value(0) for option in options}
+    nobodys = _exercise(path, with_values(tree, known), checks, digest)
+    for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
+        _exercise(path, with_values(tree, values), checks, digest)
+    variant = _variant(path, tree, nobodys, options, draw)
+    exercise = _exercise(path, with_values(tree, dict(variant.values)), checks, varied_digest(digest, variant))
+    return replace(exercise, variant=variant)
+
+
+def _variant(path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[Options], draw: Draw | None) -> Variant:
+    """Return the values that were drawn; raises RubricError where nobody is named, or a value is not known."""
+    if draw is None:
+        hint = "name the student and the course key: --student ID --variant-key FILE"
+        text = "expected a student, because this rubric has variants, found none"
+        _refuse(path, [tree.keys[("variants",)].mistake(text, hint)])
+    values = [(option.name, draw.value(exercise.id, option)) for option in options]
+    unknown = [name for name, value in values if value is None]
+    if unknown:
+        text = "expected a variant that was graded, found one of which no value was kept"
+        _refuse(path, [tree.keys[("variants", name)].mistake(text, "grade the submission again") for name in unknown])
+    return Variant(draw.student, tuple((name, value) for name, value in values if value is not None))
+
+
+def _exercise(path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str) -> Exercise:
     rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
     mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
     criteria = tuple(_criteria(rubric, checks, tree, mistakes))
@@ -97,7 +145,7 @@ def read_rubric(
         files=rubric.files,
         scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
         criteria=criteria,
-        digest=digest_of(content, files),
+        digest=digest,
         by_request=rubric.exercise.by_request,
     )
 
@@ -164,7 +212,7 @@ def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
     raise RubricMistakes(shown(str(path), 500), mistakes)
 
 
-def _validated(path: Path, tree: YamlTree, model: type[RubricShape]) -> RubricShape:
+def _validated(path: Path, tree: YamlTree, model: type[_Model]) -> _Model:
     if tree.data is None:
         _refuse(path, [TOP.mistake("expected a rubric, found an empty file")])
     try:

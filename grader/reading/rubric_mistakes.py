@@ -107,6 +107,9 @@ def _keys(model: type[BaseModel], path: TreePath) -> list[str]:
 def _step(annotation: object, part: str | int) -> object:
     if isinstance(part, int):
         return _first(annotation, lambda inner: getattr(inner, "__origin__", None) is tuple) or annotation
+    named = _first(annotation, lambda inner: getattr(inner, "__origin__", None) is dict)
+    if named is not None:
+        return get_args(named)[1]
     shape = _shape_in(annotation)
     fields = shape.model_fields.items() if shape else ()
     return next((info.annotation for name, info in fields if (info.alias or name) == part), object)

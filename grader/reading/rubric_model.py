@@ -23,6 +23,7 @@ from grader.reading.rubric_types import (
     Topic,
     YesNo,
 )
+from grader.reading.variants import VariantsField
 
 
 class ExerciseShape(Shape):
@@ -80,6 +81,7 @@ class RubricShape(Shape):
     checks: tuple[CheckFile, ...] = Field(default=(), description="files of checks of one's own, beside the rubric")
     limits: LimitsShape = Field(default_factory=LimitsShape)
     feedback: FeedbackField | None = None
+    variants: VariantsField = Field(default_factory=dict)
     scenarios: tuple[ScenarioShape, ...] = Field(min_length=1)
     criteria: tuple[CriterionShape, ...] = Field(min_length=1)
 

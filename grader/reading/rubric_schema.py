@@ -12,6 +12,21 @@ from typing import Any
 
 from grader.judging.checks import CHECKS
 from grader.reading.rubric_model import rubric_model
+from grader.reading.variants import REFERENCE
+
+_SCALARS = frozenset({"string", "number", "integer", "boolean"})
+_VARIANT = "VariantReference"
+_REFERS = {"$ref": f"#/$defs/{_VARIANT}"}
+_REFERENCE = {
+    "type": "object",
+    "description": "The value that one of `variants` has for the student who is graded.",
+    "properties": {REFERENCE: {"type": "string"}},
+    "required": [REFERENCE],
+    "additionalProperties": False,
+}
+#: Definitions in which nothing varies, and those in which only some keys do.
+_FIXED = frozenset({"ExerciseShape", "FeedbackShape", "LimitsShape", "VariantShape", "Check", "StimulusShape"})
+_FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
 
 
 def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
@@ -21,12 +36,50 @@ def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
         checks: The table of checks that rubrics may use.
     """
     schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_tidy(schema)}
+    tidy = _tidy(schema)
+    tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **tidy}
 
 
 def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
     """Return the schema as text; that of the grader's own checks is shipped."""
     return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
+
+
+def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
+    """Return the definition of a mapping in which variants may stand for values."""
+    if name in _FIXED:
+        return node
+    if "properties" not in node:
+        return _or_variant(node)
+    kept = _FREE.get(name, tuple(node["properties"]))
+    free = {key: _or_variant(value) if key in kept else value for key, value in node["properties"].items()}
+    return {**node, "properties": free}
+
+
+def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema of values, each of which may be a variant instead."""
+    for word in ("anyOf", "oneOf"):
+        if word in node:
+            options = [_inside(option) for option in node[word]]
+            return {**node, word: [*options, _REFERS] if any(map(_is_scalar, node[word])) else options}
+    return {"anyOf": [node, _REFERS]} if _is_scalar(node) else _inside(node)
+
+
+def _inside(node: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema of a list or a mapping whose values may be variants."""
+    found = dict(node)
+    for word in ("items", "additionalProperties"):
+        if isinstance(node.get(word), dict):
+            found[word] = _or_variant(node[word])
+    if "prefixItems" in node:
+        found["prefixItems"] = [_or_variant(item) for item in node["prefixItems"]]
+    return found
+
+
+def _is_scalar(node: dict[str, Any]) -> bool:
+    kinds = node.get("type", ())
+    return bool({kinds} & _SCALARS if isinstance(kinds, str) else set(kinds) & _SCALARS)
 
 
 def _tidy(node: Any, *, names: bool = False) -> Any:

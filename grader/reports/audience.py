@@ -11,6 +11,7 @@ from grader.model.exercise import Location, Outcome
 from grader.model.feedback import DUE_DATE, OPEN, PUBLISHED, Shows, strictest
 from grader.model.figure import Chart, Excerpt, Figure
 from grader.model.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.model.variant import variant_notes
 from grader.reports.readers import Readers
 from grader.reports.wording import points
 from grader.reports.wordless import without_numbers
@@ -45,9 +46,9 @@ def for_student(report: Report, day: str) -> Report:
     ids = {exercise.id for exercise in kept}
     unshown = [
         f"exercise {exercise.number} is not shown: {note}"
-        for exercise in exercises
+        for index, exercise in enumerate(exercises)
         if not exercise.verdicts
-        for note in exercise.notes[:1]
+        for note in _unshown(report.exercises[index], day)
     ]
     return replace(
         report,
@@ -80,7 +81,7 @@ def _exercise(exercise: ExerciseReport, day: str) -> ExerciseReport:
         clock_reason=_said(exercise.clock_reason, worst, otherwise=_CLOCK),
         verdicts=verdicts,
         faults=faults,
-        notes=(*_unshown(exercise, day), *_notes(exercise.notes, worst), _LEFT_OUT),
+        notes=(*variant_notes(exercise.variant), *_unshown(exercise, day), *_notes(exercise, worst), _LEFT_OUT),
         graph=None,
         figures=tuple(figure for figure in exercise.figures if _is_open(figure, exercise, shown)),
         excerpts=_excerpts(exercise, verdicts, faults, shown),
@@ -112,7 +113,9 @@ def _said(text: str, worst: Shows, *, otherwise: str) -> str:
     return without_numbers(text) if worst is Shows.WITHOUT_NUMBERS else otherwise
 
 
-def _notes(notes: Sequence[str], worst: Shows) -> list[str]:
+def _notes(exercise: ExerciseReport, worst: Shows) -> list[str]:
+    """Return the notes of the run; the variant is no secret, for it is on the student's own task sheet."""
+    notes = [note for note in exercise.notes if note not in variant_notes(exercise.variant)]
     return [without_numbers(note) for note in notes] if worst is Shows.WITHOUT_NUMBERS else []
 
 

@@ -15,6 +15,7 @@ from grader.model.containment import Property, described
 from grader.model.exercise import Location
 from grader.model.quantities import seconds
 from grader.model.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
+from grader.model.variant import Variant
 from grader.reports.escape import valid_unicode
 from grader.reports.shell import command_line
 
@@ -93,7 +94,15 @@ def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
         "criteria": [_criterion(verdict) for verdict in exercise.verdicts],
         "faults": [_fault(fault) for fault in exercise.faults],
         "notes": _notes(exercise, report),
+        **_variant(exercise.variant),
     }
+
+
+def _variant(variant: Variant | None) -> dict[str, Any]:
+    """Return the values of the student's own, where the rubric has some."""
+    if variant is None:
+        return {}
+    return {"variant": {"student": valid_unicode(variant.student), "values": _plain(dict(variant.values))}}
 
 
 def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
