@@ -236,7 +236,11 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
             settle()
         clock.busy_sending()
         ledger.sent[name] += 1
-        return send()
+        try:
+            return send()
+        except BaseException:
+            ledger.sent[name] -= 1  # nothing was sent, as after the context was shut down
+            raise
 
     publish = rclpy.publisher.Publisher.publish
     call = rclpy.client.Client.call_async

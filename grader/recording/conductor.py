@@ -345,14 +345,14 @@ class Conductor:
                 self._tell_matches(student, claims)
 
     def _sees(self, claims: list[dict[str, Any]]) -> bool:
-        """Return whether the graph holds what the processes claim; nodes count only where they may be called."""
+        """Return whether the graph holds what the processes claim."""
         graph = self._graph_now()
         seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
         ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
         wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        nodes = {c["name"] for c in claims if c["kind"] == "node" and self._plan.calls}
+        nodes = {c["name"] for c in claims if c["kind"] == "node"}
         return (
             all(seen[key] >= count for key, count in wanted.items())
             and exchanging <= offered
