@@ -20,7 +20,7 @@ from grader.reports.delivery import show
 @click.option("--template", type=PATH, metavar="FOLDER", help="What students start from; by default as above.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Scenarios at a time; by default one a core.")
 @click.option("--only", default="", metavar="PATTERN", help="Only mutants and variants of this id; * is anything.")
-@click.option("--sample", type=click.IntRange(min=1), metavar="N", help="At most N mutants an operator and file.")
+@click.option("--sample", type=click.IntRange(min=1), metavar="N", help="Only N mutants a rubric, of many kinds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw the sample and all values from N.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for grading.")

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import zip_longest
 from pathlib import Path
 
 from grader.model.errors import RubricError
@@ -24,6 +25,9 @@ from grader.selftest.mutating.variants import variants_of
 from grader.selftest.results import Fate, Result, Standing, Trial, one_line_change
 from grader.session import Progress, Request, read_exercises, read_recording
 
+#: A sample holds a variant for so many mutants.
+_MUTANTS_A_VARIANT = 4
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -34,7 +38,7 @@ class Options:
         template: Folder of templates; None likewise.
         jobs: Scenarios recorded side by side; None leaves it to the machine.
         only: Ids to run, with `*` for anything; empty for all.
-        sample: Most mutants of one operator and file; None for all.
+        sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
         seed: Of the sample, and of every drawn value; None derives the values from the reference solution.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
@@ -146,7 +150,9 @@ def _mutants(bench: Bench, explained: Explained, options: Options) -> Iterator[T
     """Yield the mutants that were asked for, tried."""
     found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
     wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
-    for candidate, standing in bench.standings(_sampled(wanted, options), f"{bench.exercise.id}: mutant"):
+    for candidate, standing in bench.standings(
+        _sampled(wanted, options.sample, options.seed or 0), f"{bench.exercise.id}: mutant"
+    ):
         trial = _trial(candidate, standing, bench)
         because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
         expected = _first(explained.expected, trial.id)
@@ -157,7 +163,9 @@ def _variants(bench: Bench, explained: Explained, options: Options) -> Iterator[
     """Yield the correct variants that were asked for, tried."""
     found = [variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name)]
     wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
-    for candidate, standing in bench.standings(wanted, f"{bench.exercise.id}: variant"):
+    most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
+    chosen = _sampled(wanted, most, options.seed or 0)
+    for candidate, standing in bench.standings(chosen, f"{bench.exercise.id}: variant"):
         trial = _trial(candidate, standing, bench)
         because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
         yield replace(trial, because=because.because if because else "")
@@ -172,17 +180,17 @@ def _wanted(id_: str, options: Options) -> bool:
     return not options.only or fnmatchcase(id_, options.only)
 
 
-def _sampled(candidates: Sequence[Candidate], options: Options) -> list[Candidate]:
-    """Return at most so many of each operator and file, in the same order; the draw repeats."""
-    if options.sample is None:
+def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> list[Candidate]:
+    """Return at most so many, spread over the operators, in the same order; the draw repeats."""
+    if most is None:
         return list(candidates)
-    groups: dict[tuple[str, str], list[Candidate]] = {}
-    for candidate in candidates:
-        groups.setdefault((candidate.file, candidate.operator), []).append(candidate)
-    kept: set[str] = set()
-    for (file, operator), group in groups.items():
-        draw = random.Random(f"{options.seed or 0} {file} {operator}")  # noqa: S311  it has to repeat
-        kept.update(c.id for c in draw.sample(group, min(len(group), options.sample)))
+    draw = random.Random(f"{seed}")  # noqa: S311  it has to repeat
+    groups: dict[str, list[Candidate]] = {}
+    for candidate in draw.sample(candidates, len(candidates)):
+        groups.setdefault(candidate.operator, []).append(candidate)
+    rounds = zip_longest(*groups.values())
+    drawn = [candidate.id for one_each in rounds for candidate in one_each if candidate is not None]
+    kept = set(drawn[:most])
     return [candidate for candidate in candidates if candidate.id in kept]
 
 

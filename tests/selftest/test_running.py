@@ -1,0 +1,92 @@
+"""Self-tests as they are run: what is chosen without nodes, and the whole with real nodes."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from grader.cli import app
+from grader.model.errors import RubricError
+from grader.reading.rubric_file import builtin_rubrics
+from grader.selftest.bench import Candidate
+from grader.selftest.running import Options, _sampled, selftest
+
+#: Mutants of each of our rubrics in this test; `grade selftest rubrics/exercise_*.yaml` by hand runs them all.
+SAMPLE = 8
+
+
+def candidates():
+    """Return twenty changed programs of four operators."""
+    return [Candidate(f"a.py:{n}:{n % 4}:x", "a.py", str(n % 4), "") for n in range(20)]
+
+
+def test_a_sample_is_spread_over_the_operators():
+    """One of each kind comes before a second of any, in the order of the whole."""
+    sample = _sampled(candidates(), 6, 0)
+    assert len(sample) == 6
+    assert {candidate.operator for candidate in sample} == {"0", "1", "2", "3"}
+    assert sample == sorted(sample, key=candidates().index)
+
+
+def test_a_sample_repeats():
+    """The same seed draws the same mutants, another one others."""
+    assert _sampled(candidates(), 6, 1) == _sampled(candidates(), 6, 1)
+    assert _sampled(candidates(), 6, 1) != _sampled(candidates(), 6, 2)
+    assert _sampled(candidates(), None, 1) == candidates()
+
+
+def test_a_rubric_without_a_reference_is_refused(tmp_path):
+    """Before anything is started."""
+    rubric = tmp_path / "mine.yaml"
+    rubric.write_bytes(builtin_rubrics()["velocity_publisher"].read_bytes())
+    with pytest.raises(RubricError, match="expected a reference solution") as error:
+        next(selftest([rubric], Options(), lambda step: None))
+    assert "mine.selftest.yaml" in error.value.hint
+
+
+def graded(*arguments):
+    """Return the exit code of `grade selftest`, and what it printed as JSON."""
+    result = CliRunner().invoke(app, ["selftest", *map(str, arguments), "--json", "--no-progress"])
+    return result.exit_code, json.loads(result.stdout) if result.stdout.startswith("{") else result.output
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=builtin_rubrics())
+def test_our_rubrics_notice_what_students_do_wrong(rubric):
+    """No survivor of the sample is unexplained, no variant is marked down, the template has its baseline."""
+    code, data = graded(rubric, "--sample", SAMPLE, "--seed", 7)
+    (tested,) = data["rubrics"]
+    assert [m["change"] for m in tested["mutants"] if m["fate"] == "survived" and not m["because"]] == []
+    assert [v["id"] for v in tested["variants"] if v["fate"] != "survived" and not v["because"]] == []
+    assert tested["template"]["score"] == tested["template_expected"]
+    assert len(tested["mutants"]) == SAMPLE
+    assert code == 0
+
+
+HOLED = """\
+schema: grader/rubric/v1
+exercise: {id: holed, number: "1", title: Holed, required: true}
+files: [velocity_publisher.py]
+scenarios:
+  - {id: alone, processes: [velocity_publisher.py], observe: {duration: 10 s}}
+criteria:
+  - id: publishes
+    title: Publishes
+    points: 1
+    scenario: alone
+    check: {publishes: {topic: /cmd_vel, type: geometry_msgs/msg/Twist}}
+"""
+
+
+@pytest.mark.ros
+def test_a_hole_in_a_rubric_is_found(tmp_path):
+    """A rubric that asks for a publisher only lets ten times the period survive, and notices a misspelt topic."""
+    rubric = tmp_path / "holed.yaml"
+    rubric.write_text(HOLED, encoding="utf-8")
+    reference = builtin_rubrics()["velocity_publisher"].parent.parent / "reference_solutions"
+    code, data = graded(rubric, "--reference", reference, "--only", "*:period:*[*] 10")
+    (tested,) = data["rubrics"]
+    assert [(m["fate"], m["change"].split("=>")[1].strip()) for m in tested["mutants"]] == [
+        ("survived", "self.create_timer((1 / RATE_HZ) * 10, self.send)"),
+    ]
+    assert (code, tested["passed"], tested["template"]) == (1, False, None)
