@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -54,3 +55,14 @@ def times(factor: float) -> str:
 def in_window(outputs: Sequence[Output], start_ns: int, stop_ns: int) -> list[Output]:
     """Return what was written in [start_ns, stop_ns)."""
     return [o for o in outputs if start_ns <= o.t_ns < stop_ns]
+
+
+def number_in(text: str, pattern: str | None = None) -> float | None:
+    """Return the number that a text tells: what the pattern finds in it, or its first number."""
+    if pattern is not None:
+        match = re.search(pattern, text[:2_000])
+        if match is None:
+            return None
+        text = match[1] if match.re.groups and match[1] is not None else match[0]
+    found = numbers_in(text)
+    return found[0].value if found else None

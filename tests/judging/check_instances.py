@@ -32,4 +32,8 @@ INSTANCES: dict[str, Check] = {
         "/battery/get_status", {"success": True, "message": FieldRule(pattern="Battery: .*")}
     ),
     "service_sequence": CHECKS["service_sequence"]("/battery/get_status", 84.5, -0.5, floor=0.0, reset_to=100.0),
+    "service_calls": CHECKS["service_calls"]("/battery/get_status", 5, period=NS_PER_S),
+    "waits_for_service": CHECKS["waits_for_service"]("battery_service_client.py", "/battery/get_status"),
+    "reacts_to_responses": CHECKS["reacts_to_responses"]("battery_service_client.py", "/battery/get_status", 20.0),
+    "no_go_without_answer": CHECKS["no_go_without_answer"]("battery_service_client.py", "/battery/get_status", 20.0),
 }

@@ -11,6 +11,7 @@ import pytest
 from check_instances import INSTANCES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from test_client_checks import asking, chapter, deciding
 from test_fan_check import HONEST, WRONG
 from test_fan_check import each as each_temperature
 from test_graph_check import graph
@@ -56,12 +57,22 @@ TRACES = {
     "together": each(),
     "graph": graph(),
     "battery server": answering(60, clients=3),
+    "battery client": asking(chapter),
+    "careless battery client": asking(deciding(lambda v: v > 10, 50.0)),
     "empty": Recording(),
 }
 
-NAMES = st.sampled_from(["/cmd_vel", "/odom", "/temperature", "/fan_speed", "/x", "/rosout"])
+NAMES = st.sampled_from(["/cmd_vel", "/battery/get_status", "/odom", "/temperature", "/fan_speed", "/x", "/rosout"])
 TYPES = st.sampled_from([TWIST, ODOMETRY, FLOAT32, "std_msgs/msg/String", "\ud800\n"])
-FILES = st.sampled_from(["velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py", "fan_controller.py"])
+FILES = st.sampled_from(
+    [
+        "velocity_publisher.py",
+        "odom_subscriber.py",
+        "temperature_sensor.py",
+        "fan_controller.py",
+        "battery_service_client.py",
+    ]
+)
 TIMES = st.integers(0, 30 * NS_PER_S)
 NUMBERS = st.one_of(st.floats(), st.integers(), st.booleans(), st.none(), st.text(max_size=3), st.just([1.0]))
 POSITIONS = st.builds(lambda x, y: {"pose": {"pose": {"position": {"x": x, "y": y}}}}, NUMBERS, NUMBERS)
@@ -85,6 +96,9 @@ ENDPOINTS = st.builds(
     st.sampled_from(["reliable", "best_effort", ""]),
     st.sampled_from(["volatile", "transient_local", ""]),
 )
+MARKS = st.sampled_from(
+    ["stream_starts", "stream_stops", "limit", "server_starts", "server_stops", "exited", "stop_signal", "stopped"]
+)
 SENDERS = st.sampled_from(["grader", "student"])
 SERVICE_ENDS = st.builds(
     ServiceEnd, st.sampled_from(["service", "client"]), st.sampled_from([BATTERY, "/b"]), TYPES, st.just("/a")
@@ -95,7 +109,7 @@ OBSERVATIONS = st.one_of(
     st.builds(LogRecord, TIMES, FILES, st.sampled_from(["INFO", "ERROR", ""]), st.text(max_size=5), TEXTS),
     st.builds(OutputLine, TIMES, FILES, st.sampled_from(["stdout", "stderr"]), TEXTS),
     st.builds(Fault, TIMES, FILES, st.sampled_from(list(FaultKind)), TEXTS),
-    st.builds(Mark, TIMES, st.sampled_from(["stream_starts", "stream_stops", "limit"]), NAMES),
+    st.builds(Mark, TIMES, MARKS, st.one_of(NAMES, FILES)),
     st.builds(Request, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
     st.builds(Response, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
     st.builds(lambda t, e: GraphSnapshot(t, (), (), tuple(e)), TIMES, st.lists(SERVICE_ENDS, max_size=3)),

@@ -1,5 +1,7 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
 
+from grader.judging.checks.clients import ServiceCalls, WaitsForService
+from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
@@ -36,6 +38,10 @@ CHECKS: dict[str, type] = {
     "service_answers_all": ServiceAnswersAll,
     "service_response": ServiceResponse,
     "service_sequence": ServiceSequence,
+    "service_calls": ServiceCalls,
+    "waits_for_service": WaitsForService,
+    "reacts_to_responses": ReactsToResponses,
+    "no_go_without_answer": NoGoWithoutAnswer,
 }
 
 __all__ = ["CHECKS"]

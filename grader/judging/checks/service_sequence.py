@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -11,7 +10,7 @@ from typing import Any
 from grader.judging.checks.services import too_few_responses
 from grader.judging.findings import met, not_met
 from grader.judging.paths import number_at, text_at
-from grader.judging.printed import numbers_in
+from grader.judging.printed import number_in
 from grader.judging.services import Call, calls_of
 from grader.judging.wording import counted, moment, number, numbers, quote
 from grader.model.exercise import Finding
@@ -157,14 +156,3 @@ class ServiceSequence:
         if sum(again) >= 0.4 * len(again):
             return f"numbers come more than once ({numbers(values[:4])}, ...)", _KEEP_HINT
         return "", ""
-
-
-def number_in(text: str, pattern: str | None = None) -> float | None:
-    """Return the number that a text tells: what the pattern finds in it, or its first number."""
-    if pattern is not None:
-        match = re.search(pattern, text[:2_000])
-        if match is None:
-            return None
-        text = match[1] if match.re.groups and match[1] is not None else match[0]
-    found = numbers_in(text)
-    return found[0].value if found else None

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from grader.judging.checks.clients import ServiceCalls, WaitsForService
+from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
@@ -128,6 +130,28 @@ def _sequence(check: ServiceSequence) -> str:
     return said + (f", not beyond {number(check.floor)}{again}" if check.floor is not None else "")
 
 
+def _calls(check: ServiceCalls) -> str:
+    said = f"{check.calls} requests on {check.service}"
+    if check.period is None:
+        return said
+    return f"{said}, {number(seconds(check.period))} ± {number(seconds(check.tolerance))} s apart"
+
+
+def _waits_for(check: WaitsForService) -> str:
+    return f"{check.process} waits for {check.service}, logs that it does, and asks once it is there"
+
+
+def _reacts(check: ReactsToResponses) -> str:
+    limit = number(check.threshold)
+    goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
+    said = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[check.side]
+    return f"{check.process} {said}; printing alone is half of it"
+
+
+def _keeps_still(check: NoGoWithoutAnswer) -> str:
+    return f"{check.process} does not go on where {check.service} gives no answer, no success or no number"
+
+
 _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
     {
         Publishes: _publishes,
@@ -150,5 +174,9 @@ _PHRASES: Mapping[type, Callable[[Any], str]] = MappingProxyType(
         ServiceAnswersAll: _answers,
         ServiceResponse: _response,
         ServiceSequence: _sequence,
+        ServiceCalls: _calls,
+        WaitsForService: _waits_for,
+        ReactsToResponses: _reacts,
+        NoGoWithoutAnswer: _keeps_still,
     }
 )

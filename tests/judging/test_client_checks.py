@@ -1,0 +1,355 @@
+"""A client of the battery server: it waits, asks five times, goes on, warns, and knows when it knows nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from tracing import TRIGGER, Recording
+
+from grader.judging.checks.clients import ServiceCalls, WaitsForService
+from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
+from grader.judging.findings import FAULT_KEY
+from grader.model.errors import HarnessError
+from grader.model.exercise import Check
+from grader.model.quantities import NS_PER_MS, NS_PER_S
+from grader.model.trace import ClockKind
+
+BATTERY = "/battery/get_status"
+FILE = "battery_service_client.py"
+CALLS = ServiceCalls(BATTERY, 5, period=NS_PER_S, tolerance=300 * NS_PER_MS)
+WAITS = WaitsForService(FILE, BATTERY)
+REACTS = ReactsToResponses(FILE, BATTERY, 20.0)
+ABOVE = ReactsToResponses(FILE, BATTERY, 20.0, "above")
+BELOW = ReactsToResponses(FILE, BATTERY, 20.0, "at_or_below")
+STILL = NoGoWithoutAnswer(FILE, BATTERY, 20.0)
+
+#: What a client writes: (level, text); `print` is a printed line, `at_end LEVEL` comes once the pause is over.
+Said = Sequence[tuple[str, str]]
+Answer = tuple[bool, str] | None
+
+
+def battery(level: float) -> Answer:
+    return True, f"Battery: {level:.1f}% remaining"
+
+
+FAILED: Answer = (False, "Battery: 60.0% remaining")
+UNREADABLE: Answer = (True, "sensor fault")
+ANSWERS = (battery(84.5), battery(20.1), battery(20.0), FAILED, UNREADABLE, None, battery(15.0), battery(63.0))
+
+
+def level_of(answer: Answer) -> float | None:
+    if answer is None or not answer[0] or "%" not in answer[1]:
+        return None
+    return float(answer[1].split(":")[1].split("%")[0])
+
+
+def asking(
+    write: Callable[[Answer], Said],
+    answers: Sequence[Answer] = ANSWERS,
+    header: str = "--- Mission {} ---",
+    pause_s: float = 1.0,
+    delay_s: float = 0.1,
+    waiting: Said = (("INFO", "Waiting for battery service..."),),
+    appears_s: float = 3.0,
+    clock: ClockKind = ClockKind.VIRTUAL,
+) -> Recording:
+    """A client that waits until its server appears, and asks again a pause after each answer."""
+    rec = Recording(30.0, clock, FILE).service("client", BATTERY, TRIGGER, "/mission_planner")
+    rec.mark(appears_s, "server_starts", BATTERY)
+    for k in range(1, 3):
+        say(rec, float(k), waiting)
+    t = appears_s + 0.25
+    say(rec, t, [("INFO", "Mission Planner ready")])
+    for place, answer in enumerate(answers, 1):
+        say(rec, t, [("INFO", header.format(place))] if header else [])
+        rec.request(t, BATTERY, place, sender="student")
+        at = t + (delay_s if answer is not None else 2.0)
+        if answer is not None:
+            rec.response(at, BATTERY, place, {"success": answer[0], "message": answer[1]}, sender="grader")
+        texts = write(answer)
+        say(rec, at, [x for x in texts if not x[0].startswith("at_end")])
+        t = at + pause_s
+        say(rec, t, [(level[7:], text) for level, text in texts if level.startswith("at_end")])
+    return rec
+
+
+def say(rec: Recording, t_s: float, texts: Said) -> None:
+    for level, text in texts:
+        if level == "print":
+            rec.line(t_s, text)
+        else:
+            rec.log(t_s, text, level)
+
+
+def chapter(answer: Answer) -> Said:
+    said = [("INFO", f"Battery status: {answer[1]}")] if answer else [("ERROR", "Service call failed")]
+    level = level_of(answer)
+    if level is None:
+        return said
+    return [
+        *said,
+        ("INFO", "Battery OK, starting mission") if level > 20 else ("WARN", "Low battery, aborting mission"),
+    ]
+
+
+def with_numbers(answer: Answer) -> Said:
+    level = level_of(answer)
+    if level is None:
+        return [("WARN", "no valid answer")]
+    return [("INFO", f"go ({level})") if level > 20 else ("WARN", f"battery low ({level})")]
+
+
+def looks_later(answer: Answer) -> Said:
+    return [(f"at_end {level}", text) for level, text in with_numbers(answer)]
+
+
+def pausing(answer: Answer) -> Said:
+    return [*chapter(answer), ("INFO", "sleeping for a second")]
+
+
+def silent_go(answer: Answer) -> Said:
+    return [s for s in chapter(answer) if "starting" not in s[1]]
+
+
+def as_error(answer: Answer) -> Said:
+    return [("ERROR" if level == "WARN" else level, text) for level, text in chapter(answer)]
+
+
+def as_print(answer: Answer) -> Said:
+    return [("print", text) for _, text in chapter(answer)]
+
+
+RIGHT = {
+    "chapter": asking(chapter),
+    "no header": asking(chapter, header=""),
+    "numbers in the texts": asking(with_numbers),
+    "answers at once": asking(chapter, delay_s=0.0),
+    "answers at once, numbers": asking(with_numbers, delay_s=0.0),
+    "looks at the answer when it asks again": asking(looks_later),
+    "looks later, answers at once": asking(looks_later, delay_s=0.0),
+    "tells its pause": asking(pausing),
+    "goes on without a word": asking(silent_go),
+    "a low charge is an error": asking(as_error),
+    "wall clock": asking(chapter, clock=ClockKind.WALL),
+    "low first": asking(chapter, (battery(15.0), FAILED, battery(84.5))),
+    "timer": asking(with_numbers, pause_s=0.9),
+}
+
+
+@pytest.mark.parametrize("rec", RIGHT.values(), ids=RIGHT)
+@pytest.mark.parametrize("check", [WAITS, REACTS, ABOVE, BELOW, STILL], ids=lambda c: type(c).__name__)
+def test_right_clients_meet_everything(check: Check, rec: Recording) -> None:
+    """Whatever the words, and whenever the answer comes."""
+    finding = check.judge(rec.trace())
+    assert finding.credit == 1, finding.reason
+
+
+def deciding(go: Callable[[float], bool], unknown: float | None = None) -> Callable[[Answer], Said]:
+    """A client by another rule, with the number that it takes for an answer that it cannot use."""
+
+    def write(answer: Answer) -> Said:
+        level = level_of(answer)
+        level = unknown if level is None else level
+        if level is None:
+            return chapter(answer)
+        said = [("INFO", f"Battery status: {answer[1]}")] if answer else [("ERROR", "Service call failed")]
+        return [*said, ("INFO", "Battery OK, starting mission") if go(level) else ("WARN", "Low, aborting")]
+
+    return write
+
+
+def low_is_info(answer: Answer) -> Said:
+    return [("INFO" if "Low" in text else level, text) for level, text in chapter(answer)]
+
+
+def says_nothing(answer: Answer) -> Said:
+    return []
+
+
+def always_warns(answer: Answer) -> Said:
+    return [*chapter(answer), ("WARN", "battery status was asked for")]
+
+
+def goes_on(kinds: Sequence[Answer]) -> Callable[[Answer], Said]:
+    def write(answer: Answer) -> Said:
+        return [*chapter(answer), ("INFO", "Battery OK, starting mission")] if answer in kinds else chapter(answer)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("write", "check", "said"),
+    [
+        (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20, expected that it warns"),
+        (deciding(lambda v: v > 10), BELOW, "no record of severity WARN after 20"),
+        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: Low, aborting after 20.1, expected that it goes on"),
+        (deciding(lambda v: v <= 20), REACTS, "WARN at t = 3.350 s: Low, aborting after 84.5"),
+        (deciding(lambda v: False), ABOVE, "after 84.5"),
+        (low_is_info, BELOW, "no record of severity WARN after 20"),
+        (says_nothing, ABOVE, "nothing is written after"),
+        (always_warns, ABOVE, "WARN at"),
+        (deciding(lambda v: v > 20, 60.0), STILL, "after a response without success (request 4)"),
+        (goes_on([FAILED]), STILL, "'Battery OK, starting mission' after a response without success (request 4)"),
+        (goes_on([UNREADABLE]), STILL, "after an answer without a number (request 5)"),
+        (goes_on([None]), STILL, "after a request that got no response (request 6)"),
+    ],
+)
+def test_wrong_decisions_are_named(write: Callable[[Answer], Said], check: Check, said: str) -> None:
+    """With the moment, the text and the number."""
+    header = "" if write is says_nothing else "--- Mission {} ---"
+    finding = check.judge(asking(write, header=header).trace())
+    assert finding.credit == 0
+    assert said in finding.reason
+
+
+def test_the_threshold_itself_is_not_above() -> None:
+    """The hint says so where only that is wrong."""
+    finding = BELOW.judge(asking(deciding(lambda v: v >= 20), (battery(84.5), battery(20.0), battery(15.0))).trace())
+    assert "compare with > and not with >=" in finding.hint
+    assert "warn(...)" in BELOW.judge(asking(low_is_info).trace()).hint
+
+
+def test_a_client_without_a_pause_between_the_words_is_compared_leniently() -> None:
+    """Where no number was low, what tells the answer or stands before the first one is no going on."""
+    answers = (battery(84.5), battery(63.0), FAILED, UNREADABLE)
+    for write in (chapter, with_numbers, silent_go):
+        for delay_s in (0.0, 0.1):
+            assert STILL.judge(asking(write, answers, delay_s=delay_s).trace()).credit == 1
+    assert STILL.judge(asking(goes_on([UNREADABLE]), answers).trace()).credit == 0
+
+
+def test_printing_is_half() -> None:
+    """Of the waiting and of the decisions; going on without an answer is wrong in print as well."""
+    rec = asking(as_print, header="", waiting=(("print", "waiting"),))
+    rec.items = [o for o in rec.items if getattr(o, "text", "") != "Mission Planner ready"]
+    for check in (WAITS, REACTS, ABOVE, BELOW):
+        finding = check.judge(rec.trace())
+        assert finding.credit == Fraction(1, 2), finding.reason
+        assert "self.get_logger().info" in finding.hint
+    assert STILL.judge(rec.trace()).credit == 1
+    warned = asking(lambda a: [("print" if level == "WARN" else level, text) for level, text in chapter(a)])
+    assert BELOW.judge(warned.trace()).credit == Fraction(1, 2)
+    assert ABOVE.judge(warned.trace()).credit == 1
+    wrong = asking(lambda a: [("print", text) for _, text in goes_on([FAILED])(a)])
+    assert STILL.judge(wrong.trace()).credit == 0
+
+
+def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:
+    """The client did not go on."""
+    answers = (battery(84.5), battery(15.0), UNREADABLE)
+    rec = asking(lambda a: [] if a == UNREADABLE else chapter(a), answers, header="")
+    crashed = STILL.judge(rec.crashed(5.55, "IndexError: list index out of range", 40).trace())
+    assert crashed.credit == 1
+    assert "costs nothing here" in crashed.reason
+    assert "IndexError" in crashed.reason
+
+
+def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
+    """The client ended, crashed, hangs at a lost response, or our server never sent such an answer."""
+    only_good = (battery(84.5), battery(63.0))
+    ended = asking(chapter, only_good).mark(6.0, "exited", FILE)
+    crashed = asking(chapter, only_good).crashed(6.0)
+    hangs = asking(chapter, (battery(84.5), None))
+    for check in (BELOW, REACTS, STILL):
+        assert check.judge(ended.trace()).blocked_by == "service_calls"
+        assert FAULT_KEY in check.judge(crashed.trace()).evidence
+        with pytest.raises(HarnessError):
+            check.judge(asking(chapter, only_good).trace())
+    assert BELOW.judge(hangs.trace()).blocked_by == "service_calls"
+    assert ABOVE.judge(ended.trace()).credit == 1
+
+
+def test_no_client_is_explained() -> None:
+    """By a crash, by another name, by nothing."""
+    for check in (CALLS, REACTS, STILL):
+        assert FAULT_KEY in check.judge(Recording(9, process=FILE).crashed(0.0, process=FILE).trace()).evidence
+        other = check.judge(Recording(9, process=FILE).service("client", "/get_status", TRIGGER).trace())
+        assert "asks /get_status" in other.reason
+        assert check.judge(Recording(9).trace()).credit == 0
+
+
+def five(**kw: Any) -> Recording:
+    return asking(chapter, [battery(84.5 - 0.5 * k) for k in range(5)], **kw)
+
+
+@pytest.mark.parametrize(
+    ("rec", "credit", "said"),
+    [
+        (five(), 1, "5 requests, 1.1 s apart"),
+        (five(delay_s=0.0), 1, "1 s apart"),
+        (five(delay_s=0.8), 1, "1.8 s apart"),
+        (five(pause_s=1.3), 1, ""),
+        (five(pause_s=1.31), 0, "1.410 s from number 1 to number 2, expected 1.0 s ± 0.3 s"),
+        (five(pause_s=0.7, delay_s=0.0), 1, ""),
+        (five(pause_s=0.69, delay_s=0.0), 0, "0.690 s from number 1"),
+        (five(pause_s=0.0, delay_s=0.0), 0, "0.000 s from number 1"),
+        (five(pause_s=3.0), 0, "3.100 s from number 1"),
+        (five(pause_s=1.5, clock=ClockKind.WALL), 1, ""),
+        (asking(chapter, [battery(84.5)] * 4).mark(7.0, "exited", FILE), 0, "4 requests, expected 5; battery"),
+        (asking(chapter, [battery(84.5)] * 6), 0, "6 requests, expected 5"),
+        (asking(chapter, [battery(84.5)] * 3).crashed(8.0), 0, "3 requests, expected 5; battery_service_client.py:12"),
+        (asking(chapter, [battery(84.5), None]), 0, "2 requests, expected 5; the last one got no response"),
+        (asking(chapter, [battery(84.5), None, *[battery(60.0)] * 3]), 1, "5 requests"),
+    ],
+)
+def test_number_and_gaps_of_the_requests(rec: Recording, credit: int, said: str) -> None:
+    """The time a response takes is not the client's; a gap after a lost one is free."""
+    finding = CALLS.judge(rec.trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+def test_more_requests_may_be_allowed_and_too_short_a_recording_is_ours() -> None:
+    """`at_most` lets a client ask again."""
+    six = asking(chapter, [battery(84.5)] * 6)
+    assert ServiceCalls(BATTERY, 5, at_most=6).judge(six.trace()).credit == 1
+    short = asking(chapter, [battery(84.5)] * 3)
+    short.stop_s = 6.0
+    with pytest.raises(HarnessError):
+        CALLS.judge(short.trace())
+
+
+def test_waiting_may_be_said_once_or_as_a_warning() -> None:
+    """Only not as an error, and not by nothing at all."""
+    for waiting, credit in (
+        ((("WARN", "no service yet"),), 1),
+        ((("ERROR", "no service yet"),), 0),
+        ((("FATAL", "no service yet"),), 0),
+        ((), 0),
+    ):
+        assert WAITS.judge(five(waiting=waiting).trace()).credit == credit
+    silent = WAITS.judge(five(waiting=()).trace())
+    assert "logs nothing while it waits" in silent.reason
+    assert "wait_for_service" in silent.hint
+
+
+def waiting_only(**kw: Any) -> Recording:
+    rec = Recording(20.0, process=FILE).service("client", BATTERY, TRIGGER, "/mission_planner")
+    return rec.log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
+
+
+def test_giving_up_is_not_waiting() -> None:
+    """By an exception, by ending, or by never asking although the server is there."""
+    raised = WAITS.judge(waiting_only().crashed(1.0, "SystemExit: 1").trace())
+    assert "while /battery/get_status was not there" in raised.reason
+    assert FAULT_KEY in raised.evidence
+    early = Recording(1.0, process=FILE).log(0.5, "waiting").crashed(1.0)
+    assert FAULT_KEY in WAITS.judge(early.trace()).evidence
+    ended = WAITS.judge(waiting_only().mark(2.0, "exited", FILE).trace())
+    assert "ended at t = 2.000 s" in ended.reason
+    never = WAITS.judge(waiting_only().trace())
+    assert "no request came, expected one within 5.0 s" in never.reason
+    late = WAITS.judge(waiting_only().request(9.0, BATTERY, 1, "student").trace())
+    assert "the first request came at t = 9.000 s" in late.reason
+    deaf = Recording(20.0, process=FILE).log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
+    assert WAITS.judge(deaf.trace()).blocked_by == "service_calls"
+
+
+def test_a_recording_without_a_wait_is_ours() -> None:
+    """The server was there from the start, or never came."""
+    for rec in (Recording(9, process=FILE), Recording(9, process=FILE).mark(0.0, "server_starts", BATTERY)):
+        with pytest.raises(HarnessError):
+            WAITS.judge(rec.trace())
