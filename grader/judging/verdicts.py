@@ -43,13 +43,15 @@ class Bench:
         answer = self.answers[criterion.id]
         if answer.missing:
             return self._missing(criterion, answer.missing)
+        needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
+        known = answer.finding is not None
+        # A question that could not be answered waits for what it needs, if that is known to be the student's to mend.
+        if needed is not None and (known or self._outcome(needed) is not Outcome.UNDECIDED):
+            return self._blocked(criterion, needed, self._outcome(needed))
         if answer.finding is None:
             evidence = {"error": answer.error} if answer.error else {}
             problem, hint = answer.problem, answer.hint
             return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
-        needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
-        if needed is not None:
-            return self._blocked(criterion, needed, self._outcome(needed))
         return self._found(criterion, answer.finding)
 
     def _found(self, criterion: Criterion, finding: Finding) -> Verdict:

@@ -157,6 +157,13 @@ def test_a_failed_recording_leaves_everything_undecided() -> None:
     assert "alone was not recorded" in report.verdicts[0].reason
 
 
+def test_what_cannot_be_asked_waits_for_the_criterion_that_it_needs() -> None:
+    """A server of the wrong type is never called: that is the student's to mend, and no fault of the machine."""
+    given = judged(criterion("a", Says(Fraction(0))), criterion("b", Raises(), "a"))
+    assert [v.outcome.value for v in given.values()] == ["not_met", "blocked"]
+    assert given["b"].reason == "not judged: needs a (not met)"
+
+
 def test_what_needs_an_undecided_criterion_is_undecided() -> None:
     """Nobody knows whether it could have been judged."""
     given = judged(criterion("a", Raises()), criterion("b", Says(), "a"), criterion("c", Says()))
