@@ -31,6 +31,11 @@ SHUTDOWN_S = 1.0
 _CONTEXT_OK = Context.ok
 
 
+TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
+#: The publisher of a state machine, which is none of rclpy's.
+_ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False}
+
+
 def type_name(interface: Any) -> str:
     """Return a message or service class as ROS writes it, e.g. `geometry_msgs/msg/Twist`."""
     package, kind = interface.__module__.split(".")[:2]
@@ -55,6 +60,8 @@ class Ledger:
         self.awaited: Counter[int] = Counter()
         self.contexts: list[weakref.ref[Any]] = []
         self._nodes: list[weakref.ref[Any]] = []
+        #: The topics on which the state machines of lifecycle nodes tell of transitions.
+        self.transitions: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
     def add(self, kind: str, endpoint: Any) -> None:
         """Remember a new endpoint."""
@@ -106,7 +113,13 @@ class Ledger:
             for endpoint in self.alive(kind)
             if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
         ]
-        claims += [{"kind": "node", "name": node.get_fully_qualified_name(), "type": ""} for node in self.nodes()]
+        nodes = [node.get_fully_qualified_name() for node in self.nodes()]
+        claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
+        claims += [
+            {**_ORDINARY, "kind": "publisher", "name": topic, "type": TRANSITION_EVENT}
+            for topic in self.transitions.values()
+            if topic.rpartition("/")[0] in nodes
+        ]
         return claims + [claim for node in self.nodes() for claim in _parameters(node)]
 
     def nodes(self) -> list[Any]:
@@ -195,11 +208,11 @@ class Ledger:
             for endpoint in self.alive(kind)
         }
 
-    def await_matches(self, expected: dict[str, dict[str, int]]) -> list[str]:
+    def await_matches(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
         """Wait, in real time, until endpoints have the counterparts the grader knows of; return those that have not.
 
         Args:
-            expected: Kind of endpoint -> name -> number of counterparts.
+            expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any.
         """
         deadline = originals.perf_counter() + MATCH_S
         missing = self._unmatched(expected)
@@ -215,12 +228,17 @@ class Ledger:
         while any(_matches("client", client) for client in clients) and originals.perf_counter() < deadline:
             originals.sleep(0.0005)
 
-    def _unmatched(self, expected: dict[str, dict[str, int]]) -> list[str]:
+    def _unmatched(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
         missing = []
         for kind, names in expected.items():
+            found: dict[str, list[int]] = {}
             for endpoint in self.alive(kind):
                 name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
-                if _matches(kind, endpoint) < names.get(name, 0):
+                if name in names:
+                    found.setdefault(name, []).append(_matches(kind, endpoint))
+            for name, matches in found.items():
+                wanted = sorted(names[name], reverse=True)
+                if any(has < want for has, want in zip(sorted(matches, reverse=True), wanted, strict=False)):
                     missing.append(f"{kind} {name}")
         return missing
 

@@ -262,8 +262,38 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     rclpy.publisher.Publisher.publish = counted_publish
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
+    _install_transitions(ledger, counted)
     for name in ("_take_subscription", "_take_client", "_take_service"):
         setattr(rclpy.executors.Executor, name, _counting_take(name, ledger, clock))
+
+
+def _install_transitions(ledger: Ledger, counted: Callable[[str, Callable[[], Any]], Any]) -> None:
+    """Count what the state machines of lifecycle nodes publish, which they do below rclpy."""
+    machines = _rclpy.LifecycleStateMachine
+    make = machines.__init__
+
+    def made(self: Any, node: Any, telling: bool) -> None:
+        make(self, node, telling)
+        if telling:
+            ledger.transitions[self] = f"{self.service_change_state.name.rpartition('/')[0]}/transition_event"
+            ledger.changed = True
+
+    machines.__init__ = made
+    for name in ("trigger_transition_by_id", "trigger_transition_by_label"):
+        _count_transitions(machines, name, ledger, counted)
+
+
+def _count_transitions(
+    machines: Any, name: str, ledger: Ledger, counted: Callable[[str, Callable[[], Any]], Any]
+) -> None:
+    trigger = getattr(machines, name)
+
+    def triggered(self: Any, transition: Any, telling: bool) -> Any:
+        if not telling or self not in ledger.transitions:
+            return trigger(self, transition, telling)
+        return counted(f"topic {ledger.transitions[self]}", lambda: trigger(self, transition, telling))
+
+    setattr(machines, name, triggered)
 
 
 def _counting_take(name: str, ledger: Ledger, clock: VirtualClock) -> Callable[..., Any]:

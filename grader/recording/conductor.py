@@ -388,12 +388,11 @@ class Conductor:
 
     def _tell_matches(self, student: Student, claims: list[dict[str, Any]]) -> None:
         """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
-        expected: dict[str, dict[str, int]] = {}
+        expected: dict[str, dict[str, list[int]]] = {}
         for claim in student.claims:
             count = self._counterparts(claim, claims)
             if count:
-                names = expected.setdefault(claim["kind"], {})
-                names[claim["name"]] = min(names.get(claim["name"], count), count)
+                expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
         gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
         if expected == student.told or not (expected or gone):
             return

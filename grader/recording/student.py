@@ -75,7 +75,7 @@ class Student:
     wake_ns: int | None = None
     claims: list[dict[str, Any]] = field(default_factory=list)
     arrivals: dict[str, int] = field(default_factory=dict)
-    told: dict[str, dict[str, int]] = field(default_factory=dict)
+    told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False
     ended: bool = False

@@ -10,6 +10,7 @@ from __future__ import annotations
 import bisect
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from grader.model.quantities import NS_PER_MS
@@ -31,6 +32,8 @@ LOOK_S = 0.001
 HELD_UP_NS = 150 * NS_PER_MS
 #: How long a publisher stays after its last message, which it would take with it otherwise.
 LINGER_NS = 400 * NS_PER_MS
+#: How long before its first message a publisher appears: a subscription has to find it.
+LEAD_NS = 300 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 
 
@@ -48,7 +51,8 @@ class WallConductor:
         self._students = students
         self._observer = observer
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
-        self._due = schedule(plan)
+        early = (replace(d, t_ns=max(0, d.t_ns - LEAD_NS)) if d.action == "offer" else d for d in schedule(plan))
+        self._due = sorted(early, key=lambda d: d.t_ns)
         self._streams: dict[str, str] = {}
         self._leaving: list[tuple[int, str]] = []
         self._tape = Tape(plan.limits)

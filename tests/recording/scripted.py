@@ -97,7 +97,7 @@ class ScriptedStudent:
         self.wake_ns: int | None = None
         self.claims: list[dict[str, Any]] = []
         self.arrivals: dict[str, int] = {}
-        self.told: dict[str, dict[str, int]] = {}
+        self.told: dict[str, dict[str, list[int]]] = {}
         self.offers: set[tuple[str, str, str]] = set()
         self.nudged = False
         self.ended = False
