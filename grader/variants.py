@@ -72,7 +72,7 @@ def read_key(path: Path) -> bytes:
         raise VariantError(f"{where}: expected a file with the course key: {error.strerror}") from None
     if not LEAST_BYTES <= len(key) <= MOST_BYTES:
         found = f"more than {MOST_BYTES}" if len(key) > MOST_BYTES else str(len(key))
-        hint = f"head -c 32 /dev/urandom | base64 > {where} makes one"
+        hint = "make one: head -c 32 /dev/urandom | base64 > course.key"
         raise VariantError(f"{where}: expected a key of {LEAST_BYTES} to {MOST_BYTES} bytes, found {found}", hint)
     return key
 

@@ -11,6 +11,7 @@ from grader.model.errors import RubricError
 from grader.model.exercise import Exercise
 from grader.reading.quoting import shown
 from grader.reading.rubric_file import RubricMistakes, read_rubric
+from grader.reading.variants import First
 from grader.reading.yaml_tree import read_yaml
 
 
@@ -33,7 +34,7 @@ def check_rubric(path: Path) -> Checked:
     Raises:
         RubricError: It cannot be used; its message lists every mistake.
     """
-    exercise = read_rubric(path)
+    exercise = read_rubric(path, draw=First())
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))

@@ -30,10 +30,12 @@ from grader.batch.running import ClassRun
 from grader.batch.store import Store, open_store
 from grader.batch.summary import Graded, summary_json
 from grader.batch.tasks import MakeScheduler
+from grader.batch.variants import own_conditions, refuse_without_key, with_known_students
 from grader.batch.watching import Watcher
 from grader.batch.worker import GRADESCOPE, HANDED_BACK, REPORT
 from grader.model.errors import GraderError, HarnessError, SubmissionError
 from grader.model.exercise import Exercise
+from grader.reading.variants import First
 from grader.recording.leftovers import scratch_folder
 from grader.reproducing import recording_digest
 from grader.session import Request, read_exercises, read_recording
@@ -56,20 +58,23 @@ def grade_class(
     Raises:
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
-    exercises = read_exercises(course.grading, course.sources)
+    exercises = read_exercises(replace(course.grading, draw=First()), course.sources)
+    refuse_without_key(course, exercises)
     conditions = conditions_of(course.grading, exercises)
     roster = None if course.roster is None else read_roster(course.roster)
     adjustments = Adjustments() if course.adjustments is None else read_adjustments(course.adjustments)
     with open_store(course.results) as store:
         intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
         matching = match(intake.entries, roster)
+        intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
+        own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
         with scratch_folder() as scratch:
-            keys = {entry.name: _key(entry, conditions, scratch) for entry in intake.entries}
+            keys = {entry.name: _key(entry, own[entry.name], scratch) for entry in intake.entries}
         due = due_now(store, intake.entries, keys, course.rerun)
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before)
-        run = ClassRun(course, exercises, conditions, store, watcher)
+        run = ClassRun(course, exercises, own, store, watcher)
         book = partial(_book, store, intake, matching, adjustments, keys)
         began = time.monotonic()
         try:

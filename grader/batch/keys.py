@@ -7,6 +7,7 @@ import json
 from dataclasses import asdict, dataclass
 
 from grader.model.errors import GraderError
+from grader.model.variant import Drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,7 @@ class Conditions:
         clock: The clock that was asked for.
         isolation: The sandbox that was asked for.
         every: Whether only exercises count of which a submission has a file.
+        variants: The values that are this student's own; None if nothing varies.
     """
 
     grader: str
@@ -30,6 +32,7 @@ class Conditions:
     clock: str
     isolation: str
     every: bool = False
+    variants: Drawn | None = None
 
     def key(self, submission: str) -> str:
         """Return the key of the result of a submission, by its digest."""

@@ -12,6 +12,7 @@ import msgspec
 
 from grader.batch.keys import Conditions
 from grader.model.errors import HarnessError
+from grader.model.variant import Drawn
 from grader.reading.collected import Collected
 from grader.reading.member_names import objection
 from grader.reports.destination import write_whole
@@ -59,12 +60,14 @@ class Errand:
         label: What the source calls it.
         path: What reports call it: a path from where the class is graded.
         collected: What was handed in; see `pack_collected`.
+        variants: The values that are this student's own; None if nothing varies.
     """
 
     name: str
     label: bytes
     path: bytes
     collected: bytes
+    variants: Drawn | None = None
 
 
 @dataclass(frozen=True, slots=True)

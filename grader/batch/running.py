@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,14 +43,14 @@ class ClassRun:
     Attributes:
         course: What was asked for.
         exercises: What is graded.
-        conditions: What results depend on.
+        conditions: Name of a submission -> what its result depends on.
         store: Where they go.
         watcher: Hears how it gets on.
     """
 
     course: Course
     exercises: Sequence[Exercise]
-    conditions: Conditions
+    conditions: Mapping[str, Conditions]
     store: Store
     watcher: Watcher
 
@@ -119,7 +119,8 @@ class ClassRun:
             exercises=grading.exercises,
             rubrics=grading.rubrics,
             odom_bag=grading.odom_bag,
-            conditions=self.conditions,
+            conditions=self.conditions[entry.name],
+            variant_key=grading.variant_key,
             workers=workers,
             standalone=self.course.standalone,
             deadline_s=deadline_s(self.exercises),
@@ -127,7 +128,7 @@ class ClassRun:
 
     def _refused(self, entry: Entry) -> Standing:
         digest = unusable_digest(SubmissionError(entry.problem))
-        return Standing(State.REFUSED, self.conditions.key(digest), digest, entry.label, entry.problem)
+        return Standing(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
 
     def _stop_if_full(self, standing: Standing) -> None:
         """Raise HarnessError if an attempt failed because a disk is full: the others would fail too."""

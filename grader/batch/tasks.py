@@ -28,6 +28,7 @@ class Task:
         standalone: Whether the HTML report holds its scripts, instead of sharing them with the class.
         deadline_s: Real time after which the attempt is given up.
         collected: File of what was read of the submission on another machine; None to read it now.
+        variant_key: File with the course key, for the line that repeats the run; nothing is read from it.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Task:
     standalone: bool
     deadline_s: float
     collected: Path | None = None
+    variant_key: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from grader.batch.tasks import Task
 from grader.keeping import Keeper
 from grader.model.errors import GraderError, SubmissionError
 from grader.model.report import Report
+from grader.reading.variants import Recorded
 from grader.reports.audience import for_student
 from grader.reports.destination import write_whole
 from grader.reports.gradescope import render_gradescope
@@ -70,7 +71,7 @@ def attempt(task: Task, progress: Progress) -> Standing:
 
 
 def _graded(task: Task, progress: Progress) -> Standing:
-    conditions = task.conditions
+    conditions, own = task.conditions, task.conditions.variants
     request = Request(
         submission=str(task.submission),
         exercises=task.exercises,
@@ -82,6 +83,9 @@ def _graded(task: Task, progress: Progress) -> Standing:
         isolation=conditions.isolation,
         workers=task.workers,
         collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
+        student=own.student if own is not None else "",
+        variant_key=task.variant_key if own is not None else None,
+        draw=Recorded(own) if own is not None else None,
     )
     task.into.mkdir()
     keeper = Keeper([task.into / EVIDENCE], request)

@@ -39,6 +39,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
+@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
@@ -64,6 +65,7 @@ def command(  # noqa: PLR0913  one parameter an option
     odom_bag: Path | None,
     clock: str,
     isolation: str,
+    variant_key: Path | None,
     standalone: bool,
     canvas: str | None,
     canvas_gradebook: Path | None,
@@ -106,6 +108,7 @@ def command(  # noqa: PLR0913  one parameter an option
             odom_bag=odom_bag,
             clock=clock,
             isolation=isolation,
+            variant_key=variant_key,
         ),
         jobs=jobs,
         rerun=rerun,

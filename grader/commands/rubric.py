@@ -6,9 +6,12 @@ from pathlib import Path
 
 import click
 
-from grader.model.errors import RubricError
+from grader.model.containment import TIERS
+from grader.model.errors import GraderError, RubricError
 from grader.options import ALL_MET, PATH, UNUSABLE
+from grader.progress import shown_progress
 from grader.reports.delivery import show
+from grader.reports.destination import write_whole
 from grader.reports.escape import shown
 
 
@@ -57,6 +60,21 @@ def _schema(*, rubric: Path | None) -> int:
     return ALL_MET
 
 
+@command.command(name="variant")
+@click.argument("rubric", metavar="FILE", type=PATH)
+@click.option("--key-file", "key", type=PATH, metavar="KEY", required=True, help="The course key.")
+@click.option("--student", metavar="ID", required=True, help="Whose values; the same id as on the roster.")
+@click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
+def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
+    """Print the values that a rubric has for one student, for the task sheet."""
+    from grader.reports.task_sheet import render_sheet, sheet_to_json  # noqa: PLC0415  as above
+    from grader.variants import sheet  # noqa: PLC0415
+
+    exercise = sheet(rubric, key, student)
+    show(lambda _: sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise), for_people=False)
+    return ALL_MET
+
+
 @command.command(name="explain")
 @click.argument("files", metavar="[FILE]...", nargs=-1, type=PATH)
 @click.option("--checks", "checks", is_flag=True, help="List the checks that rubrics can use, one line each.")
@@ -80,4 +98,39 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
         show(lambda layout: list_checks(found, width=layout.width), for_people=True)
     else:
         show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+    return ALL_MET
+
+
+@command.command(name="new")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
+@click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
+@click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
+def _new(  # noqa: PLR0913  one parameter an option
+    *, files: tuple[Path, ...], output: Path | None, id_: str, duration: float, clock: str, isolation: str
+) -> int:
+    """Run the FILEs of a reference solution, and write a rubric that asks for what they do.
+
+    It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
+    """
+    from grader.authoring.starting import new_rubric  # noqa: PLC0415  as above
+    from grader.observing import ObserveRequest  # noqa: PLC0415
+
+    if output is not None and output.exists():
+        raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
+    with shown_progress(wanted=True) as progress:
+        skeleton = new_rubric(ObserveRequest(files, round(duration * 1e9), None, clock, isolation), id_, progress)
+    if output is None:
+        show(lambda _: skeleton.text, for_people=False)
+    else:
+        try:
+            write_whole(output, skeleton.text.encode())
+        except OSError as error:
+            raise GraderError(f"{output}: it cannot be written: {error.strerror or error}") from error
+        rows = "criterion" if skeleton.criteria == 1 else "criteria"
+        click.echo(
+            f"{shown(str(output))}: {skeleton.criteria} {rows}, all of them met; {skeleton.left_out} in comments"
+        )
     return ALL_MET

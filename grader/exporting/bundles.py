@@ -9,6 +9,7 @@ from pathlib import Path
 from grader.exporting.parts import integration, pins, wheel, zipped
 from grader.model.errors import GraderError, RubricError
 from grader.reading.rubric_file import builtin_rubrics, own_check_files, read_rubric
+from grader.reading.variants import First
 
 #: Files that are run; the others are read.
 _PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
@@ -96,7 +97,13 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
 
 def _check(chosen: Chosen) -> None:
     """Find mistakes now that would otherwise be found by the first student."""
-    known = [read_rubric(path).id for path in chosen.rubrics or tuple(builtin_rubrics().values())]
+    paths = chosen.rubrics or tuple(builtin_rubrics().values())
+    exercises = [read_rubric(path, draw=First()) for path in paths]
+    for path, found in zip(paths, exercises, strict=True):
+        if found.variant is not None:
+            text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
+            raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
+    known = [exercise.id for exercise in exercises]
     for exercise in chosen.exercises:
         if exercise not in known:
             raise RubricError(f"--exercise {exercise}: expected one of {', '.join(known)}, found {exercise}")

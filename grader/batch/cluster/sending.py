@@ -27,6 +27,7 @@ from grader.batch.worker import PARTS
 from grader.model.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.reading.rubric_file import own_check_files
 from grader.reading.submission import collect_submission
+from grader.reading.variants import First
 from grader.session import Request, read_exercises, wanted_files
 
 AGAIN = "run the same command again"
@@ -56,7 +57,7 @@ def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
 
 def files_wanted(task: Task) -> Sequence[str]:
     """Return the names of the files that a class is asked for, of which this is one submission."""
-    asked = Request("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics)
+    asked = Request("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
     return wanted_files(read_exercises(asked))
 
 
@@ -76,7 +77,13 @@ def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
         return Attempt(task, Standing(State.REFUSED, key, digest, task.label, error.message, error.hint))
     except (OSError, MemoryError, RecursionError) as error:
         return failed(task, f"the submission cannot be read: {type(error).__name__}")
-    return Errand(task.name, os.fsencode(task.label), travelling_name(task.submission), pack_collected(collected))
+    return Errand(
+        task.name,
+        os.fsencode(task.label),
+        travelling_name(task.submission),
+        pack_collected(collected),
+        task.conditions.variants,
+    )
 
 
 def taken_in(task: Task, answer: Answer) -> Attempt:
