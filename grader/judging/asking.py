@@ -16,7 +16,7 @@ from grader.model.errors import HarnessError
 from grader.model.exercise import Criterion, Exercise, Finding
 from grader.model.scenario import Scenario
 from grader.model.submission import Submission
-from grader.model.trace import Fault, FaultKind, Trace
+from grader.model.trace import Fault, FaultKind, Request, Response, Trace
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +104,15 @@ def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
     faults = [fault for process in scenario.processes if (fault := first_fault(trace, process)) is not None]
     if not faults:
         return None
-    started = len({e.participant for e in student_endpoints(trace)}) or int(bool(trace.messages()))
-    few = started < len(scenario.processes)
+    few = _started(trace) < len(scenario.processes)
     return next((fault for fault in faults if few or fault.kind is FaultKind.SYNTAX_ERROR), None)
+
+
+def _started(trace: Trace) -> int:
+    """Return how many processes came so far that they had a part in the ROS graph, or said something over it."""
+    endpoints = student_endpoints(trace)
+    ends = (*trace.service_ends("service"), *trace.service_ends("client"))
+    only_services = {e.node for e in ends} - {e.node for e in endpoints}
+    known = len({e.participant for e in endpoints}) + len(only_services)
+    talked = bool(trace.messages()) or any(r.sender == "student" for r in (*trace.of(Request), *trace.of(Response)))
+    return known or int(talked)

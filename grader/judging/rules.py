@@ -26,6 +26,7 @@ class FieldRule:
 
     Attributes:
         equals: The text, number or truth value expected.
+        items: The elements of a list expected, in order.
         tolerance: Largest difference from a number expected.
         low: Smallest number allowed.
         high: Largest number allowed.
@@ -34,6 +35,7 @@ class FieldRule:
     """
 
     equals: str | float | bool | None = None
+    items: tuple[str | float | bool, ...] | None = None
     tolerance: float = 1e-6
     low: float | None = None
     high: float | None = None
@@ -42,17 +44,23 @@ class FieldRule:
 
     def allows(self, value: object) -> bool:
         """Return whether a field may hold a value; NaN is in no range and equals nothing."""
-        return self._equal(value) and self._in_range(value) and self._of_form(value)
+        equal = self.equals is None or self._equal(value, self.equals)
+        return equal and self._listed(value) and self._in_range(value) and self._of_form(value)
 
-    def _equal(self, value: object) -> bool:
-        if self.equals is None:
-            return True
-        if isinstance(value, bool) and isinstance(self.equals, str):
-            return _YES_OR_NO.get(self.equals.lower()) is value  # for YAML, yes is a text
-        if isinstance(self.equals, (bool, str)):
-            return type(value) is type(self.equals) and value == self.equals
+    def _equal(self, value: object, wanted: str | float | bool) -> bool:  # noqa: FBT001 - the value of a field
+        if isinstance(value, bool) and isinstance(wanted, str):
+            return _YES_OR_NO.get(wanted.lower()) is value  # for YAML, yes is a text
+        if isinstance(wanted, (bool, str)):
+            return type(value) is type(wanted) and value == wanted
         got = as_number(value)
-        return got is not None and within(got, self.equals, self.tolerance)
+        return got is not None and within(got, wanted, self.tolerance)
+
+    def _listed(self, value: object) -> bool:
+        if self.items is None:
+            return True
+        if not isinstance(value, (list, tuple)) or len(value) != len(self.items):
+            return False
+        return all(self._equal(got, wanted) for got, wanted in zip(value, self.items, strict=True))
 
     def _in_range(self, value: object) -> bool:
         if self.low is None and self.high is None:
@@ -75,6 +83,8 @@ class FieldRule:
         parts = []
         if self.equals is not None:
             parts.append(_shown(self.equals))
+        if self.items is not None:
+            parts.append(_shown(self.items))
         if self.low is not None and self.high is not None:
             parts.append(f"{number(self.low)} to {number(self.high)}")
         elif self.low is not None:
@@ -90,14 +100,14 @@ class FieldRule:
 Rule = str | float | bool | FieldRule
 
 
-def as_rule(rule: Rule) -> FieldRule:
+def as_rule(rule: Rule, tolerance: float = 1e-6) -> FieldRule:
     """Return a rule for what may stand short for one."""
-    return rule if isinstance(rule, FieldRule) else FieldRule(equals=rule)
+    return rule if isinstance(rule, FieldRule) else FieldRule(equals=rule, tolerance=tolerance)
 
 
-def broken_rules(value: Mapping[str, Any], rules: Mapping[str, Rule]) -> list[str]:
-    """Return the paths whose rules a value breaks, in the order of the rules."""
-    return [path for path, rule in rules.items() if not _keeps(value, path, as_rule(rule))]
+def broken_rules(value: Mapping[str, Any], rules: Mapping[str, Rule], tolerance: float = 1e-6) -> list[str]:
+    """Return the paths whose rules a value breaks, in the order of the rules; the tolerance is that of short ones."""
+    return [path for path, rule in rules.items() if not _keeps(value, path, as_rule(rule, tolerance))]
 
 
 def _keeps(value: Mapping[str, Any], path: str, rule: FieldRule) -> bool:
@@ -121,6 +131,8 @@ def _shown(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return f"{quote(value, 80)!r}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_shown, value[:20]))}{', ...' if len(value) > 20 else ''}]"
     got = as_number(value)
     return number(got) if got is not None else quote(str(value), 80)
 

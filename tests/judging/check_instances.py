@@ -5,6 +5,7 @@ from __future__ import annotations
 from tracing import ODOMETRY, TRIGGER, TWIST
 
 from grader.judging.checks import CHECKS
+from grader.judging.checks.reactions import ReactionCase
 from grader.judging.rules import FieldRule
 from grader.model.exercise import Check
 from grader.model.quantities import NS_PER_S
@@ -36,4 +37,7 @@ INSTANCES: dict[str, Check] = {
     "waits_for_service": CHECKS["waits_for_service"]("battery_service_client.py", "/battery/get_status"),
     "reacts_to_responses": CHECKS["reacts_to_responses"]("battery_service_client.py", "/battery/get_status", 20.0),
     "no_go_without_answer": CHECKS["no_go_without_answer"]("battery_service_client.py", "/battery/get_status", 20.0),
+    "reaction": CHECKS["reaction"](
+        "/temperature", "/fan_speed", (ReactionCase({"data": FieldRule(low=0)}, {"data": 100}),)
+    ),
 }

@@ -10,6 +10,7 @@ from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.reactions import Reaction
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.service_sequence import ServiceSequence
 from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
@@ -42,6 +43,7 @@ CHECKS: dict[str, type] = {
     "waits_for_service": WaitsForService,
     "reacts_to_responses": ReactsToResponses,
     "no_go_without_answer": NoGoWithoutAnswer,
+    "reaction": Reaction,
 }
 
 __all__ = ["CHECKS"]

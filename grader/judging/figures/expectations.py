@@ -29,9 +29,12 @@ from grader.model.quantities import seconds
 
 
 def expectation(check: Check) -> str:
-    """Return what a check expects, without a full stop; empty for a check that has no phrase yet."""
+    """Return what a check expects, without a full stop: the table's phrase, or the check's own; empty without one."""
     phrase = _PHRASES.get(type(check))
-    return phrase(check) if phrase else ""
+    if phrase is not None:
+        return phrase(check)
+    own = getattr(check, "expected", "")
+    return own if isinstance(own, str) else ""
 
 
 def _publishes(check: Publishes) -> str:
