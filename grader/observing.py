@@ -12,6 +12,8 @@ from grader.model.quantities import NS_PER_S
 from grader.model.scenario import OdometryStream, Scenario, Span
 from grader.model.submission import Submission
 from grader.model.summary import Summary
+from grader.model.trace import Trace
+from grader.reading.shipped import builtin_odometry
 from grader.reading.submission import stage_submission
 from grader.recording.bag import read_odometry
 from grader.recording.plan import plan_scenario, seed_of
@@ -42,24 +44,60 @@ class ObserveRequest:
     isolation: str = "auto"
 
 
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What nodes did.
+
+    Attributes:
+        trace: All of it.
+        processes: Names of their files.
+        isolation: The sandbox tier.
+    """
+
+    trace: Trace
+    processes: tuple[str, ...]
+    isolation: str
+
+
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
     """Run the files together and return what they did.
 
     Raises:
         GraderError: Something that the run needs cannot be used.
     """
+    watched = watch(request, progress)
+    return summarise(watched.trace, watched.processes, watched.isolation)
+
+
+def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
+    """Run the files together and return the trace.
+
+    Args:
+        request: What is to be run, and how.
+        progress: Hears which step begins.
+        scenario: What happens to them; None for nothing but the recording that is named, for the time that is.
+
+    Raises:
+        GraderError: Something that the run needs cannot be used.
+    """
     names = _names(request.files)
-    odometry = None if request.odom_bag is None else read_odometry(request.odom_bag)
+    if scenario is None:
+        scenario = _undisturbed(request, names)
+    plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
+    odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
     with open_studio(request.isolation) as studio:
         submission = _stage(request.files, names, studio.folder)
-        stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
-        scenario = Scenario("observed", tuple(names), Span(request.duration_ns), () if odometry is None else (stream,))
         seed, clock = seed_of(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
-        trace = studio.record({"observed": Job("observing", plan)}, request.clock, progress)["observed"]
+        trace = studio.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
-    return summarise(trace, names, studio.isolation.name)
+    return Watched(trace, tuple(names), studio.isolation.name)
+
+
+def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:
+    stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
+    return Scenario("observed", tuple(names), Span(request.duration_ns), (stream,) if request.odom_bag else ())
 
 
 def _names(files: tuple[Path, ...]) -> list[str]:

@@ -1,0 +1,208 @@
+"""What can be asked of nodes that do what the reference does: one row for each thing that was seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.authoring.drafts import DraftCriterion, Quantity, as_id
+from grader.judging.silence import student_endpoints
+from grader.judging.summary import summarise
+from grader.judging.values import carries_number, leaves
+from grader.judging.wording import counted, number
+from grader.model.quantities import seconds
+from grader.model.summary import TopicSummary
+from grader.model.trace import Offer, Trace
+
+#: Fewer messages tell no rate, and more spread of the intervals than this share of them is no rate.
+_FEWEST, _STEADY = 5, 0.2
+#: Tolerance of a rate, and the one for half of the points, as shares of it.
+_TOLERANCE, _PARTLY = 0.05, 0.1
+#: Most constant fields that a row names.
+_MOST_FIELDS = 8
+#: Times of a message are of the run.
+_OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A reference as it was seen.
+
+    Attributes:
+        alone: The nodes by themselves.
+        driven: The nodes with the stimuli of the draft; the same as `alone` if there are none.
+        files: Their files.
+        window_s: Longest time from its first message on for which every topic was watched.
+    """
+
+    alone: Trace
+    driven: Trace
+    files: tuple[str, ...]
+    window_s: float
+
+
+def questions(seen: Seen) -> tuple[DraftCriterion, ...]:
+    """Return the rows for all that was seen, whether the checks they name exist or not."""
+    topics = summarise(seen.driven, seen.files, "").topics
+    own = {end.topic for end in student_endpoints(seen.driven)}
+    rows: list[DraftCriterion] = []
+    for topic in (t for t in topics if t.name in own):
+        rows += [*_published(topic, seen), *_subscribed(topic)]
+    rows += [*_services(seen), *_parameters(seen), *_logs(seen)]
+    return tuple(rows)
+
+
+def _published(topic: TopicSummary, seen: Seen) -> Iterator[DraftCriterion]:
+    if not topic.messages:
+        return
+    name, messages = as_id(topic.name), seen.driven.messages(topic.name)
+    first = f"publishes_{name}"
+    asked = {"topic": topic.name, "type": messages[0].type}
+    hint = f"create a publisher for {messages[0].type} on {topic.name}, and publish on it"
+    yield DraftCriterion(first, f"Publishes on {topic.name}", "publishes", asked, hint)
+    if seen.alone.messages(topic.name):
+        yield from _rate(topic, seen, first)
+    else:
+        yield _reaction(topic, seen, first)
+    yield from _fields(topic, seen, first)
+
+
+def _rate(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterion]:
+    pace = topic.pace
+    if pace is None or topic.messages < _FEWEST or pace.std_dev_s * pace.rate_hz > _STEADY:
+        return
+    rate = float(f"{pace.rate_hz:.3g}")
+    asked = {
+        "topic": topic.name,
+        "rate": _hertz(rate),
+        "tolerance": _hertz(rate * _TOLERANCE),
+        "partly_tolerance": _hertz(rate * _PARTLY),
+        "window": Quantity(f"{seen.window_s:g} s"),
+    }
+    comment = f"seen: {pace.rate_hz:.3f} Hz; decide: how far off may it be, for all and for half of the points?"
+    hint = "a timer takes its period in seconds, which is 1 divided by the rate"
+    title = f"Publishes {topic.name} at {number(rate)} Hz"
+    yield DraftCriterion(f"{as_id(topic.name)}_rate", title, "topic_rate", asked, hint, needs, comment)
+
+
+def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
+    """Return a row for a topic on which there is something only when something comes in."""
+    inputs = sorted({d for d in (o.topic for o in student_endpoints(seen.driven, "subscription")) if d != topic.name})
+    asked = {"input": inputs[0] if inputs else topic.name, "output": topic.name}
+    comment = "seen: nothing is published until something comes in; decide: how soon, and what?"
+    hint = f"publish on {topic.name} in the callback of the subscription"
+    title = f"Answers on {topic.name}"
+    return DraftCriterion(f"{as_id(topic.name)}_reaction", title, "reaction", asked, hint, needs, comment)
+
+
+def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterion]:
+    rows = [leaves(message.value) for message in seen.driven.messages(topic.name)]
+    constant, varying = _sorted_out(rows)
+    name = as_id(topic.name)
+    if constant:
+        asked = {"topic": topic.name, "values": dict(list(constant.items())[:_MOST_FIELDS])}
+        comment = f"seen: the same in all of {len(rows)} messages; decide: which of them does the task ask for?"
+        hint = f"the fields of every message on {topic.name} hold the same numbers"
+        yield DraftCriterion(
+            f"{name}_values", f"Right values on {topic.name}", "field_values", asked, hint, needs, comment
+        )
+    for path, (low, high) in list(varying.items())[:_MOST_FIELDS]:
+        yield from _varying(topic, path, low, high, needs)
+
+
+def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str) -> Iterator[DraftCriterion]:
+    """Yield rows for a field that varies: drawn numbers first, then any in a range; those that fit are kept."""
+    name = f"{as_id(topic.name)}_{as_id(path)}"
+    comment = f"seen: {number(low)} to {number(high)}; decide: which range does the task ask for?"
+    hint = f"{path} stays in its range"
+    bounds = _round_range(low, high)
+    if path in ("data", "temperature") and carries_number(topic.types[0]):
+        title = f"Random numbers on {topic.name}"
+        asked = {"topic": topic.name, **bounds}
+        yield DraftCriterion(f"{name}_random", title, "random_in_range", asked, hint, needs, comment)
+    title, asked = f"{path} of {topic.name} is in range", {"topic": topic.name, "field": path, **bounds}
+    yield DraftCriterion(f"{name}_range", title, "field_range", asked, hint, needs, comment)
+
+
+def _sorted_out(rows: Sequence[Mapping[str, float]]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Return the fields that never change with their value, and those that do with least and greatest value."""
+    constant: dict[str, float] = {}
+    varying: dict[str, tuple[float, float]] = {}
+    for path in rows[0] if rows else ():
+        values = [row[path] for row in rows if path in row]
+        if path.endswith(_OF_THE_RUN) or any(v != v for v in values):  # noqa: PLR0124  NaN
+            continue
+        if min(values) == max(values):
+            constant[path] = values[0]
+        else:
+            varying[path] = (min(values), max(values))
+    return constant, varying
+
+
+def _subscribed(topic: TopicSummary) -> Iterator[DraftCriterion]:
+    own = [end for end in topic.subscriptions if end.participant >= 0]
+    if own:
+        asked = {"topic": topic.name, "type": own[0].type}
+        hint = f"create a subscription for {own[0].type} on {topic.name} with an ordinary queue depth such as 10"
+        yield DraftCriterion(
+            f"subscribes_{as_id(topic.name)}", f"Subscribes to {topic.name}", "subscribes", asked, hint
+        )
+
+
+def _services(seen: Seen) -> Iterator[DraftCriterion]:
+    for service, type_ in dict.fromkeys((e.service, e.type) for e in seen.driven.service_ends("service")):
+        name = as_id(service)
+        first = f"offers_{name}"
+        asked = {"service": service, "type": type_}
+        hint = f"create a service of the type {type_} with the name {service}"
+        yield DraftCriterion(first, f"Offers {service}", "service_available", asked, hint)
+        comment = "decide: how long may an answer take?"
+        within = {"service": service, "within": Quantity("1 s")}
+        hint = f"the callback of {service} returns the response"
+        title = f"Answers on {service}"
+        yield DraftCriterion(f"{name}_answers", title, "service_answers_all", within, hint, first, comment)
+    for service in dict.fromkeys(e.service for e in seen.driven.service_ends("client")):
+        calls = len(seen.driven.requests(service, "student"))
+        if calls:
+            wanted: dict[str, Any] = {"service": service, "calls": calls}
+            comment = f"seen: {counted(calls, 'call')}; decide: how many, and how long between two of them?"
+            hint = f"call {service} once it is there"
+            yield DraftCriterion(
+                f"calls_{as_id(service)}", f"Calls {service}", "service_calls", wanted, hint, "", comment
+            )
+
+
+def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
+    for offer in seen.driven.of(Offer):
+        if offer.kind != "parameter":
+            continue
+        node, _, parameter = offer.name.partition(":")
+        if parameter == "use_sim_time" or parameter.startswith(("qos_overrides", "start_type_description")):
+            continue
+        asked = {"node": node, "name": parameter}
+        comment = f"seen: {offer.detail}; decide: is its default asked for?"
+        hint = f"declare the parameter {parameter}"
+        title = f"Has the parameter {parameter}"
+        yield DraftCriterion(f"parameter_{as_id(parameter)}", title, "parameter_declared", asked, hint, "", comment)
+
+
+def _logs(seen: Seen) -> Iterator[DraftCriterion]:
+    for file in seen.files:
+        records = seen.driven.records(file)
+        if records:
+            comment = f"seen: {len(records)} in {seconds(seen.driven.stop_ns):g} s; decide: which, and how often?"
+            hint = 'write through the node\'s logger, for example self.get_logger().info("...")'
+            first = f"{as_id(file.removesuffix('.py'))}_logs"
+            yield DraftCriterion(first, f"{file} logs", "uses_logger", {"process": file}, hint, "", comment)
+
+
+def _hertz(rate: float) -> Quantity:
+    return Quantity(f"{float(f'{rate:.3g}'):g} Hz")
+
+
+def _round_range(low: float, high: float) -> dict[str, float]:
+    """Return bounds around what was seen, as round as its width is large: 20 and 30 for 20.3 to 29.8."""
+    step = 10.0 ** math.floor(math.log10(high - low))
+    return {"low": float(f"{math.floor(low / step) * step:.9g}"), "high": float(f"{math.ceil(high / step) * step:.9g}")}

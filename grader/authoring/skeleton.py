@@ -1,0 +1,141 @@
+"""Writes a draft down as the text of a rubric, with comments for its author."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from grader.authoring.drafts import Draft, DraftCriterion, DraftStimulus, Quantity
+
+#: Points of every row, until the author weighs them.
+POINTS = 5
+_WIDTH = 100
+# What needs no quotation marks inside `{...}`, and is neither a number nor a word of YAML.
+_PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
+_WORDS = ("true", "false", "null", "yes", "no", "on", "off")
+
+
+def rubric_text(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]] = ()) -> str:
+    """Return the text of a rubric.
+
+    Args:
+        draft: What goes into it.
+        left_out: Rows that stand in comments, each with the reason.
+    """
+    return "\n".join(_lines(draft, left_out)) + "\n"
+
+
+def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iterator[str]:
+    yield from _comment(
+        f"A skeleton, made of what {_and(draft.files)} did. What is marked `decide:` only you can know."
+    )
+    yield from _comment("`grade rubric check` says whether it can be used, `grade rubric explain` what it asks.")
+    for remark in draft.remarks:
+        yield from _comment(remark)
+    yield from ("schema: grader/rubric/v1", "", "exercise:", f"  id: {draft.id}")
+    yield from ('  number: "1"  # decide: what is its number in the course?', f"  title: {_title(draft.id)}")
+    yield from ("  required: true", "", f"files: {_value(list(draft.files))}", "")
+    yield from _scenario(draft)
+    yield from (
+        "",
+        "criteria:",
+        *_comment(f"decide: what is each of these worth? All have {POINTS} points so far.", "  "),
+    )
+    for criterion in draft.criteria:
+        yield from _criterion(criterion, scenario_id(draft))
+        yield ""
+    if left_out:
+        yield from _comment(
+            "decide: what of this is asked as well? The reference does not meet it as it stands here.", "  "
+        )
+    for criterion, reason in left_out:
+        yield from _comment(reason, "  ")
+        yield from (f"  # {line}" for line in _criterion(criterion, scenario_id(draft)))
+
+
+def scenario_id(draft: Draft) -> str:
+    """Return what the only scenario of a draft is called."""
+    return "alone" if len(draft.files) == 1 else "together"
+
+
+def _scenario(draft: Draft) -> Iterator[str]:
+    observe: dict[str, Any] = {"duration": Quantity(f"{draft.duration_s:g} s")}
+    if draft.after:
+        observe |= {"after_first_message_on": draft.after, "wait_at_most": Quantity("60 s")}
+    yield from ("scenarios:", f"  - id: {scenario_id(draft)}", f"    processes: {_value(list(draft.files))}")
+    if draft.may_exit:
+        yield f"    may_exit: {_value(list(draft.may_exit))}"
+    yield f"    observe: {_value(observe)}"
+    if draft.stimuli:
+        yield "    stimuli:"
+    for stimulus in draft.stimuli:
+        yield from _stimulus(stimulus)
+
+
+def _stimulus(stimulus: DraftStimulus) -> Iterator[str]:
+    if stimulus.comment:
+        yield from _comment(stimulus.comment, "      ")
+    yield f"      - {stimulus.kind}: {_value(stimulus.parameters)}"
+
+
+def _criterion(criterion: DraftCriterion, scenario: str) -> Iterator[str]:
+    yield f"  - id: {criterion.id}"
+    yield f"    title: {_scalar(criterion.title)}"
+    yield f"    points: {POINTS}"
+    yield f"    scenario: {scenario}"
+    yield "    check:"
+    if criterion.comment:
+        yield from _comment(criterion.comment, "      ")
+    yield f"      {criterion.check}: {_value(criterion.parameters)}"
+    if criterion.needs:
+        yield f"    needs: [{criterion.needs}]"
+    yield f"    hint: {_scalar(criterion.hint)}"
+
+
+def _comment(text: str, indent: str = "") -> Iterator[str]:
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    start = f"{indent}# "
+    yield from textwrap.wrap(line, _WIDTH, initial_indent=start, subsequent_indent=start, break_on_hyphens=False)
+
+
+def _value(value: Any) -> str:
+    """Return a value as YAML writes it on one line."""
+    if isinstance(value, Quantity):
+        return value.text
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_plain(str(key))}: {_value(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return _number(value) if isinstance(value, (int, float)) else _plain(str(value))
+
+
+def _number(value: float) -> str:
+    if float(value).is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    short = f"{value:.6g}"
+    # 32 bits of a float make a long tail that nobody wrote
+    return short if abs(float(short) - value) <= 1e-7 * max(1.0, abs(value)) else repr(float(value))
+
+
+def _plain(text: str) -> str:
+    fits = _PLAIN.fullmatch(text) is not None and text.lower() not in _WORDS
+    return text if fits else json.dumps(text, ensure_ascii=False)
+
+
+def _scalar(text: str) -> str:
+    """Return a sentence as YAML writes it after a key, on one line."""
+    risky = re.search(r"[\"'#:{}\[\]&*!|>%@`\\]|^[-?\s]", text) is not None or not text.isprintable()
+    return json.dumps(text, ensure_ascii=False) if risky else text
+
+
+def _title(id_: str) -> str:
+    return _scalar(id_.replace("_", " ").capitalize())
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

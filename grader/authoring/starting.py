@@ -1,0 +1,151 @@
+"""Makes the skeleton of a rubric from a reference: runs it twice, asks about all it did, and keeps what it meets."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grader.authoring.drafts import Draft, DraftCriterion, as_id
+from grader.authoring.questions import Seen, questions
+from grader.authoring.skeleton import rubric_text
+from grader.authoring.stimulation import stimuli_for
+from grader.judging.checks import CHECKS
+from grader.judging.silence import student_endpoints
+from grader.judging.wording import fault_sentence, quote
+from grader.model.errors import GraderError, RubricError, SubmissionError
+from grader.model.exercise import Exercise
+from grader.model.quantities import NS_PER_S, seconds
+from grader.model.scenario import Scenario
+from grader.model.trace import FaultKind, Trace
+from grader.observing import ObserveRequest, watch
+from grader.reading.rubric_file import read_rubric
+from grader.session import Progress
+
+#: Shortest time that tells anything of rates, and leaves room for stimuli.
+SHORTEST_S = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """A rubric to begin with.
+
+    Attributes:
+        text: What its file holds.
+        criteria: How many rows it has; the reference meets all of them.
+        left_out: How many more stand in comments.
+    """
+
+    text: str
+    criteria: int
+    left_out: int
+
+
+def new_rubric(request: ObserveRequest, id_: str, progress: Progress) -> Skeleton:
+    """Return the skeleton of a rubric for what a reference does.
+
+    Args:
+        request: The files of the reference, and how to run them.
+        id_: Id of the exercise; empty for one made of the first file's name.
+        progress: Hears which step begins.
+
+    Raises:
+        SubmissionError: The reference ends with an exception, or does nothing that could be asked for.
+        GraderError: Something that the run needs cannot be used.
+    """
+    alone = watch(request, progress)
+    _refuse_broken(alone.trace, alone.processes)
+    draft = _begun(alone.trace, alone.processes, request, id_)
+    driven = watch(request, progress, _scenario_of(draft)).trace
+    _refuse_broken(driven, draft.files)
+    seen = Seen(alone.trace, driven, draft.files, _window_s(driven, draft.duration_s))
+    kept, left_out = _sorted_out(draft, (row for row in questions(seen) if row.check in CHECKS), driven)
+    if not kept:
+        names = ", ".join(draft.files)
+        raise SubmissionError(f"{names}: expected a reference that publishes, listens, serves or logs, found none")
+    text = rubric_text(replace(draft, criteria=tuple(kept)), left_out)
+    _read(text)  # a mistake of ours is better found here than by the author
+    return Skeleton(text, len(kept), len(left_out))
+
+
+def _begun(trace: Trace, files: tuple[str, ...], request: ObserveRequest, id_: str) -> Draft:
+    """Return the draft of what happens to the reference, without a question."""
+    duration_s = request.duration_ns / NS_PER_S
+    stimuli = stimuli_for(trace, duration_s)
+    spoken = [m.topic for m in trace.messages() if m.topic in {e.topic for e in student_endpoints(trace, "publisher")}]
+    ended = tuple(f.process for f in trace.faults() if f.kind is FaultKind.EXITED)
+    remarks = () if trace.messages() or stimuli else ("The reference publishes nothing and waits for nobody.",)
+    return Draft(
+        id=as_id(id_ or Path(files[0]).stem),
+        files=files,
+        duration_s=duration_s,
+        after=spoken[0] if spoken and not stimuli else "",
+        may_exit=tuple(dict.fromkeys(ended)),
+        stimuli=stimuli,
+        remarks=remarks,
+    )
+
+
+def _scenario_of(draft: Draft) -> Scenario:
+    """Return the scenario that a draft's text describes; some question has to stand in it."""
+    asked = DraftCriterion("any", "Any", "uses_logger", {"process": draft.files[0]}, "any")
+    (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,)))).scenarios
+    return scenario
+
+
+def _read(text: str) -> Exercise:
+    with tempfile.TemporaryDirectory(prefix="grade-new-") as folder:
+        path = Path(folder) / "rubric.yaml"
+        path.write_text(text, encoding="utf-8")
+        return read_rubric(path)
+
+
+def _window_s(trace: Trace, duration_s: float) -> float:
+    """Return how long every topic was watched from its first message on, in whole seconds."""
+    firsts: dict[str, int] = {}
+    for message in trace.messages():
+        firsts.setdefault(message.topic, message.t_ns)
+    watched = [seconds(trace.stop_ns - first) for first in firsts.values()]
+    return max(1.0, float(math.floor(min([*watched, duration_s]) + 1e-9)))
+
+
+def _sorted_out(
+    draft: Draft, rows: Iterable[DraftCriterion], trace: Trace
+) -> tuple[list[DraftCriterion], list[tuple[DraftCriterion, str]]]:
+    """Return the rows that the reference meets, and the others with the reason; a row twice asked stays once."""
+    kept: list[DraftCriterion] = []
+    left_out: list[tuple[DraftCriterion, str]] = []
+    for row in rows:
+        ids = {other.id for other in kept}
+        if row.id in ids or row.id.removesuffix("_range") + "_random" in ids:
+            continue
+        row = replace(row, needs=row.needs if row.needs in ids else "")  # noqa: PLW2901  without what is not asked
+        reason = _unmet(replace(draft, criteria=(replace(row, needs=""),)), trace)
+        if reason:
+            left_out.append((row, reason))
+        else:
+            kept.append(row)
+    randomless = {row.id.removesuffix("_range") for row in kept}
+    return kept, [(r, why) for r, why in left_out if r.id.removesuffix("_random") not in randomless]
+
+
+def _unmet(draft: Draft, trace: Trace) -> str:
+    """Return why the reference does not meet the only row of a draft; empty if it does."""
+    try:
+        (criterion,) = _read(rubric_text(draft)).criteria
+        finding = criterion.check.judge(trace)
+    except RubricError as error:
+        return f"it cannot be asked yet: {quote(error.message.partition('.yaml:')[2] or error.message)}"
+    except GraderError as error:
+        return f"it cannot be judged: {quote(error.message)}"
+    return "" if finding.credit == 1 else f"seen: {quote(finding.reason)}"
+
+
+def _refuse_broken(trace: Trace, files: Iterable[str]) -> None:
+    """Raise SubmissionError if a process ended otherwise than with code 0."""
+    for fault in trace.faults():
+        if fault.kind is FaultKind.EXITED and fault.text.endswith("code 0"):
+            continue
+        raise SubmissionError(f"{', '.join(files)}: expected a reference that runs, found {fault_sentence(fault)}")
