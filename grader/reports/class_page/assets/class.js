@@ -2,6 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("class").textContent);
   const byId = (id) => document.getElementById(id);
+  const form = byId("filters");
   const table = byId("table");
   const body = table.tBodies[0];
   const rows = [...body.rows];
@@ -123,9 +124,13 @@
     byId("shown").textContent = all ? `${rows.length} rows` : `${wanted.length} of ${rows.length} rows${which}`;
   }
 
-  function only(change) {
-    byId("filters").reset();
+  function clear() {
+    form.reset();
     cause = null;
+  }
+
+  function only(change) {
+    clear();
     change();
     filter();
     byId("students").scrollIntoView();
@@ -133,11 +138,10 @@
     byId("shown").focus({ preventScroll: true });
   }
 
-  const form = byId("filters");
   form.hidden = false;
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("input", () => filter());
-  form.addEventListener("reset", () => setTimeout(() => { cause = null; filter(); }));
+  byId("all").addEventListener("click", () => { clear(); filter(); });
   // What is wanted of a criterion is nearly always who failed it.
   byId("criterion").addEventListener("input", () => {
     if (byId("criterion").value && !byId("outcome").value) byId("outcome").value = "lost";

@@ -1,0 +1,231 @@
+"""The page of a class of 300 in a real browser: sorting, searching, filters, links, and hostile names."""
+
+import re
+import shutil
+from itertools import pairwise
+from urllib.parse import unquote, urlparse
+
+import made_class
+import pytest
+
+COUNT = 300
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Return the folder with the results of a class."""
+    folder = tmp_path_factory.mktemp("class")
+    yield made_class.make_class(folder, COUNT)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+class Visit:
+    """A page that was opened, what its console said, and what it asked for."""
+
+    def __init__(self, browser, folder, **options):
+        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options})
+        self.page = self.context.new_page()
+        self.said, self.asked = [], []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto((folder / "index.html").as_uri())
+        self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+
+
+@pytest.fixture(scope="module")
+def visit(browser, results):
+    """Return the page, opened once for all tests."""
+    made = Visit(browser, results)
+    yield made
+    made.context.close()
+
+
+@pytest.fixture
+def page(visit):
+    """Return the page with everybody in the order of names; afterwards its console is still silent."""
+    visit.page.evaluate(
+        "() => { document.getElementById('all').click(); const head = document.querySelector('th[data-sort=name]');"
+        " if (head.getAttribute('aria-sort') !== 'ascending') head.firstElementChild.click(); }"
+    )
+    yield visit.page
+    assert visit.said == []
+
+
+def rows(page):
+    """Return the cells of all rows that are shown, those further down included."""
+    page.evaluate("() => { const more = document.getElementById('more'); while (!more.hidden) more.click(); }")
+    return page.evaluate(
+        "[...document.querySelectorAll('#table tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))"
+    )
+
+
+def finals(page):
+    """Return the final scores that are shown, in order."""
+    return [float(cells[4]) for cells in rows(page) if cells[4]]
+
+
+def shown(page):
+    """Return how many rows the page says it shows."""
+    return int(page.inner_text("#shown").split()[0])
+
+
+def test_the_page_loads_its_own_files_and_draws(visit, page, results):
+    """Nothing else is asked for, the console is silent, and the bars are there."""
+    assert {urlparse(url).scheme for url in visit.asked} == {"file"}
+    assert all(unquote(urlparse(url).path).startswith(str(results)) for url in visit.asked)
+    assert page.locator("[data-figure=scores] svg path").count() > 10
+    assert page.locator("#criteria .bar rect").count() > 30
+    assert shown(page) == COUNT
+
+
+def test_the_table_sorts_by_score_and_by_name(page):
+    """Down, up, and back to names; whoever has no score comes last; the order is told to who listens."""
+    head = page.locator("th[data-sort=final]")
+    head.get_by_role("button").click()
+    down = finals(page)
+    assert head.get_attribute("aria-sort") == "descending"
+    assert down == sorted(down, reverse=True)
+    assert rows(page)[-1][4] == ""
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert finals(page) == down[::-1]
+    assert rows(page)[-1][4] == ""
+    assert page.locator("[aria-sort]").count() == 1
+    page.locator("th[data-sort=name] button").focus()
+    page.keyboard.press("Enter")
+    names = [cells[0].split("\n")[0] for cells in rows(page)]
+    assert len(names) == COUNT
+    assert names.index("Ada Abe") < names.index("Élodie Abe") < names.index("Fatima Abe") < names.index("Zoë Missing")
+
+
+def test_searching_finds_whom_one_means(page):
+    """Every word counts, accents and capitals do not; an empty search shows everybody."""
+    page.fill("#search", "elodie ABE")
+    assert [cells[0].split("\n")[0] for cells in rows(page)] == ["Élodie Abe"]
+    page.fill("#search", "lab machine")
+    assert shown(page) == 1
+    page.fill("#search", "nobody is called so")
+    assert shown(page) == 0
+    page.get_by_role("button", name="Show all").click()
+    assert shown(page) == COUNT
+
+
+def test_filters_narrow_the_table_down(page):
+    """By a criterion that was not met, by outcome, by status, by score."""
+    cell = page.locator("button[data-criterion='odom_subscriber/log_period'][data-outcome=not_met]")
+    count = int(re.match(r"\d+", cell.inner_text())[0])
+    page.select_option("#criterion", "odom_subscriber/log_period")
+    assert page.input_value("#outcome") == "lost"
+    assert shown(page) == count == len(rows(page))
+    page.select_option("#outcome", "met")
+    assert shown(page) > count
+    page.click("#all")
+    page.select_option("#status", "undecided")
+    assert {cells[1] for cells in rows(page)} == {"undecided"}
+    page.select_option("#status", "")
+    page.fill("#least", "60")
+    page.fill("#most", "80")
+    assert finals(page)
+    assert all(60 <= score <= 80 for score in finals(page))
+
+
+def test_a_number_and_a_cause_show_their_students(page):
+    """The table shows just as many, and the keyboard is there."""
+    cell = page.locator("button[data-criterion='velocity_publisher/rate'][data-outcome=blocked]")
+    count = int(re.match(r"\d+", cell.inner_text())[0])
+    cell.focus()
+    page.keyboard.press("Enter")
+    assert shown(page) == count
+    cause = page.locator(".causes > li").first
+    cause.get_by_role("button").click()
+    assert shown(page) == int(cause.locator(".size strong").inner_text())
+    assert page.evaluate("document.activeElement.id") == "shown"
+
+
+def test_a_bar_shows_its_students_to_the_keyboard(page):
+    """Arrows walk over the bars and are told, Enter filters."""
+    page.locator("[data-figure=scores] .drawing").focus()
+    for _ in range(9):
+        page.keyboard.press("ArrowRight")
+    assert "80 to 90 %" in page.text_content("[data-said]")
+    page.keyboard.press("Enter")
+    assert all(80 <= score < 90 for score in finals(page))
+
+
+def test_every_link_leads_to_a_file_of_the_class(page, results):
+    """Also those of students with odd names; one is followed."""
+    rows(page)
+    links = page.evaluate("[...document.querySelectorAll('a[href]')].map((a) => a.href)")
+    paths = {unquote(urlparse(link).path) for link in links}
+    assert len([path for path in paths if path.endswith("/report.html")]) == COUNT - 3
+    assert all(path.startswith(str(results)) for path in paths)
+    assert [path for path in paths if not (results / path).is_file()] == []
+    other = page.context.new_page()
+    other.goto(next(link for link in links if "javascript" in link and link.endswith("report.html")))
+    assert other.inner_text("h1") == made_class.HOSTILE[2]
+    other.close()
+
+
+def test_hostile_names_stay_text(visit, page):
+    """No element, no handler and no script comes of a name; direction marks are shown as what they are."""
+    rows(page)
+    assert page.title().startswith("homework")
+    assert (
+        page.evaluate("document.querySelectorAll('img, iframe, object, embed, [onclick], [onerror], [onload]').length")
+        == 0
+    )
+    assert page.evaluate("document.scripts.length") == 3
+    text = page.inner_text("#table")
+    for name in (
+        "<img src=x onerror=document.title='owned'>",
+        "evil\\u202edrowssap\\u202c",
+        "two\\nlines",
+        "{{ 7*7 }}",
+        "مريم",
+    ):
+        assert name in text
+    assert not [url for url in visit.asked if "owned" in url]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_sticks_out_on_a_phone(browser, results, scheme):
+    """The page scrolls downwards only; tables scroll inside themselves."""
+    size = {"width": 390, "height": 800}
+    phone = Visit(browser, results, viewport=size, color_scheme=scheme, is_mobile=True, has_touch=True)
+    width = phone.page.evaluate("document.documentElement.scrollWidth")
+    phone.context.close()
+    assert width <= 390
+    assert phone.said == []
+
+
+def test_a_print_has_everybody(page):
+    """Rows that the screen shows later are on paper."""
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("#table tbody tr").count() == COUNT
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.locator("#table tbody tr").count() < COUNT
+
+
+def test_headings_and_controls_have_names(page):
+    """One h1, no level left out, every control named."""
+    levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map((h) => Number(h.tagName[1]))")
+    assert levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in pairwise(levels))
+    unnamed = page.evaluate(
+        "[...document.querySelectorAll('button, input, select, [tabindex=\"0\"]')].filter((e) => !e.hidden"
+        " && !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby') && !e.textContent.trim()"
+        " && !(e.labels && e.labels.length)).length"
+    )
+    assert unnamed == 0
+
+
+def test_without_scripts_everybody_is_there(browser, results):
+    """The table, the causes and the lists need none."""
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto((results / "index.html").as_uri())
+    count, text = page.locator("#table tbody tr").count(), page.inner_text("main")
+    context.close()
+    assert count == COUNT
+    assert "need JavaScript" in text
