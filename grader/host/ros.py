@@ -259,6 +259,15 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     def counted_respond(self: Any, response: Any, header: Any) -> Any:
         return counted(f"response {service_name(self)}", lambda: respond(self, response, header))
 
+    look = rclpy.client.Client.service_is_ready
+
+    @functools.wraps(look)
+    def settled_look(self: Any) -> Any:
+        if ledger.changed:
+            settle()  # whether a new client sees its server must not depend on who is faster
+        return look(self)
+
+    rclpy.client.Client.service_is_ready = settled_look
     rclpy.publisher.Publisher.publish = counted_publish
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond

@@ -1,0 +1,170 @@
+"""Services between the grader and real nodes: in virtual time every call and response has its instant, every time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from grader.model.quantities import NS_PER_MS, NS_PER_S
+from grader.model.scenario import MessageStream, Scenario, ServiceCalls, ServiceServer, Span
+from grader.model.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
+from grader.reading.submission import stage_submission
+from grader.recording.codec import trace_to_json
+from grader.recording.plan import plan_scenario
+from grader.recording.recorder import Job
+from grader.recording.studio import open_studio
+
+pytestmark = pytest.mark.ros
+
+NODES = Path(__file__).with_name("service_nodes")
+BATTERY, RELAY, TRIGGER = "/battery/get_status", "/relay", "std_srvs/srv/Trigger"
+ANSWERS = tuple({"success": True, "message": f"n{number}"} for number in range(3))
+TEXT = "std_msgs/msg/String"
+
+
+@pytest.fixture(scope="module")
+def studio():
+    """The strongest sandbox of this machine, with warm workers."""
+    with open_studio("auto") as studio:
+        yield studio
+
+
+@pytest.fixture
+def run(studio, tmp_path):
+    """Record some of the nodes beside this file, for so many seconds."""
+    tmp_path.chmod(0o755)
+
+    def run_one(files, *stimuli, seconds=4, clock="virtual", times=1, **fields):
+        (tmp_path / "s").mkdir()
+        submission = stage_submission(str(NODES), files, tmp_path / "s")
+        asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
+        plan = plan_scenario("services", asked, submission, seed=1, odometry=None, clock=clock)
+        traces = [studio.record({"t": Job("t", plan)}, clock, lambda _: None)["t"] for _ in range(times)]
+        assert [trace.harness_problem for trace in traces] == [""] * times
+        assert len({json.dumps(trace_to_json(trace)) for trace in traces}) == 1
+        return traces[0]
+
+    return run_one
+
+
+def short(trace) -> list[str]:
+    """Return what was asked, answered, logged and marked, in short, with its milliseconds."""
+    found = []
+    for o in trace.observations:
+        at = o.t_ns // NS_PER_MS
+        if isinstance(o, Request):
+            found.append(f"{at} {o.sender} asks {o.service} {o.number}")
+        elif isinstance(o, Response):
+            found.append(f"{at} {o.sender} answers {o.number}: {o.value['message']}")
+        elif isinstance(o, (LogRecord, Mark, Fault)):
+            found.append(f"{at} {o.text if isinstance(o, (LogRecord, Fault)) else f'{o.name} {o.detail}'}")
+    return found
+
+
+def test_a_server_is_called_by_several_clients(run):
+    """Calls of one instant come one after the other, always in the same order; the graph shows the server."""
+    trace = run(("server.py",), ServiceCalls(BATTERY, TRIGGER, ({},), calls=2, clients=2), times=2)
+    percentages = ["85.0", "84.5", "84.0", "83.5"]
+    expected = []
+    for index, percentage in enumerate(percentages):
+        said = f"Battery: {percentage}% remaining"
+        at = 1000 * (index // 2)
+        asked, told = f"{at} grader asks {BATTERY} {index + 1}", f"{at} student answers {index + 1}: {said}"
+        expected += [asked, f"{at} {said}", told]
+    assert short(trace) == expected
+    assert [r.client for r in trace.responses(BATTERY, "student")] == [1, 2, 1, 2]
+    assert [(e.kind, e.service, e.node) for e in trace.graphs()[-1].services] == [("service", BATTERY, "/battery")]
+
+
+def test_a_client_waits_for_a_late_server_that_disappears(run):
+    """It polls in virtual time; the last request stays unanswered; then it ends, which it is free to do."""
+    server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 1300 * NS_PER_MS, delay_ns=100 * NS_PER_MS, answers=2)
+    trace = run(("client_loop.py",), server, seconds=20, may_exit=("client_loop.py",), times=2)
+    assert short(trace) == [
+        "1000 waiting",
+        f"1300 server_starts {BATTERY}",
+        f"1500 student asks {BATTERY} 1",
+        "1600 grader answers 1: n0",
+        "1600 n0",
+        f"2600 student asks {BATTERY} 2",
+        "2700 grader answers 2: n1",
+        "2700 n1",
+        f"2700 server_stops {BATTERY}",
+        "6700 no answer",
+        "10700 no answer",
+        "14700 no answer",
+        "15700 exited client_loop.py",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("file", "asked_ms"),
+    [
+        ("client_callbacks.py", [1000, 2000, 3000]),
+        ("client_async.py", [1000, 2000, 3000]),
+        ("client_blocking.py", [0, 1250, 2500]),
+        ("client_two.py", [500, 1000, 1500, 2000, 2500, 3000, 3500]),
+    ],
+)
+def test_every_way_to_ask_is_served(run, file, asked_ms):
+    """Callbacks, await, the call that blocks in a thread, and a second client that hears what is not for it."""
+    server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=250 * NS_PER_MS, cycle=True)
+    trace = run((file,), server)
+    assert [r.t_ns // NS_PER_MS for r in trace.requests(BATTERY, "student")] == asked_ms
+    logged = [r.t_ns // NS_PER_MS for r in trace.records()]
+    assert logged == [at + 250 for at in asked_ms]
+
+
+def test_a_server_asks_another_one_while_it_answers(run):
+    """Two callbacks of one node wait for each other, in threads."""
+    server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=100 * NS_PER_MS)
+    trace = run(("relay.py",), server, ServiceCalls(RELAY, TRIGGER, ({},), start_ns=NS_PER_S))
+    assert [line for line in short(trace) if "server_starts" not in line] == [
+        f"1000 grader asks {RELAY} 1",
+        f"1000 student asks {BATTERY} 1",
+        "1100 grader answers 1: n0",
+        "1100 student answers 1: relayed n0",
+    ]
+
+
+def test_two_processes_meet_when_one_starts_late_and_one_ends(run):
+    """And the one that is left ends at the stop signal."""
+    files = ("server.py", "client_loop.py")
+    late, free = (("server.py", 2500 * NS_PER_MS),), ("client_loop.py",)
+    trace = run(files, seconds=10, starts_ns=late, may_exit=free, shutdown_ns=2 * NS_PER_S, times=2)
+    lines = short(trace)
+    assert lines[:3] == ["1000 waiting", "2000 waiting", "2500 process_starts server.py"]
+    assert lines[3:5] == ["2500 Battery: 85.0% remaining"] * 2
+    assert lines[-3:] == ["7500 exited client_loop.py", "10000 stop_signal server.py", "10000 stopped server.py"]
+    assert (trace.faults(), trace.stop_ns) == ((), 10 * NS_PER_S)
+
+
+def test_parameters_and_messages_of_fixed_types_reach_a_node(run):
+    """The parameter takes effect at its instant; the messages come as often as they are repeated."""
+    asked = {"parameters": [{"name": "word", "value": {"type": 4, "string_value": "bye"}}]}
+    changed = ServiceCalls("~/set_parameters", "rcl_interfaces/srv/SetParameters", (asked,), start_ns=1200 * NS_PER_MS)
+    heard = MessageStream("/heard", TEXT, ({"data": "a"}, {"data": "b"}), 500 * NS_PER_MS, NS_PER_S, repeats=2)
+    trace = run(("parrot.py",), changed, heard, times=2)
+    (response,) = trace.responses("/parrot/set_parameters", "student")
+    assert (response.t_ns, response.value["results"][0]["successful"]) == (1200 * NS_PER_MS, True)
+    said = [(m.t_ns // NS_PER_MS, m.value["data"]) for m in trace.messages("/said")]
+    assert said == [(1000, "a hello"), (1500, "a bye"), (2000, "b bye"), (2500, "b bye")]
+
+
+def test_the_wall_clock_sees_the_same(run):
+    """Only later by what the machine needs."""
+    server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 600 * NS_PER_MS, answers=1)
+    trace = run(("client_callbacks.py",), server, seconds=3, clock="wall", shutdown_ns=2 * NS_PER_S)
+    assert trace.clock is ClockKind.WALL
+    lines = [line.partition(" ")[2] for line in short(trace)]
+    assert lines[:4] == [
+        f"server_starts {BATTERY}",
+        f"student asks {BATTERY} 1",
+        "grader answers 1: n0",
+        "n0",
+    ]
+    assert lines[-2:] == ["stop_signal client_callbacks.py", "stopped client_callbacks.py"]
