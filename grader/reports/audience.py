@@ -98,7 +98,12 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
         return replace(verdict, reason=reason)
     # What is not judged has no numbers of its own, and the ids in it have to stay what they are.
     said = reason if verdict.outcome is Outcome.BLOCKED else without_numbers(reason)
-    return replace(verdict, reason=said, hint=without_numbers(verdict.hint), evidence={})
+    return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={})
+
+
+def _hint(hint: str) -> str:
+    """Return the parts of a hint that get along without numbers: most others would give the answer away."""
+    return "; ".join(part for part in hint.split("; ") if without_numbers(part) == part)
 
 
 def _needed(match: re.Match[str], shown: Mapping[str, Shows]) -> str:

@@ -59,7 +59,7 @@ def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
                 10,
                 Outcome.PARTLY,
                 reason=words,
-                hint=f"the period is 1/{NUMBER}",
+                hint=f"the period is 1/{NUMBER}; use a timer",
                 location=Location("pump.py", 17),
                 evidence={"rate_hz": 7357.25},
             ),
@@ -168,10 +168,10 @@ def test_an_outcome_alone_has_its_points():
 
 
 def test_a_reason_without_numbers_still_says_what_is_wrong():
-    """Words stand for numbers; the place in the student's own file stays."""
+    """Words stand for numbers, hints with numbers go; the place in the student's own file stays."""
     numbers = for_student(sample(), BEFORE).exercises[0].verdicts[1]
     assert numbers.reason == "/flow: average rate: a rate, expected a rate over a time"
-    assert numbers.hint == "the period is numbers"
+    assert numbers.hint == "use a timer"
     assert (numbers.location, numbers.evidence) == (Location("pump.py", 17), {})
 
 
