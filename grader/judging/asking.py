@@ -114,5 +114,5 @@ def _started(trace: Trace) -> int:
     ends = (*trace.service_ends("service"), *trace.service_ends("client"))
     only_services = {e.node for e in ends} - {e.node for e in endpoints}
     known = len({e.participant for e in endpoints}) + len(only_services)
-    talked = bool(trace.messages()) or any(r.sender == "student" for r in (*trace.of(Request), *trace.of(Response)))
-    return known or int(talked)
+    said: tuple[Request | Response, ...] = (*trace.of(Request), *trace.of(Response))
+    return known or int(bool(trace.messages()) or any(r.sender == "student" for r in said))

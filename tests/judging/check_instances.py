@@ -40,4 +40,11 @@ INSTANCES: dict[str, Check] = {
     "reaction": CHECKS["reaction"](
         "/temperature", "/fan_speed", (ReactionCase({"data": FieldRule(low=0)}, {"data": 100}),)
     ),
+    "period": CHECKS["period"]("/cmd_vel", least=NS_PER_S // 100, average=NS_PER_S // 20),
+    "latency": CHECKS["latency"]("/temperature", "/fan_speed", NS_PER_S),
+    "silence": CHECKS["silence"]("/cmd_vel", after="stream_stops"),
+    "field_equal": CHECKS["field_equal"]("/cmd_vel", {"linear.x": 0.5}),
+    "field_in_range": CHECKS["field_in_range"]("/temperature", 20, 30),
+    "field_monotone": CHECKS["field_monotone"]("/temperature"),
+    "logs_matching": CHECKS["logs_matching"]("velocity_publisher.py", "start", "INFO"),
 }

@@ -3,8 +3,10 @@
 from grader.judging.checks.clients import ServiceCalls, WaitsForService
 from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.log_patterns import LogsMatching
 from grader.judging.checks.log_rhythm import LogsEvery
 from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.logs import UsesLogger
@@ -14,6 +16,7 @@ from grader.judging.checks.reactions import Reaction
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.service_sequence import ServiceSequence
 from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
+from grader.judging.checks.timing import Latency, Period, Silence
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 
@@ -44,6 +47,13 @@ CHECKS: dict[str, type] = {
     "reacts_to_responses": ReactsToResponses,
     "no_go_without_answer": NoGoWithoutAnswer,
     "reaction": Reaction,
+    "period": Period,
+    "latency": Latency,
+    "silence": Silence,
+    "field_equal": FieldEqual,
+    "field_in_range": FieldInRange,
+    "field_monotone": FieldMonotone,
+    "logs_matching": LogsMatching,
 }
 
 __all__ = ["CHECKS"]
