@@ -11,6 +11,8 @@ from fnmatch import fnmatchcase
 from itertools import zip_longest
 from pathlib import Path
 
+from libcst import ParserSyntaxError
+
 from grader.model.errors import RubricError
 from grader.model.exercise import Exercise
 from grader.model.submission import Submission
@@ -21,6 +23,7 @@ from grader.recording.studio import Studio, open_studio
 from grader.selftest.bench import Bench, Candidate
 from grader.selftest.explained import Explained, Explanation, beside, idle, read_explained
 from grader.selftest.mutating.mutants import mutants_of
+from grader.selftest.mutating.program import Program
 from grader.selftest.mutating.variants import variants_of
 from grader.selftest.results import Fate, Result, Standing, Trial, one_line_change
 from grader.session import Progress, Request, read_exercises, read_recording
@@ -110,11 +113,16 @@ def _staged(folder: Path | None, exercise: Exercise, studio: Studio, name: str) 
 
 
 def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
-    """Return the text of every file of the reference solution; raises RubricError if one is missing."""
+    """Return the text of every file of the reference solution; raises RubricError if one cannot be used."""
     sources = read_sources(reference)
     for name in exercise.files:
         if name not in sources:
             raise RubricError(f"{reference.path}: expected {name} of {exercise.id} in it, found none that can be read")
+        try:
+            Program(sources[name])
+        except ParserSyntaxError as error:
+            where = f"{reference.path}/{name}:{error.raw_line}"
+            raise RubricError(f"{where}: expected a program that libcst can read, found another") from None
     return sources
 
 

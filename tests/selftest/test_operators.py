@@ -37,6 +37,7 @@ CASES = {
     "topic_private": (NODE, ["/speed -> ~/speed", "/heat -> ~/heat"]),
     "topic_swapped": (NODE, ["/speed <-> /heat"]),
     "message_type": (NODE, ["Float32 -> std_msgs.msg.Float64"]),
+    "stamped_type": ("from geometry_msgs.msg import Twist, Vector3\na = Twist()\n", ["Twist -> TwistStamped"]),
     "message_type_once": (NODE, ["create_publisher Float32 -> Float64", "create_subscription Float32 -> Float64"]),
     "best_effort": (NODE, ["publisher best effort", "subscription best effort"]),
     "transient_local": (NODE, ["publisher transient local", "subscription transient local"]),
@@ -171,6 +172,11 @@ CHANGES = [
         "message_type",
         "from std_srvs.srv import Trigger\nself.create_service(Trigger, 'x', f)\nself.Trigger = 3\n",
         ["self.create_service(Trigger, 'x', f) => from std_srvs.srv import SetBool ¶", "(SetBool, 'x', f)"],
+    ),
+    (
+        "stamped_type",
+        "from geometry_msgs.msg import Twist\na = Twist()\na.linear.x = 1.0\n",
+        ["=> from geometry_msgs.msg import TwistStamped ¶", "¶ a = TwistStamped() ¶ a.twist.linear.x = 1.0"],
     ),
     (
         "best_effort",

@@ -1,15 +1,17 @@
 """Self-tests as they are run: what is chosen without nodes, and the whole with real nodes."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
 
 from grader.cli import app
 from grader.model.errors import RubricError
-from grader.reading.rubric_file import builtin_rubrics
+from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.submission import stage_submission
 from grader.selftest.bench import Candidate
-from grader.selftest.running import Options, _sampled, selftest
+from grader.selftest.running import Options, _sampled, _sources, selftest
 
 #: Mutants of each of our rubrics in this test; `grade selftest rubrics/exercise_*.yaml` by hand runs them all.
 SAMPLE = 6
@@ -42,6 +44,18 @@ def test_a_rubric_without_a_reference_is_refused(tmp_path):
     with pytest.raises(RubricError, match="expected a reference solution") as error:
         next(selftest([rubric], Options(), lambda step: None))
     assert "mine.selftest.yaml" in error.value.hint
+
+
+def test_a_reference_that_cannot_be_read_is_refused(tmp_path):
+    """With its place; nothing has been run by then."""
+    (tmp_path / "velocity_publisher.py").write_text("a = 1\nb = (\n", encoding="utf-8")
+    exercise = read_rubric(builtin_rubrics()["velocity_publisher"])
+    (tmp_path / "staged").mkdir()
+    reference = stage_submission(str(tmp_path), exercise.files, tmp_path / "staged")
+    with pytest.raises(RubricError, match=r"velocity_publisher.py:\d+: expected a program that libcst can read"):
+        _sources(reference, exercise)
+    with pytest.raises(RubricError, match=r"expected fan_controller.py of velocity_publisher in it, found none"):
+        _sources(reference, replace(exercise, files=("fan_controller.py",)))
 
 
 def graded(*arguments):

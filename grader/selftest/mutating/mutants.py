@@ -19,6 +19,7 @@ OPERATORS: Mapping[str, Operator] = {
         naming.topic_private,
         naming.topic_swapped,
         naming.message_type,
+        naming.stamped_type,
         naming.message_type_once,
         quality.best_effort,
         quality.transient_local,

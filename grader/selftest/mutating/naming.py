@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import combinations
 
 import libcst as cst
@@ -33,6 +33,11 @@ _TWINS: Mapping[str, tuple[str, str]] = {
     "Trigger": ("std_srvs.srv", "SetBool"),
     "SetBool": ("std_srvs.srv", "Trigger"),
 }
+#: Types with a stamped relative -> the member that holds what they hold, and their own fields.
+_STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "Twist": ("twist", ("linear", "angular")),
+    "Pose": ("pose", ("position", "orientation")),
+}
 
 
 def topic_typo(program: Program) -> Iterator[Change]:
@@ -62,12 +67,27 @@ def topic_swapped(program: Program) -> Iterator[Change]:
 
 def message_type(program: Program) -> Iterator[Change]:
     """Another message or service type with the same fields, imported and used in the whole file."""
-    for imported, alias in _imported_types(program):
+    for imported, alias in _imported_types(program, _TWINS):
         package, twin = _TWINS[alias]
         edits: list[Edit] = [(name, cst.Name(twin)) for name in _uses(program, alias) if not _is_import(program, name)]
         line = f"from {package} import {twin}"
         edits += program.importing(line)
         yield Change(imported, into(alias, f"{package}.{twin}"), tuple(edits))
+
+
+def stamped_type(program: Program) -> Iterator[Change]:
+    """The stamped relative of a type, with the fields where that has them: TwistStamped for Twist."""
+    for imported, alias in _imported_types(program, _STAMPED):
+        member, parts = _STAMPED[alias]
+        stamped = f"{alias}Stamped"
+        edits: list[Edit] = [
+            (name, cst.Name(stamped)) for name in _uses(program, alias) if not _is_import(program, name)
+        ]
+        fields = [node for node in program.all(cst.Attribute) if node.attr.value in parts]
+        edits += [(node.value, cst.Attribute(node.value, cst.Name(member))) for node in fields]
+        package = program.code(imported.module) if imported.module is not None else ""
+        edits += program.importing(f"from {package} import {stamped}")
+        yield Change(imported, into(alias, stamped), tuple(edits))
 
 
 def message_type_once(program: Program) -> Iterator[Change]:
@@ -97,11 +117,11 @@ def _renamed(node: cst.SimpleString, name: str, other: str) -> Change:
     return Change(node, into(name, other), ((node, string(other)),))
 
 
-def _imported_types(program: Program) -> Iterator[tuple[cst.ImportFrom, str]]:
+def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
     for imported in program.all(cst.ImportFrom):
         if not isinstance(imported.names, cst.ImportStar):
             for alias in imported.names:
-                if alias.asname is None and isinstance(alias.name, cst.Name) and alias.name.value in _TWINS:
+                if alias.asname is None and isinstance(alias.name, cst.Name) and alias.name.value in known:
                     yield imported, alias.name.value
 
 
