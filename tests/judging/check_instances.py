@@ -5,6 +5,7 @@ from __future__ import annotations
 from tracing import ODOMETRY, TRIGGER, TWIST
 
 from grader.judging.checks import CHECKS
+from grader.judging.checks.endpoints import GraphEdge
 from grader.judging.checks.reactions import ReactionCase
 from grader.judging.rules import FieldRule
 from grader.model.exercise import Check
@@ -47,4 +48,10 @@ INSTANCES: dict[str, Check] = {
     "field_in_range": CHECKS["field_in_range"]("/temperature", 20, 30),
     "field_monotone": CHECKS["field_monotone"]("/temperature"),
     "logs_matching": CHECKS["logs_matching"]("velocity_publisher.py", "start", "INFO"),
+    "qos": CHECKS["qos"]("/cmd_vel", "publisher", "reliable"),
+    "node_name": CHECKS["node_name"]("/velocity_publisher"),
+    "topic_names": CHECKS["topic_names"](("/cmd_vel",)),
+    "graph_edges": CHECKS["graph_edges"]((GraphEdge("/temperature"),)),
+    "no_fault": CHECKS["no_fault"](),
+    "clean_shutdown": CHECKS["clean_shutdown"]("velocity_publisher.py"),
 }

@@ -2,6 +2,8 @@
 
 from grader.judging.checks.clients import ServiceCalls, WaitsForService
 from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
+from grader.judging.checks.endings import CleanShutdown, NoFault
+from grader.judging.checks.endpoints import GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
 from grader.judging.checks.functions import FieldFunction
@@ -54,6 +56,12 @@ CHECKS: dict[str, type] = {
     "field_in_range": FieldInRange,
     "field_monotone": FieldMonotone,
     "logs_matching": LogsMatching,
+    "qos": Qos,
+    "node_name": NodeName,
+    "topic_names": TopicNames,
+    "graph_edges": GraphEdges,
+    "no_fault": NoFault,
+    "clean_shutdown": CleanShutdown,
 }
 
 __all__ = ["CHECKS"]

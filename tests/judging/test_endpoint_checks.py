@@ -1,0 +1,177 @@
+"""The graph by its names, edges and policies; and how a process ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from tracing import FLOAT32, FLOAT64, Recording
+
+from grader.judging.checks.endings import CleanShutdown, NoFault
+from grader.judging.checks.endpoints import GraphEdge, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.findings import FAULT_KEY
+from grader.model.errors import HarnessError
+from grader.model.quantities import NS_PER_MS, NS_PER_S
+from grader.model.trace import FaultKind
+
+
+def talking() -> Recording:
+    rec = Recording(10.0).endpoint("publisher", "/a", FLOAT32, "/talker", 1, "reliable", "transient_local")
+    rec.endpoint("publisher", "/rosout", "rcl_interfaces/msg/Log", "/talker", 1)
+    return rec.endpoint("subscription", "/a", FLOAT32, "/listener", 2, "best_effort", t_s=1.0)
+
+
+def with_end(**change: Any) -> Recording:
+    rec = talking()
+    first = replace(rec.ends[0], **change)
+    return Recording(10.0).snapshot(0.0, [first, *rec.ends[1:]])
+
+
+@pytest.mark.parametrize(
+    ("check", "credit", "said"),
+    [
+        (Qos("/a", "publisher", "reliable", "transient_local"), 1, "of /talker has reliable and transient_local"),
+        (Qos("/a", "publisher", "best_effort"), 0, "has reliable reliability, transient_local durability, a depth of"),
+        (Qos("/a", "publisher", durability="volatile"), 0, "expected volatile"),
+        (Qos("/a", "subscription", "best_effort", depth=10), 1, ""),
+        (Qos("/a", "subscription", depth=11), 0, "expected a depth of at least 11"),
+        (Qos("/a", "publisher", deadline=0), 1, "no deadline"),
+        (Qos("/a", "publisher", deadline=NS_PER_S), 0, "expected a deadline of 1 s"),
+        (Qos("/b", "publisher"), 0, "/b: no publisher; seen: /a"),
+        (Qos("/b", "subscription"), 0, "/a"),
+    ],
+)
+def test_policies_of_an_endpoint(check: Qos, credit: int, said: str) -> None:
+    """Those named have to fit; the reason has those found."""
+    finding = check.judge(talking().trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+def test_a_depth_that_nobody_tells_is_not_judged() -> None:
+    """The middleware leaves it out for some; a deadline is told."""
+    with pytest.raises(HarnessError):
+        Qos("/a", "publisher", depth=10).judge(with_end(depth=0).trace())
+    assert Qos("/a", "publisher", "best_effort", depth=10).judge(with_end(depth=0).trace()).credit == 0
+    assert Qos("/a", "publisher", deadline=NS_PER_S).judge(with_end(deadline_ns=NS_PER_S).trace()).credit == 1
+    for kind in ("publisher", "subscription"):
+        assert FAULT_KEY in Qos("/a", kind).judge(Recording().crashed(0).trace()).evidence  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "credit", "said"),
+    [
+        ("/talker", 1, "/talker is in the ROS graph"),
+        ("talker", 1, ""),
+        ("/talkr", 0, "not in the ROS graph, found 2 nodes: /talker, /listener"),
+        ("/ns/talker", 0, ""),
+    ],
+)
+def test_a_node_is_found_by_its_name(name: str, credit: int, said: str) -> None:
+    """With or without its slash."""
+    finding = NodeName(name).judge(talking().trace())
+    assert finding.credit == credit
+    assert said in finding.reason
+
+
+def test_the_nearest_node_is_offered() -> None:
+    """A crash is the reason only where there is no node at all."""
+    assert NodeName("/talkr").judge(talking().trace()).hint == "name the node 'talkr' instead of /talker"
+    assert FAULT_KEY in NodeName("/a").judge(Recording().crashed(0.0).trace()).evidence
+    assert FAULT_KEY not in NodeName("/a").judge(talking().crashed(1.0).trace()).evidence
+    assert "found no node" in NodeName("/a").judge(Recording().trace()).reason
+
+
+@pytest.mark.parametrize(
+    ("check", "credit", "said"),
+    [
+        (TopicNames(("/a",), ("/a",)), 1, "published: /a; subscribed to: /a"),
+        (TopicNames(("/a",), ("/a",), exactly=True), 1, ""),
+        (TopicNames(("/a",), exactly=True), 0, "/a is subscribed to too"),
+        (TopicNames(("/a", "/aa")), 0, "/aa is not published"),
+        (TopicNames(node="/listener", subscribes=("/a",), exactly=True), 1, "published: nothing"),
+        (TopicNames(node="/listener", publishes=("/a",)), 0, "/a is not published; expected that /listener"),
+    ],
+)
+def test_topics_by_name(check: TopicNames, credit: int, said: str) -> None:
+    """Those that every node has do not count."""
+    finding = check.judge(talking().trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+@pytest.mark.parametrize(
+    ("check", "credit", "said"),
+    [
+        (GraphEdges((GraphEdge("/a"),)), 1, "t = 1.000 s: a node ─/a→ a node"),
+        (GraphEdges((GraphEdge("/a", "/talker", "/listener"),), between_processes=True), 1, "/talker ─/a→ /listener"),
+        (GraphEdges((GraphEdge("/a", "/listener"),)), 0, "/talker publishes std_msgs/msg/Float32, /listener subscr"),
+        (GraphEdges((GraphEdge("/a"), GraphEdge("/b"))), 0, "no edge a node ─/b→ a node; nothing publishes /b"),
+    ],
+)
+def test_edges_of_the_graph(check: GraphEdges, credit: int, said: str) -> None:
+    """By topic, and by nodes where they are named."""
+    finding = check.judge(talking().trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+def test_an_edge_needs_one_type_and_perhaps_two_processes_and_one_moment() -> None:
+    """What does not meet is no edge."""
+    assert GraphEdges((GraphEdge("/a"),)).judge(with_end(type=FLOAT64).trace()).credit == 0
+    alone = GraphEdges((GraphEdge("/a"),), between_processes=True)
+    assert alone.judge(with_end(participant=2).trace()).credit == 0
+    rec = Recording(10.0)
+    ends = talking().endpoint("publisher", "/b").endpoint("subscription", "/b").ends
+    rec.snapshot(0.0, [e for e in ends if e.topic == "/a"]).snapshot(1.0, [e for e in ends if e.topic == "/b"])
+    both = (GraphEdge("/a"), GraphEdge("/b"))
+    assert GraphEdges(both).judge(rec.trace()).credit == 1
+    assert "never all of them at once" in GraphEdges(both, at_once=True).judge(rec.trace()).reason
+    assert FAULT_KEY in GraphEdges(both).judge(Recording().crashed(0.0).trace()).evidence
+
+
+def test_no_fault_means_none_before_the_stop() -> None:
+    """Of the process named, or of any."""
+    assert NoFault().judge(talking().trace()).credit == 1
+    found = NoFault().judge(talking().crashed(3.0).exited(4.0, 1).trace())
+    assert found.reason == "t = 3.000 s: node.py:12: ValueError: no; 2 faults in all"
+    assert FAULT_KEY in found.evidence
+    assert NoFault("other.py").judge(talking().crashed(3.0).trace()).credit == 1
+    stopped = talking().mark(5.0, "stop_signal", "node.py").crashed(5.1)
+    assert NoFault().judge(stopped.trace()).credit == 1
+
+
+CLEAN = CleanShutdown("node.py")
+
+
+def stopping(ended_s: float | None) -> Recording:
+    rec = Recording(10.0).mark(5.0, "stop_signal", "node.py")
+    return rec if ended_s is None else rec.mark(ended_s, "stopped", "node.py")
+
+
+@pytest.mark.parametrize(
+    ("rec", "credit", "said"),
+    [
+        (stopping(5.0), 1, "ended 0.000 s after Ctrl-C"),
+        (stopping(7.0), 1, "ended 2.000 s"),
+        (stopping(7.1), 0, "ended 2.100 s after Ctrl-C, expected within 2 s"),
+        (stopping(None), 0, "still running 2.0 s after Ctrl-C at t = 5.000 s"),
+        (stopping(None).crashed(5.1, "RuntimeError: no"), 0, "t = 5.100 s, after Ctrl-C: node.py:12: RuntimeError"),
+        (stopping(None).fault(7.0, FaultKind.HUNG, "did not end"), 0, "did not end"),
+        (Recording().crashed(1.0), 0, "could not be stopped any more"),
+        (Recording().mark(1.0, "exited", "node.py"), 0, "ended by itself at t = 1.000 s"),
+    ],
+)
+def test_a_stopped_process_ends_tidily(rec: Recording, credit: int, said: str) -> None:
+    """In time, and without another error."""
+    finding = CLEAN.judge(rec.trace())
+    assert finding.credit == credit, finding.reason
+    assert said in finding.reason
+
+
+def test_a_process_that_nobody_stopped_is_ours() -> None:
+    """The scenario lacks its shutdown."""
+    with pytest.raises(HarnessError):
+        CLEAN.judge(Recording().trace())
+    assert CleanShutdown("node.py", 100 * NS_PER_MS).judge(stopping(5.2).trace()).credit == 0
