@@ -49,12 +49,17 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     if importlib.util.find_spec("libcst") is None:
         raise EnvironmentFault("grade selftest: expected libcst, found none", "pip install 'rclpy-grader[authors]'")
-    from grader.selftest.running import Options, selftest  # noqa: PLC0415  the rest of the grader, and libcst
+    from grader.reading.rubric_file import NOTES  # noqa: PLC0415  the rest of the grader, and libcst
+    from grader.selftest.running import Options, selftest  # noqa: PLC0415  as above
     from grader.selftest.showing import render_results, results_to_json  # noqa: PLC0415  as above
 
+    # A pattern of the shell names the notes as well.
+    named = [path for path in rubrics if not path.name.endswith(NOTES)]
+    if not named:
+        raise click.BadParameter(f"expected rubrics, found notes only; name {rubrics[0].name.removesuffix(NOTES)}.yaml")
     options = Options(reference, template, jobs, only, sample, seed, clock, isolation)
     with shown_progress(wanted=not no_progress) as progress:
-        results = list(selftest(rubrics, options, progress))
+        results = list(selftest(named, options, progress))
     if as_json:
         show(lambda _: results_to_json(results), for_people=False)
     else:

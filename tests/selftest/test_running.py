@@ -64,6 +64,14 @@ def graded(*arguments):
     return result.exit_code, json.loads(result.stdout) if result.stdout.startswith("{") else result.output
 
 
+def test_notes_are_no_rubrics():
+    """A pattern of the shell may name them beside their rubric, but not alone."""
+    notes = builtin_rubrics()["velocity_publisher"].with_name("exercise_1.selftest.yaml")
+    code, said = graded(notes)
+    assert code == 2
+    assert "name exercise_1.yaml" in said
+
+
 @pytest.mark.ros
 @pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=builtin_rubrics())
 def test_our_rubrics_notice_what_students_do_wrong(rubric):
