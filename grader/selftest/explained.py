@@ -114,6 +114,15 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
     mistakes = [*tree.mistakes, *_unknown_criteria(read, tree, exercise)]
     if mistakes:
         _refuse(path, mistakes)
+    return _explained(path, read, tree)
+
+
+def idle(explanations: Iterable[Explanation], needed: Callable[[Explanation], bool]) -> tuple[str, ...]:
+    """Return what explains nothing, each with its place."""
+    return tuple(f"{e.where}: `{shown(e.pattern)}` explains nothing" for e in explanations if not needed(e))
+
+
+def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
     return Explained(
         reference=None if read.reference is None else path.parent / read.reference,
         template=None if read.template is None else path.parent / read.template,
@@ -131,11 +140,6 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
             for n, one in enumerate(read.variants)
         ),
     )
-
-
-def idle(explanations: Iterable[Explanation], needed: Callable[[Explanation], bool]) -> tuple[str, ...]:
-    """Return what explains nothing, each with its place."""
-    return tuple(f"{e.where}: `{shown(e.pattern)}` explains nothing" for e in explanations if not needed(e))
 
 
 def _tree(path: Path) -> YamlTree:
