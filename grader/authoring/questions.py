@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.authoring.answers import ANY, OF_THE_RUN, cases_seen, texts
 from grader.authoring.drafts import DraftCriterion, Quantity, as_id
 from grader.judging.silence import student_endpoints
 from grader.judging.summary import summarise
@@ -14,7 +15,7 @@ from grader.judging.values import carries_number, leaves
 from grader.judging.wording import counted, number
 from grader.model.quantities import seconds
 from grader.model.summary import TopicSummary
-from grader.model.trace import Offer, Trace
+from grader.model.trace import Delivery, Offer, Trace
 
 #: Fewer messages tell no rate, and more spread of the intervals than this share of them is no rate.
 _FEWEST, _STEADY = 5, 0.2
@@ -22,8 +23,6 @@ _FEWEST, _STEADY = 5, 0.2
 _TOLERANCE, _PARTLY = 0.05, 0.1
 #: Most constant fields that a row names.
 _MOST_FIELDS = 8
-#: Times of a message are of the run.
-_OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +63,12 @@ def _published(topic: TopicSummary, seen: Seen) -> Iterator[DraftCriterion]:
     yield DraftCriterion(first, f"Publishes on {topic.name}", "publishes", asked, hint)
     if seen.alone.messages(topic.name):
         yield from _rate(topic, seen, first)
-    else:
-        yield _reaction(topic, seen, first)
-    yield from _fields(topic, seen, first)
+        yield from _fields(topic, seen, first)
+        return
+    reaction = _reaction(topic, seen, first)
+    yield reaction
+    if reaction.parameters["cases"] == ANY:
+        yield from _fields(topic, seen, first)
 
 
 def _rate(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterion]:
@@ -89,9 +91,10 @@ def _rate(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterio
 
 def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
     """Return a row for a topic on which there is something only when something comes in."""
-    inputs = sorted({d for d in (o.topic for o in student_endpoints(seen.driven, "subscription")) if d != topic.name})
-    asked = {"input": inputs[0] if inputs else topic.name, "output": topic.name}
-    comment = "seen: nothing is published until something comes in; decide: how soon, and what?"
+    given = next((delivery.topic for delivery in seen.driven.of(Delivery)), topic.name)
+    cases = cases_seen(seen.driven, given, topic.name)
+    asked = {"input": given, "output": topic.name, "within": Quantity("1 s"), "cases": cases}
+    comment = "seen: nothing is published until something comes in; decide: what follows from what, and how soon?"
     hint = f"publish on {topic.name} in the callback of the subscription"
     title = f"Answers on {topic.name}"
     return DraftCriterion(f"{as_id(topic.name)}_reaction", title, "reaction", asked, hint, needs, comment)
@@ -103,11 +106,16 @@ def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriter
     name = as_id(topic.name)
     if constant:
         asked = {"topic": topic.name, "values": dict(list(constant.items())[:_MOST_FIELDS])}
-        comment = f"seen: the same in all of {len(rows)} messages; decide: which of them does the task ask for?"
+        comment = f"seen: the same in {counted(len(rows), 'message')}; decide: which of them does the task ask for?"
         hint = f"the fields of every message on {topic.name} hold the same numbers"
-        yield DraftCriterion(
-            f"{name}_values", f"Right values on {topic.name}", "field_values", asked, hint, needs, comment
-        )
+        title = f"Right values on {topic.name}"
+        yield DraftCriterion(f"{name}_values", title, "field_values", asked, hint, needs, comment)
+    words = _constant_texts([message.value for message in seen.driven.messages(topic.name)])
+    if words:
+        said = {"topic": topic.name, "fields": words}
+        comment = f"seen: the same in {counted(len(rows), 'message')}; decide: does the task ask for them?"
+        hint = f"the texts of every message on {topic.name} are the same"
+        yield DraftCriterion(f"{name}_texts", f"Right texts on {topic.name}", "field_equal", said, hint, needs, comment)
     for path, (low, high) in list(varying.items())[:_MOST_FIELDS]:
         yield from _varying(topic, path, low, high, needs)
 
@@ -123,7 +131,14 @@ def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str
         asked = {"topic": topic.name, **bounds}
         yield DraftCriterion(f"{name}_random", title, "random_in_range", asked, hint, needs, comment)
     title, asked = f"{path} of {topic.name} is in range", {"topic": topic.name, "field": path, **bounds}
-    yield DraftCriterion(f"{name}_range", title, "field_range", asked, hint, needs, comment)
+    yield DraftCriterion(f"{name}_range", title, "field_in_range", asked, hint, needs, comment)
+
+
+def _constant_texts(values: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return the texts that are the same in all messages, by their paths, without empty ones."""
+    rows = [dict(texts(value)) for value in values]
+    first = rows[0] if rows else {}
+    return {path: text for path, text in first.items() if text and all(row.get(path) == text for row in rows)}
 
 
 def _sorted_out(rows: Sequence[Mapping[str, float]]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
@@ -132,7 +147,7 @@ def _sorted_out(rows: Sequence[Mapping[str, float]]) -> tuple[dict[str, float], 
     varying: dict[str, tuple[float, float]] = {}
     for path in rows[0] if rows else ():
         values = [row[path] for row in rows if path in row]
-        if path.endswith(_OF_THE_RUN) or any(v != v for v in values):  # noqa: PLR0124  NaN
+        if path.endswith(OF_THE_RUN) or any(v != v for v in values):  # noqa: PLR0124  NaN
             continue
         if min(values) == max(values):
             constant[path] = values[0]

@@ -13,6 +13,8 @@ from grader.authoring.drafts import Draft, DraftCriterion, DraftStimulus, Quanti
 #: Points of every row, until the author weighs them.
 POINTS = 5
 _WIDTH = 100
+#: Longest line that holds all parameters of something.
+_LONGEST = 120
 # What needs no quotation marks inside `{...}`, and is neither a number nor a word of YAML.
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")
@@ -34,7 +36,7 @@ def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iter
     )
     yield from _comment("`grade rubric check` says whether it can be used, `grade rubric explain` what it asks.")
     for remark in draft.remarks:
-        yield from _comment(remark)
+        yield from _comment(f"{remark[:1].upper()}{remark[1:]}.")
     yield from ("schema: grader/rubric/v1", "", "exercise:", f"  id: {draft.id}")
     yield from ('  number: "1"  # decide: what is its number in the course?', f"  title: {_title(draft.id)}")
     yield from ("  required: true", "", f"files: {_value(list(draft.files))}", "")
@@ -78,7 +80,7 @@ def _scenario(draft: Draft) -> Iterator[str]:
 def _stimulus(stimulus: DraftStimulus) -> Iterator[str]:
     if stimulus.comment:
         yield from _comment(stimulus.comment, "      ")
-    yield f"      - {stimulus.kind}: {_value(stimulus.parameters)}"
+    yield from _mapping(f"      - {stimulus.kind}:", stimulus.parameters, " " * 10)
 
 
 def _criterion(criterion: DraftCriterion, scenario: str) -> Iterator[str]:
@@ -89,7 +91,7 @@ def _criterion(criterion: DraftCriterion, scenario: str) -> Iterator[str]:
     yield "    check:"
     if criterion.comment:
         yield from _comment(criterion.comment, "      ")
-    yield f"      {criterion.check}: {_value(criterion.parameters)}"
+    yield from _mapping(f"      {criterion.check}:", criterion.parameters, " " * 8)
     if criterion.needs:
         yield f"    needs: [{criterion.needs}]"
     yield f"    hint: {_scalar(criterion.hint)}"
@@ -99,6 +101,21 @@ def _comment(text: str, indent: str = "") -> Iterator[str]:
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     start = f"{indent}# "
     yield from textwrap.wrap(line, _WIDTH, initial_indent=start, subsequent_indent=start, break_on_hyphens=False)
+
+
+def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator[str]:
+    """Yield parameters on the line of their key, or below it where that line would be long."""
+    line = f"{start} {_value(parameters)}"
+    if len(line) <= _LONGEST:
+        yield line
+        return
+    yield start
+    for key, value in parameters.items():
+        if isinstance(value, (list, tuple)) and any(isinstance(inner, Mapping) for inner in value):
+            yield f"{indent}{_plain(str(key))}:"
+            yield from (f"{indent}  - {_value(inner)}" for inner in value)
+        else:
+            yield f"{indent}{_plain(str(key))}: {_value(value)}"
 
 
 def _value(value: Any) -> str:

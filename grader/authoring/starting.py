@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from grader.authoring.drafts import Draft, DraftCriterion, as_id
 from grader.authoring.questions import Seen, questions
@@ -22,6 +23,7 @@ from grader.model.scenario import Scenario
 from grader.model.trace import FaultKind, Trace
 from grader.observing import ObserveRequest, watch
 from grader.reading.rubric_file import read_rubric
+from grader.reading.yaml_tree import YamlSyntaxError, read_yaml
 from grader.session import Progress
 
 #: Shortest time that tells anything of rates, and leaves room for stimuli.
@@ -36,30 +38,35 @@ class Skeleton:
         text: What its file holds.
         criteria: How many rows it has; the reference meets all of them.
         left_out: How many more stand in comments.
+        remarks: What the author should know of the run, one sentence each.
     """
 
     text: str
     criteria: int
     left_out: int
+    remarks: tuple[str, ...] = ()
 
 
-def new_rubric(request: ObserveRequest, id_: str, progress: Progress) -> Skeleton:
+def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", sent: Sequence[str] = ()) -> Skeleton:
     """Return the skeleton of a rubric for what a reference does.
 
     Args:
         request: The files of the reference, and how to run them.
-        id_: Id of the exercise; empty for one made of the first file's name.
         progress: Hears which step begins.
+        id_: Id of the exercise; empty for one made of the first file's name.
+        sent: Messages to send to the reference, as `TOPIC={field: value}`.
 
     Raises:
         SubmissionError: The reference ends with an exception, or does nothing that could be asked for.
         GraderError: Something that the run needs cannot be used.
     """
+    given = read_sent(sent)
     alone = watch(request, progress)
     _refuse_broken(alone.trace, alone.processes)
-    draft = _begun(alone.trace, alone.processes, request, id_)
+    draft = _begun(alone.trace, request, id_, given)
     driven = watch(request, progress, _scenario_of(draft)).trace
     _refuse_broken(driven, draft.files)
+    draft = replace(draft, remarks=tuple(_remarks(driven)))
     seen = Seen(alone.trace, driven, draft.files, _window_s(driven, draft.duration_s))
     kept, left_out = _sorted_out(draft, (row for row in questions(seen) if row.check in CHECKS), driven)
     if not kept:
@@ -67,16 +74,40 @@ def new_rubric(request: ObserveRequest, id_: str, progress: Progress) -> Skeleto
         raise SubmissionError(f"{names}: expected a reference that publishes, listens, serves or logs, found none")
     text = rubric_text(replace(draft, criteria=tuple(kept)), left_out)
     _read(text)  # a mistake of ours is better found here than by the author
-    return Skeleton(text, len(kept), len(left_out))
+    return Skeleton(text, len(kept), len(left_out), draft.remarks)
 
 
-def _begun(trace: Trace, files: tuple[str, ...], request: ObserveRequest, id_: str) -> Draft:
+def read_sent(sent: Sequence[str]) -> dict[str, list[Mapping[str, Any]]]:
+    """Return the fields of the messages to send, by topic; raises GraderError for what is of another form."""
+    given: dict[str, list[Mapping[str, Any]]] = {}
+    for text in sent:
+        topic, _, fields = text.partition("=")
+        try:
+            data = read_yaml(fields).data
+        except YamlSyntaxError:
+            data = None
+        if not topic.startswith("/") or not isinstance(data, dict):
+            raise GraderError(f"--send {quote(text)}: expected TOPIC={{field: value}}, found something else")
+        given.setdefault(topic, []).append(data)
+    return given
+
+
+def _remarks(trace: Trace) -> Iterator[str]:
+    for topic in dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")):
+        if not trace.messages(topic):
+            yield f"nothing was published on {topic}: send what its node waits for with --send TOPIC={{field: value}}"
+
+
+def _begun(trace: Trace, request: ObserveRequest, id_: str, given: Mapping[str, Sequence[Mapping[str, Any]]]) -> Draft:
     """Return the draft of what happens to the reference, without a question."""
+    files = tuple(file.name for file in request.files)
     duration_s = request.duration_ns / NS_PER_S
-    stimuli = stimuli_for(trace, duration_s)
+    stimuli = stimuli_for(trace, duration_s, given)
+    unheard = [topic for topic in given if topic not in {s.parameters.get("topic") for s in stimuli}]
+    if unheard:
+        raise GraderError(f"--send {unheard[0]}: expected a topic that the reference subscribes to, found none")
     spoken = [m.topic for m in trace.messages() if m.topic in {e.topic for e in student_endpoints(trace, "publisher")}]
     ended = tuple(f.process for f in trace.faults() if f.kind is FaultKind.EXITED)
-    remarks = () if trace.messages() or stimuli else ("The reference publishes nothing and waits for nobody.",)
     return Draft(
         id=as_id(id_ or Path(files[0]).stem),
         files=files,
@@ -84,7 +115,6 @@ def _begun(trace: Trace, files: tuple[str, ...], request: ObserveRequest, id_: s
         after=spoken[0] if spoken and not stimuli else "",
         may_exit=tuple(dict.fromkeys(ended)),
         stimuli=stimuli,
-        remarks=remarks,
     )
 
 

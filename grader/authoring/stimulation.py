@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 from grader.authoring.drafts import DraftStimulus, Quantity
 from grader.judging.silence import student_endpoints
@@ -12,24 +15,33 @@ from grader.model.trace import Trace
 ODOMETRY = "nav_msgs/msg/Odometry"
 #: Time before the first stimulus, so that waiting can be seen too.
 FIRST_S = 1.0
+#: No message was named.
+NOTHING: Mapping[str, Sequence[Mapping[str, Any]]] = MappingProxyType({})
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3
 
 
-def stimuli_for(trace: Trace, duration_s: float) -> tuple[DraftStimulus, ...]:
+def stimuli_for(
+    trace: Trace, duration_s: float, given: Mapping[str, Sequence[Mapping[str, Any]]] = NOTHING
+) -> tuple[DraftStimulus, ...]:
     """Return a stimulus for whatever of the nodes waits for somebody else.
 
     Args:
         trace: The nodes as they were by themselves.
         duration_s: How long the scenario will last.
+        given: Topic -> the fields of the messages to send there, where the author named some.
     """
-    return (*_topics(trace, duration_s), *_services(trace))
+    return (*_topics(trace, duration_s, given), *_services(trace))
 
 
-def _topics(trace: Trace, duration_s: float) -> Iterator[DraftStimulus]:
+def _topics(
+    trace: Trace, duration_s: float, given: Mapping[str, Sequence[Mapping[str, Any]]]
+) -> Iterator[DraftStimulus]:
     spoken = {end.topic for end in student_endpoints(trace, "publisher")}
     for topic, type_ in dict.fromkeys((e.topic, e.type) for e in student_endpoints(trace, "subscription")):
-        if topic not in spoken:
+        if topic in given:
+            yield _named(topic, type_, duration_s, given[topic])
+        elif topic not in spoken:
             yield _messages(topic, type_, duration_s)
 
 
@@ -46,6 +58,14 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
     repeats = max(1, int(left_s) - 1)
     given = {"topic": topic, "type": type_, "values": [{}], "period": Quantity("1 s"), "repeats": repeats}
     return DraftStimulus("messages", {**given, "start": start}, "decide: which fields? {} leaves all at their defaults")
+
+
+def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, Any]]) -> DraftStimulus:
+    """Return the messages that the author named, spread over the time there is."""
+    period_s = max(0.1, math.floor(10 * (duration_s - FIRST_S) / (len(values) + 1)) / 10)
+    period, start = Quantity(f"{min(2.0, period_s):g} s"), Quantity(f"{FIRST_S:g} s")
+    sent = {"topic": topic, "type": type_, "values": list(values), "period": period, "start": start}
+    return DraftStimulus("messages", sent, "decide: what else tells right from wrong?")
 
 
 def _services(trace: Trace) -> Iterator[DraftStimulus]:

@@ -105,11 +105,21 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
 @click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
+@click.option(
+    "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
+)
 @click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
 @click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
 def _new(  # noqa: PLR0913  one parameter an option
-    *, files: tuple[Path, ...], output: Path | None, id_: str, duration: float, clock: str, isolation: str
+    *,
+    files: tuple[Path, ...],
+    output: Path | None,
+    id_: str,
+    sent: tuple[str, ...],
+    duration: float,
+    clock: str,
+    isolation: str,
 ) -> int:
     """Run the FILEs of a reference solution, and write a rubric that asks for what they do.
 
@@ -121,7 +131,10 @@ def _new(  # noqa: PLR0913  one parameter an option
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
     with shown_progress(wanted=True) as progress:
-        skeleton = new_rubric(ObserveRequest(files, round(duration * 1e9), None, clock, isolation), id_, progress)
+        request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
+        skeleton = new_rubric(request, progress, id_=id_, sent=sent)
+    for remark in skeleton.remarks:
+        click.echo(f"warning: {shown(remark)}", err=True)
     if output is None:
         show(lambda _: skeleton.text, for_people=False)
     else:

@@ -70,6 +70,13 @@ def test_a_field_that_varies_is_asked_for_a_round_range(low, high, bounds):
     assert parameters["high"] >= high
 
 
+def test_a_text_that_never_changes_is_asked_for():
+    """By its path; one that changes or is empty is not."""
+    frames = pump().messages("/goal", POSE, {"header": {"frame_id": "map"}, "note": ""}, rate_hz=10)
+    assert asked(frames)["goal_texts"] == ("field_equal", {"topic": "/goal", "fields": {"header.frame_id": "map"}})
+    assert "goal_texts" not in asked(pump().messages("/goal", POSE, lambda n: {"note": f"{n}"}, rate_hz=10))
+
+
 def test_bursts_and_single_messages_have_no_rate():
     """No number is made up for what has none."""
     builder = pump()
@@ -83,9 +90,10 @@ def test_an_answer_is_asked_for_no_rate():
     """What is published only when something comes in has the stimulus's rate, not one of its own."""
     silent = pump().subscription("/level", FLOAT)
     driven = pump().subscription("/level", FLOAT).messages("/alarm", FLOAT, {"data": 1.0}, rate_hz=5)
-    rows = asked(driven, alone=silent)
+    rows = asked(driven.delivery(0.1, "/level", FLOAT, {"data": 3.0}), alone=silent)
     assert "alarm_rate" not in rows
-    assert rows["alarm_reaction"][0] == "reaction"
+    check, parameters = rows["alarm_reaction"]
+    assert (check, parameters["input"], parameters["output"]) == ("reaction", "/level", "/alarm")
     assert rows["subscribes_level"] == ("subscribes", {"topic": "/level", "type": FLOAT})
 
 
@@ -175,3 +183,28 @@ def test_a_reference_that_fails_is_told(tmp_path):
     done = CliRunner().invoke(cli.app, ["rubric", "new", str(tmp_path / "pump.py")])
     assert done.exit_code == 2
     assert "expected a reference that runs, found pump.py:4: ValueError: no" in done.stderr
+
+
+def test_what_came_of_each_input_becomes_a_case():
+    """What differs from the defaults in some answer is asked for in all; silence is a case too; repeats are none."""
+    silent = pump().subscription("/say", "std_msgs/msg/String")
+    driven = pump().subscription("/say", "std_msgs/msg/String")
+    for t_s, word in ((1, "left"), (3, "sing"), (5, "stop"), (7, "left")):
+        driven.delivery(t_s, "/say", "std_msgs/msg/String", {"data": word})
+        if word != "sing":
+            goal = {"header": {"frame_id": "map", "stamp": {"sec": t_s}}, "x": 2.0 if word == "left" else 0.0, "y": 0.0}
+            driven.message(t_s + 0.1, "/goal", POSE, goal)
+    _, parameters = asked(driven, alone=silent)["goal_reaction"]
+    assert parameters["cases"] == [
+        {"when": {"data": "left"}, "then": {"header.frame_id": "map", "x": 2.0}},
+        {"when": {"data": "sing"}, "silent": True},
+        {"when": {"data": "stop"}, "then": {"header.frame_id": "map", "x": 0.0}},
+    ]
+
+
+@pytest.mark.parametrize("text", ["say={data: a}", "/say", "/say={data: [}", "/say=5", "/say="])
+def test_a_message_to_send_has_a_topic_and_fields(text):
+    """Anything else is told before something runs."""
+    done = CliRunner().invoke(cli.app, ["rubric", "new", "a.py", "--send", text])
+    assert done.exit_code == 2
+    assert "expected TOPIC={field: value}, found something else" in done.stderr
