@@ -14,7 +14,15 @@ from grader.model.errors import GraderError
 from grader.model.exercise import Criterion, Exercise
 from grader.model.explanation import CheckExplanation, CriterionExplanation, Parameter
 from grader.model.quantities import Unit, duration
-from grader.model.scenario import MessageStream, NumberStream, Scenario, ServiceCalls, ServiceServer, Stimulus
+from grader.model.scenario import (
+    ActionGoal,
+    MessageStream,
+    NumberStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    Stimulus,
+)
 from grader.reading.manuals import Manual, manual_of
 from grader.reading.rubric_file import own_checks
 from grader.reading.units import format_quantity
@@ -150,8 +158,12 @@ def _stimulus(stimulus: Stimulus) -> str:
         return f"the grader offers the service {stimulus.service} from {duration(stimulus.start_ns)} on"
     if isinstance(stimulus, ServiceCalls):
         who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
-        pace = f"{stimulus.calls} times each, every {duration(stimulus.period_ns)}"
-        return f"{who} of the grader's call {stimulus.service} {pace}"
+        times = "once" if stimulus.calls == 1 else f"{stimulus.calls} times"
+        pace = f"{times} from {duration(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"
+        return f"{who} of the grader's calling {stimulus.service} {pace}"
+    if isinstance(stimulus, ActionGoal):
+        then = f", and cancels it {duration(stimulus.cancel_after_ns)} later" if stimulus.cancel_after_ns else ""
+        return f"a client of the grader's sends {stimulus.action} a goal at {duration(stimulus.start_ns)}{then}"
     played = f"from {duration(stimulus.start_ns)} on for {duration(stimulus.duration_ns)}"
     return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
 
