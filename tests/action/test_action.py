@@ -115,9 +115,9 @@ def test_inputs_become_words_of_a_command(checkout):
     }
     run(checkout, 0, **inputs)
     words, _ = json.loads((checkout / "called.json").read_text())
-    assert words[:7] == ["--no-progress", "--isolation", "landlock", "--exercise", "a", "--exercise", "b"]
-    assert words[7:11] == ["--exercise", "c;$(touch", "--exercise", "x)"]
-    assert words[11:17] == ["--rubric", "one rubric.yaml", "--rubric", "two.yaml", "--min-score", "60"]
+    assert words[:5] == ["--no-progress", "--isolation", "landlock", "--audience", "student"]
+    assert words[5:13] == ["--exercise", "a", "--exercise", "b", "--exercise", "c;$(touch", "--exercise", "x)"]
+    assert words[13:19] == ["--rubric", "one rubric.yaml", "--rubric", "two.yaml", "--min-score", "60"]
     assert words[-2:] == ["--", "--isolation=none"]
     assert not (checkout / "x").exists()
 
