@@ -82,9 +82,9 @@ class FieldRule:
         """What is expected, for text."""
         parts = []
         if self.equals is not None:
-            parts.append(_shown(self.equals))
+            parts.append(shown(self.equals))
         if self.items is not None:
-            parts.append(_shown(self.items))
+            parts.append(shown(self.items))
         if self.low is not None and self.high is not None:
             parts.append(f"{number(self.low)} to {number(self.high)}")
         elif self.low is not None:
@@ -120,19 +120,22 @@ def _keeps(value: Mapping[str, Any], path: str, rule: FieldRule) -> bool:
 def breach(value: Mapping[str, Any], path: str, rule: Rule) -> str:
     """Return what stands at a path and what was expected there, as a clause."""
     try:
-        found = f"{path} is {_shown(at_path(value, path))}"
+        found = f"{path} is {shown(at_path(value, path))}"
     except NoSuchField:
         found = f"there is no field {path}"
     return f"{found}, expected {as_rule(rule).wanted}"
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
+    """Return a field's value for text."""
+    if value is None:
+        return "nothing"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return f"{quote(value, 80)!r}"
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_shown, value[:20]))}{', ...' if len(value) > 20 else ''}]"
+        return f"[{', '.join(map(shown, value[:20]))}{', ...' if len(value) > 20 else ''}]"
     got = as_number(value)
     return number(got) if got is not None else quote(str(value), 80)
 

@@ -54,4 +54,6 @@ INSTANCES: dict[str, Check] = {
     "graph_edges": CHECKS["graph_edges"]((GraphEdge("/temperature"),)),
     "no_fault": CHECKS["no_fault"](),
     "clean_shutdown": CHECKS["clean_shutdown"]("velocity_publisher.py"),
+    "parameter_declared": CHECKS["parameter_declared"]("speed", value=0.5),
+    "parameter_takes_effect": CHECKS["parameter_takes_effect"]("speed", "/cmd_vel", field="linear.x"),
 }

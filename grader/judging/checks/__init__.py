@@ -13,6 +13,7 @@ from grader.judging.checks.log_rhythm import LogsEvery
 from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
+from grader.judging.checks.parameters import ParameterDeclared, ParameterTakesEffect
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.reactions import Reaction
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
@@ -62,6 +63,8 @@ CHECKS: dict[str, type] = {
     "graph_edges": GraphEdges,
     "no_fault": NoFault,
     "clean_shutdown": CleanShutdown,
+    "parameter_declared": ParameterDeclared,
+    "parameter_takes_effect": ParameterTakesEffect,
 }
 
 __all__ = ["CHECKS"]
