@@ -151,7 +151,7 @@ class ServiceServer:
         stop_ns: When it disappears; 0 for never.
         delay_ns: Time from a request to its response.
         cycle: Whether the responses begin again after the last one; otherwise the last one is repeated.
-        answers: After so many responses it disappears, before it takes the next request; 0 for never.
+        answers: After so many responses it takes one more request, and disappears without a response; 0 for never.
     """
 
     service: str

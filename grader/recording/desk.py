@@ -27,7 +27,6 @@ class _Served:
 
     plan: PlannedServer
     taken: int = 0
-    answered: int = 0
     unanswered: dict[int, tuple[Any, int]] = field(default_factory=dict)
 
 
@@ -60,7 +59,7 @@ class Desk:
         self._requests: Counter[str] = Counter()
         self._clients: dict[tuple[str, int, int], int] = {}
         self._called: dict[str, str] = {}
-        self._open: dict[tuple[str, int, int], int] = {}
+        self._open: dict[tuple[str, int, int], tuple[int, Call]] = {}
         self._waiting: list[Due] = []
         self._arrived: list[Arrived] = []
         self._large = False
@@ -90,8 +89,8 @@ class Desk:
             self._tape.add(Mark(now_ns, "server_stops", server.service))
 
     def done(self) -> list[PlannedServer]:
-        """Return the servers that have given all the answers they are to give."""
-        return [s.plan for s in self._servers.values() if s.plan.answers and s.answered >= s.plan.answers]
+        """Return the servers that were asked once more after all the answers they are to give."""
+        return [s.plan for s in self._servers.values() if 0 < s.plan.answers < s.taken and not s.unanswered]
 
     def meet(self, calls: PlannedCalls) -> str | None:
         """Let the clients of some calls appear, and return the service; None while its name is not known."""
@@ -123,7 +122,7 @@ class Desk:
         count = self._numbered(service, GRADER)
         value = plain_fields(request)
         self._tape.exchange(Request(now_ns, service, calls.type, count, GRADER, number, value), 0)
-        self._open[service, number, self._ends.ask(service, number, request)] = count
+        self._open[service, number, self._ends.ask(service, number, request)] = (count, call)
         return service
 
     def wait(self, due: Due) -> None:
@@ -173,8 +172,8 @@ class Desk:
 
     def _asked(self, now_ns: int, request: Arrived) -> None:
         served = self._servers.get(request.service)
-        if served is None or (served.plan.answers and served.taken >= served.plan.answers):
-            return  # it disappears before it takes this one
+        if served is None or 0 < served.plan.answers < served.taken:
+            return  # it disappears with the request before this one
         plan, number = served.plan, self._numbered(request.service, STUDENT)
         value, size = self._content(request.message)
         self._tape.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
@@ -194,17 +193,19 @@ class Desk:
         value = plain_fields(response)
         self._tape.exchange(Response(now_ns, server.service, server.type, number, GRADER, 0, value), 0)
         self._ends.answer(server.service, header, response)
-        served.answered += 1
         return True
 
     def _answered(self, now_ns: int, response: Arrived) -> None:
-        number = self._open.pop((response.service, response.client, response.sequence), None)
-        if number is None:
+        found = self._open.pop((response.service, response.client, response.sequence), None)
+        if found is None:
             return
+        number, call = found
         value, size = self._content(response.message)
         interface = self.calls()[response.service]
         answer = Response(now_ns, response.service, interface, number, STUDENT, response.client, value)
         self._tape.exchange(answer, size)
+        for delay_ns, following in call.then if value.get("accepted") else ():
+            self._later(Due(now_ns + delay_ns, "call", following.calls.service, following))
 
     def _content(self, message: Any) -> tuple[dict[str, Any], int]:
         """Return the fields of what a student's node sent, and its size; of what is too large, none."""
@@ -237,3 +238,6 @@ def check_types(plan: Plan) -> None:
         where = f"scenario {plan.scenario}, calls of {calls.service}"
         for value in calls.requests:
             built(wanted_class(calls.type, "srv", where).Request, value, where)
+    for goal in plan.goals:
+        where = f"scenario {plan.scenario}, goal of {goal.action}"
+        built(wanted_class(goal.type, "action", where).Goal, goal.goal, where)

@@ -135,6 +135,10 @@ class WallConductor:
             self._later(Due(now_ns, due.action, due.topic, due.payload))
         self._desk.take()
         self._desk.write_down(now_ns)
+        going = [due.payload for due in self._due if due.action == "dismiss"]
+        for server in self._desk.done():
+            if server not in going:  # it would take its last response with it
+                self._later(Due(now_ns + LINGER_NS, "dismiss", server.service, server))
         for student in self._students:
             if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
                 del self._starts_ns[student.name]
@@ -232,8 +236,6 @@ class WallConductor:
     def _answer(self, due: Due, now_ns: int) -> None:
         server, number = due.payload
         self._desk.answer(now_ns, server, number)
-        if server in self._desk.done():  # it would take its last response with it
-            self._later(Due(now_ns + LINGER_NS, "dismiss", server.service, server))
 
     def _dismiss(self, due: Due, now_ns: int) -> None:
         self._desk.dismiss(now_ns, due.payload)
