@@ -14,6 +14,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 
 from . import originals
+from .actions import ActionEnd, Receiver
 
 #: Topics that every node has; nobody waits for them.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -60,6 +61,7 @@ class Ledger:
         self.awaited: Counter[int] = Counter()
         self.contexts: list[weakref.ref[Any]] = []
         self._nodes: list[weakref.ref[Any]] = []
+        self._actions: list[ActionEnd] = []
         #: The topics on which the state machines of lifecycle nodes tell of transitions.
         self.transitions: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
@@ -77,6 +79,24 @@ class Ledger:
         self._expected.pop(endpoint, None)
         self._kept.pop(endpoint, None)
         self.changed = True
+
+    def add_action(self, end: ActionEnd) -> None:
+        """Remember the new server or client of an action."""
+        self._actions.append(end)
+        self.changed = True
+
+    def action(self, handle: Any) -> ActionEnd | None:
+        """Return the server or client of an action that a handle belongs to, if it is still there."""
+        return next((end for end in self._actions if end.handle is handle), None)
+
+    def forget_action(self, handle: Any) -> None:
+        """Expect nothing more at the server or client of an action that is being destroyed."""
+        end = self.action(handle)
+        if end is not None:
+            self._actions.remove(end)
+            for receiver in end.receivers.values():
+                self._expected.pop(receiver, None)
+            self.changed = True
 
     def alive(self, kind: str) -> list[Any]:
         """Return the endpoints of a kind that still exist, oldest first."""
@@ -113,6 +133,7 @@ class Ledger:
             for endpoint in self.alive(kind)
             if not type_name(endpoint.srv_type).startswith(BACKGROUND_SERVICES)
         ]
+        claims += [claim for end in self._actions for claim in end.claims()]
         nodes = [node.get_fully_qualified_name() for node in self.nodes()]
         claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
         claims += [
@@ -137,6 +158,9 @@ class Ledger:
         """Add what the grader says is on its way, and wait until it is here."""
         for channel, count in arrivals.items():
             for receiver in self._receivers(channel):
+                if isinstance(receiver, Receiver):
+                    self._expected[receiver] = min(self._expected.get(receiver, 0) + count, receiver.depth)
+                    continue
                 depth = _depth(receiver)
                 expected = self._expected.get(receiver, 0) + min(count, depth)
                 self._expected[receiver] = expected
@@ -236,6 +260,9 @@ class Ledger:
                 name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
                 if name in names:
                     found.setdefault(name, []).append(_matches(kind, endpoint))
+            for end in self._actions if kind == "client" else ():
+                if end.kind == kind and names.keys() & set(end.services()):
+                    found.setdefault(end.services()[0], []).append(int(end.handle.is_action_server_available()))
             for name, matches in found.items():
                 wanted = sorted(names[name], reverse=True)
                 if any(has < want for has, want in zip(sorted(matches, reverse=True), wanted, strict=False)):
@@ -243,6 +270,9 @@ class Ledger:
         return missing
 
     def _receivers(self, channel: str) -> list[Any]:
+        actions = [r for end in self._actions for r in end.receivers.values() if r.channel == channel]
+        if actions:
+            return actions
         kind, _, name = channel.partition(" ")
         if kind == "topic":
             return [s for s in self.alive("subscription") if s.topic_name == name]
@@ -306,6 +336,8 @@ def _matches(kind: str, endpoint: Any) -> int:
 
 def _await_ready(receiver: Any, context: Any) -> bool:
     """Wait, in real time, until one message can be taken from a receiver."""
+    if isinstance(receiver, Receiver):
+        return receiver.is_ready_within(ARRIVAL_S, REAL_WAIT_SET, context)
     kind = (
         "subscription"
         if hasattr(receiver, "topic_name")

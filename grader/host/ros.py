@@ -26,6 +26,7 @@ from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
+from .actions import install_actions
 from .clock import VirtualClock
 from .ledger import BACKGROUND, REAL_WAIT_SET, Ledger, service_name
 from .scheduler import Scheduler
@@ -272,6 +273,7 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
     _install_transitions(ledger, counted)
+    install_actions(ledger, clock, counted)
     for name in ("_take_subscription", "_take_client", "_take_service"):
         setattr(rclpy.executors.Executor, name, _counting_take(name, ledger, clock))
 

@@ -72,10 +72,17 @@ class PlannedCalls:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One request that is to be sent: by which client of which calls, the how manieth of them."""
+    """One request that is to be sent.
+
+    Attributes:
+        calls: What it is one of.
+        index: Which of them, from 0.
+        then: Requests that follow if the response accepts this one, each with its time from then on.
+    """
 
     calls: PlannedCalls
     index: int
+    then: tuple[tuple[int, Call], ...] = ()
 
     @property
     def client(self) -> int:
@@ -93,6 +100,21 @@ class PlannedGoal:
     cancel_after_ns: int
     goal: Fields
     uuid: tuple[int, ...]
+
+
+def goal_call(goal: PlannedGoal) -> Call:
+    """Return the request that sends a goal, and those that follow: for its result, and perhaps to cancel it."""
+    name, identity = f"{goal.action}/_action", {"uuid": list(goal.uuid)}
+
+    def once(service: str, interface: str, request: Fields) -> PlannedCalls:
+        return PlannedCalls(f"{name}/{service}", interface, goal.start_ns, 1, 1, (request,))
+
+    then = [(0, Call(once("get_result", f"{goal.type}_GetResult", {"goal_id": identity}), 0))]
+    if goal.cancel_after_ns:
+        asked = once("cancel_goal", "action_msgs/srv/CancelGoal", {"goal_info": {"goal_id": identity}})
+        then.append((goal.cancel_after_ns, Call(asked, 0)))
+    sent = once("send_goal", f"{goal.type}_SendGoal", {"goal_id": identity, "goal": goal.goal})
+    return Call(sent, 0, tuple(then))
 
 
 def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:

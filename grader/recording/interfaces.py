@@ -57,6 +57,8 @@ def plain_fields(message: Any) -> Any:
         return message
     if isinstance(message, bytes):
         return list(message)
+    if hasattr(message, "tolist"):
+        return message.tolist()
     return [plain_fields(item) for item in message]
 
 
@@ -78,7 +80,8 @@ def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
             known = ", ".join(kinds) or "no fields"
             raise HarnessError(f"{where}: expected a field of {_name(message)} ({known}), found `{name}`")
         try:
-            setattr(made, name, _value(kinds[name], value, f"{where}, {name}"))
+            part = type(getattr(made, name))
+            setattr(made, name, _value(kinds[name], value, part, f"{where}, {name}"))
         except (AssertionError, ValueError, TypeError, OverflowError) as error:
             kind = message.get_fields_and_field_types()[name]
             text = f"{where}: expected a value of the type {kind} in `{name}`, found {str(value)[:80]!r}"
@@ -86,16 +89,18 @@ def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
     return made
 
 
-def _value(kind: Any, value: Any, where: str) -> Any:
-    """Return a plain value as a field of a kind takes it."""
+def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
+    """Return a plain value as a field of a kind takes it; `part` is the class that the field holds now."""
     if hasattr(kind, "value_type"):
         if not isinstance(value, (list, tuple)):
             raise TypeError(value)
-        return [_value(kind.value_type, item, where) for item in value]
+        element = kind.value_type
+        if hasattr(element, "namespaces"):
+            part = getattr(importlib.import_module(".".join(element.namespaces)), element.name)
+        return [_value(element, item, part, where) for item in value]
     if hasattr(kind, "namespaces"):
         if not isinstance(value, Mapping):
             raise TypeError(value)
-        part = getattr(importlib.import_module(".".join(kind.namespaces)), kind.name)
         return built(part, value, where)
     typename = getattr(kind, "typename", "")
     if isinstance(value, bool) or not isinstance(value, (int, float)):

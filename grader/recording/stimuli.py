@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.recording.exchanges import Call, PlannedMessages
+from grader.recording.exchanges import Call, PlannedMessages, goal_call
 from grader.recording.interfaces import message_class, plain_fields
 from grader.recording.plan import Plan, PlannedNumbers, PlannedRecording
 
@@ -52,6 +52,11 @@ def schedule(plan: Plan) -> list[Due]:
         for index in range(len(calls.requests)):
             t_ns = calls.start_ns + index // calls.clients * calls.period_ns
             due.append(Due(t_ns, "call", calls.service, Call(calls, index)))
+    for goal in plan.goals:
+        call = goal_call(goal)
+        parts = [call, *(following for _, following in call.then)]
+        due += [Due(goal.start_ns, "meet", part.calls.service, part.calls) for part in parts]
+        due.append(Due(goal.start_ns, "call", call.calls.service, call))
     return sorted(due, key=lambda d: (d.t_ns, d.t_ns == 0 and d.action not in APPEARANCES))
 
 

@@ -1,0 +1,194 @@
+"""Counts the traffic of actions, whose servers and clients rclpy builds below its services and topics."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
+from . import originals
+
+if TYPE_CHECKING:
+    from .clock import VirtualClock
+    from .ledger import Ledger
+
+Counted = Callable[[str, Callable[[], Any]], Any]
+
+#: The methods of a server and of a client that take something: for each the channel, and which of the answers of
+#: `is_ready` says that it is there.
+TAKES = {
+    "service": {
+        "take_goal_request": ("request", "send_goal", 0),
+        "take_cancel_request": ("request", "cancel_goal", 1),
+        "take_result_request": ("request", "get_result", 2),
+    },
+    "client": {
+        "take_feedback": ("topic", "feedback", 0),
+        "take_status": ("topic", "status", 1),
+        "take_goal_response": ("response", "send_goal", 2),
+        "take_cancel_response": ("response", "cancel_goal", 3),
+        "take_result_response": ("response", "get_result", 4),
+    },
+}
+#: The methods that send something.
+SENDS = {
+    "service": {
+        "send_goal_response": ("response", "send_goal"),
+        "send_cancel_response": ("response", "cancel_goal"),
+        "send_result_response": ("response", "get_result"),
+        "publish_feedback": ("topic", "feedback"),
+        "publish_status": ("topic", "status"),
+    },
+    "client": {
+        "send_goal_request": ("request", "send_goal"),
+        "send_cancel_request": ("request", "cancel_goal"),
+        "send_result_request": ("request", "get_result"),
+    },
+}
+#: What an action consists of, as it stands in the graph: `{}` is the action's type.
+SERVICES = {
+    "send_goal": "{}_SendGoal",
+    "get_result": "{}_GetResult",
+    "cancel_goal": "action_msgs/srv/CancelGoal",
+}
+TOPICS = {"feedback": "{}_FeedbackMessage", "status": "action_msgs/msg/GoalStatusArray"}
+
+
+class Receiver:
+    """One of the queues of an action's server or client.
+
+    Args:
+        end: Whose queue it is.
+        channel: What comes there, e.g. `request /count/_action/send_goal`.
+        number: Which of the answers of `is_ready` says that something is there.
+    """
+
+    def __init__(self, end: ActionEnd, channel: str, number: int) -> None:
+        self._end = end
+        self._number = number
+        self.channel = channel
+        self.topic_name = channel.partition(" ")[2]
+        #: How much its queue holds; of states only the last one.
+        self.depth = 1 if channel.endswith("/status") else 10
+
+    @property
+    def handle(self) -> Any:
+        """What rclpy takes from."""
+        return self._end.handle
+
+    def is_ready_within(self, seconds: float, new_wait_set: Callable[..., Any], context: Any) -> bool:
+        """Wait, in real time, until something can be taken; return whether it can."""
+        deadline = originals.perf_counter() + seconds
+        while True:
+            with context.handle, self.handle:
+                subscriptions, guards, timers, clients, services = self.handle.get_num_entities()
+                wait_set = new_wait_set(subscriptions, guards, timers, clients, services, 0, context.handle)
+                wait_set.clear_entities()
+                self.handle.add_to_waitset(wait_set)
+                wait_set.wait(0)
+                if self.handle.is_ready(wait_set)[self._number]:
+                    return True
+            if originals.perf_counter() > deadline:
+                return False
+            originals.sleep(0.0005)
+
+
+class ActionEnd:
+    """The server or client of an action.
+
+    Args:
+        kind: `service` or `client`, as the services it consists of.
+        handle: What rclpy works with.
+        name: Absolute name of the action.
+        interface: e.g. `test_msgs/action/Fibonacci`.
+    """
+
+    def __init__(self, kind: str, handle: Any, name: str, interface: str) -> None:
+        self.kind = kind
+        self.handle = handle
+        self._interface = interface
+        self._prefix = f"{name}/_action/"
+        self.receivers = {
+            method: Receiver(self, f"{channel} {self._prefix}{part}", number)
+            for method, (channel, part, number) in TAKES[kind].items()
+        }
+
+    def channel(self, method: str) -> str:
+        """Return the channel on which a method sends."""
+        channel, part = SENDS[self.kind][method]
+        return f"{channel} {self._prefix}{part}"
+
+    def services(self) -> list[str]:
+        """Return the names of the services it consists of."""
+        return [f"{self._prefix}{part}" for part in SERVICES]
+
+    def claims(self) -> list[dict[str, Any]]:
+        """Return its services and topics as the grader needs to know them."""
+        services = [(self.kind, part, interface) for part, interface in SERVICES.items()]
+        topic = "publisher" if self.kind == "service" else "subscription"
+        topics = [(topic, part, interface) for part, interface in TOPICS.items()]
+        return [
+            {
+                "kind": kind,
+                "name": f"{self._prefix}{part}",
+                "type": interface.format(self._interface),
+                "reliable": True,
+                "latched": part == "status",
+                "deadline_ns": 0,
+                "manual": False,
+            }
+            for kind, part, interface in services + topics
+        ]
+
+
+def install_actions(ledger: Ledger, clock: VirtualClock, counted: Counted) -> None:
+    """Count what servers and clients of actions send and take."""
+    for kind, cls in (("service", _rclpy.ActionServer), ("client", _rclpy.ActionClient)):
+        _register(kind, cls, ledger)
+        for method in TAKES[kind]:
+            setattr(cls, method, _counting_take(getattr(cls, method), method, ledger, clock))
+        for method in SENDS[kind]:
+            setattr(cls, method, _counting_send(getattr(cls, method), method, ledger, counted))
+
+
+def _register(kind: str, cls: Any, ledger: Ledger) -> None:
+    make, destroy = cls.__init__, cls.destroy_when_not_in_use
+
+    def made(self: Any, node: Any, *arguments: Any) -> None:
+        make(self, node, *arguments)
+        # a server is given its node's clock first
+        interface, name = arguments[1:3] if kind == "service" else arguments[:2]
+        resolved = _rclpy.rclpy_resolve_name(node, name, False, False)  # noqa: FBT003 - C++
+        package, room = interface.__module__.split(".")[:2]
+        ledger.add_action(ActionEnd(kind, self, resolved, f"{package}/{room}/{interface.__name__}"))
+
+    def destroyed(self: Any) -> None:
+        ledger.forget_action(self)
+        destroy(self)
+
+    cls.__init__ = functools.wraps(make)(made)
+    cls.destroy_when_not_in_use = functools.wraps(destroy)(destroyed)
+
+
+def _counting_take(take: Any, method: str, ledger: Ledger, clock: VirtualClock) -> Any:
+    def counting(self: Any, *arguments: Any) -> Any:
+        clock.busy()
+        taken = take(self, *arguments)
+        end = ledger.action(self)
+        if end is not None:
+            ledger.took(end.receivers[method])
+        return taken
+
+    return counting
+
+
+def _counting_send(send: Any, method: str, ledger: Ledger, counted: Counted) -> Any:
+    def counting(self: Any, *arguments: Any) -> Any:
+        end = ledger.action(self)
+        if end is None:
+            return send(self, *arguments)
+        return counted(end.channel(method), lambda: send(self, *arguments))
+
+    return counting
