@@ -10,7 +10,7 @@ from grader.batch.classbook import Classbook, Row, Status, exactly
 from grader.batch.facts import RunOfClass
 from grader.batch.gradebook import number, remarks
 from grader.batch.page_facts import run_facts
-from grader.batch.people import Person
+from grader.batch.people import Person, fold_name
 from grader.reports.class_page.contents import ClassPage, Entry, Listing, PageLink, Student, Tone
 
 _TONES = {
@@ -35,7 +35,7 @@ def class_page(book: Classbook, run: RunOfClass, links: Sequence[PageLink] = ())
         run: The run that writes it.
         links: Other pages in the folder for results.
     """
-    rows = sorted(book.rows, key=lambda row: (row.shown_name.casefold(), row.name))
+    rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
     students = tuple(_student(row, run) for row in rows)
     listings = [listing for listing in _listings(book, rows, run) if listing.entries]
     return ClassPage(run.title, run_facts(book, run), students, tuple(listings), tuple(links))

@@ -171,13 +171,13 @@
     return box;
   }
 
-  function bars(name, column, tone) {
+  function bars(name, column, tone, labelled) {
     return {
       name,
       type: "bar",
       data: data.bins.map((bin) => bin[column]),
       itemStyle: { color: Charts.colour(tone), borderRadius: [3, 3, 0, 0] },
-      label: { show: true, position: "top", ...FONT, formatter: ({ value }) => (value ? String(value) : "") },
+      label: { show: labelled, position: "top", ...FONT, formatter: ({ value }) => (value ? String(value) : "") },
       barGap: "8%",
       barCategoryGap: "18%",
       animation: false,
@@ -223,7 +223,10 @@
         textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
         formatter: tip,
       },
-      series: [bars("as graded", 3, "main"), ...(data.changed ? [bars("after adjustments", 4, "second")] : [])],
+      series: [
+        bars("as graded", 3, "main", !narrow || !data.changed),
+        ...(data.changed ? [bars("after adjustments", 4, "second", !narrow)] : []),
+      ],
     }, { notMerge: true });
     const picture = drawing.querySelector("svg");
     if (picture) picture.setAttribute("aria-hidden", "true");
@@ -265,7 +268,7 @@
     window.addEventListener("afterprint", () => { printing = false; paint(width); });
   }
 
-  show();
+  sort(table.tHead.querySelector("[data-sort=name]"), false);
   if (figure) draw();
   document.documentElement.dataset.ready = "yes";
 })();
