@@ -42,6 +42,15 @@ def test_an_address_of_no_known_kind_is_refused():
         pass
 
 
+def test_encryption_needs_certificates():
+    """They are asked for before anybody is called."""
+    with (
+        pytest.raises(EnvironmentFault, match="expected certificates in Dask's configuration, found none"),
+        connected("tls://127.0.0.1:9", None, print),
+    ):
+        pass
+
+
 def test_a_scheduler_file_holds_the_address(tmp_path):
     """As `dask scheduler --scheduler-file` writes it."""
     path = tmp_path / "scheduler.json"

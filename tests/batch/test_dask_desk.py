@@ -156,6 +156,21 @@ def test_large_parcels_are_laid_down_first(tmp_path):
     assert [size >> 20 for size in scattered] == [2]
 
 
+@pytest.mark.parametrize("trouble", [OSError("closed"), TimeoutError()])
+def test_where_nothing_can_be_laid_down_it_travels(tmp_path, trouble):
+    """The worker that was to hold it may end at that very moment."""
+
+    def scatter(data, **options):
+        raise trouble
+
+    client = FakeClient()
+    client.scatter = scatter
+    one = task(tmp_path, "ada")
+    (one.submission / "data.bin").write_bytes(bytes(2 << 20))
+    here = ClusterScheduler(client, None, lambda line: None)
+    assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
+
+
 def test_steps_are_heard_while_a_submission_is_under_way(tmp_path):
     """And neither late nor from strangers."""
     client, heard = FakeClient(), []

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from distributed import Client
+from distributed import Client, Security
 
 from grader.batch.cluster.scheduler import ClusterScheduler
 from grader.batch.tasks import MakeScheduler
@@ -64,10 +64,13 @@ def address_of(place: str) -> str:
 
 
 def _client(address: str, patience_s: float) -> Client:
+    if address.startswith("tls://") and Security().get_connection_args("client").get("ssl_context") is None:
+        message = f"--scheduler {address}: expected certificates in Dask's configuration, found none"
+        raise EnvironmentFault(message, "name them under distributed.comm.tls: ca-file, client.cert, client.key")
     try:
         return Client(address, timeout=patience_s, set_as_default=False, name="grade-batch")
     except (OSError, TimeoutError):
-        message = f"--scheduler {address}: expected a Dask scheduler, found none within {patience_s:.0f} s"
+        message = f"--scheduler {address}: expected a Dask scheduler, found none that answers"
         raise EnvironmentFault(
             message, "start it with `dask scheduler`, or look whether a firewall is between"
         ) from None

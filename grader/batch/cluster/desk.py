@@ -143,7 +143,12 @@ class Desk:
 
     def _parcel(self, data: bytes, *, near: bool) -> Any:
         """Return bytes as they are given to the cluster: large ones go to a worker first, if there is one."""
-        return self._client.scatter(data, hash=False) if near and len(data) > SCATTERED_BYTES else data
+        if not near or len(data) <= SCATTERED_BYTES:
+            return data
+        try:
+            return self._client.scatter(data, hash=False)
+        except (OSError, TimeoutError):  # the worker that it was meant for has just ended: let it travel
+            return data
 
     def _call_back_stranded(self, alive: Any) -> None:
         """Take back submissions all of whose workers are gone: nobody would ever take them."""
