@@ -2,12 +2,14 @@
 
 import json
 
+import jsonschema
 import pytest
 from click.testing import CliRunner
 
 from grader import cli
 from grader.reading.rubric_file import builtin_rubrics
 from grader.reading.shipped import shipped_folder
+from grader.reports.json_report import report_schema
 
 SOLUTION = shipped_folder().parent / "reference_solutions" / "velocity_publisher.py"
 
@@ -39,6 +41,7 @@ def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(tmp_
     graded = run("velocity_publisher.py", *whose, "-o", "json=graded.json", "-o", "evidence=kept", "--no-progress")
     report = json.loads((tmp_path / "graded.json").read_text(encoding="utf-8"))
     assert (graded.exit_code, report["score"], report["max_score"]) == (0, 30, 30)
+    jsonschema.validate(report, report_schema())
     assert report["exercises"][0]["variant"] == {"student": "ada", "values": values}
     assert report["reproduce"]["command"].endswith("--student ada --variant-key course.key")
 
@@ -51,4 +54,6 @@ def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(tmp_
     after = json.loads(run("rejudge", "kept", "--rubric", "r.yaml", *student, "2026-12-02").stdout)
     assert (before["score"], before["max_score"]) == (25, 25)
     assert "angular_velocity" not in json.dumps(before)
+    jsonschema.validate(before, report_schema())
+    assert before["exercises"][0]["notes"][0].startswith("graded by the variant of ada: rate")
     assert after == report

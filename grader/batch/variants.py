@@ -63,12 +63,11 @@ def refuse_without_key(course: Course, exercises: Sequence[Exercise]) -> None:
     if not vary(exercises):
         return
     if course.grading.variant_key is None:
-        raise VariantError(
-            "--variant-key: expected the course key, because a rubric has variants, found none", "--variant-key FILE"
-        )
+        text = "--variant-key: expected the course key, because a rubric has variants, found none"
+        raise VariantError(text, "name its file with --variant-key FILE")
     if course.roster is None:
         text = "--roster: expected the people of the class, because a rubric has variants, found no roster"
-        raise ClassError(text, "--roster CSV; without it nobody knows whose variant a submission is")
+        raise ClassError(text, "name it with --roster CSV: it says whose variant a submission is graded by")
 
 
 def own_conditions(
