@@ -59,6 +59,7 @@ class Episode:
         stop_ns: When the next request came, or the recording ended.
         until_ns: The same, less the clock's jitter.
         outputs: What was written in [start_ns, stop_ns], in order; both ends widened by the clock's jitter.
+        awaiting: What was written between the request and its response, in order.
     """
 
     place: int
@@ -70,6 +71,7 @@ class Episode:
     stop_ns: int
     until_ns: int
     outputs: tuple[Output, ...]
+    awaiting: tuple[Output, ...]
 
     @property
     def sure(self) -> tuple[Output, ...]:
@@ -95,7 +97,8 @@ def episodes_of(trace: Trace, process: str, service: str, reading: Reading) -> t
         start_ns = asked_ns if call.response is None else call.response.t_ns
         until_ns = stop_ns if place == len(calls) else stop_ns - jitter_ns
         during = tuple(o for o in outputs if start_ns - jitter_ns <= o.t_ns <= stop_ns + jitter_ns)
-        found.append(Episode(place, kind, number, text, asked_ns, start_ns, stop_ns, until_ns, during))
+        before = tuple(o for o in outputs if asked_ns <= o.t_ns < start_ns)
+        found.append(Episode(place, kind, number, text, asked_ns, start_ns, stop_ns, until_ns, during, before))
     return tuple(found)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
@@ -15,7 +16,7 @@ from grader.judging.findings import FAULT_KEY
 from grader.model.errors import HarnessError
 from grader.model.exercise import Check
 from grader.model.quantities import NS_PER_MS, NS_PER_S
-from grader.model.trace import ClockKind
+from grader.model.trace import ClockKind, Request
 
 BATTERY = "/battery/get_status"
 FILE = "battery_service_client.py"
@@ -247,6 +248,16 @@ def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:
     assert "IndexError" in crashed.reason
 
 
+def test_an_answer_that_is_not_waited_for_is_no_going_on() -> None:
+    """A complaint between a request and its good response: the result was looked at before it was there."""
+    rec = asking(lambda a: [], [battery(84.5 - k) for k in range(5)], delay_s=0.1)
+    for request in [o for o in rec.items if isinstance(o, Request)]:
+        rec.log(request.t_ns / 1e9, "no result", "ERROR")
+    finding = ABOVE.judge(rec.trace())
+    assert finding.credit == 0
+    assert "ERROR" in finding.reason
+
+
 def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
     """The client ended, crashed, hangs at a lost response, or our server never sent such an answer."""
     only_good = (battery(84.5), battery(63.0))
@@ -256,8 +267,10 @@ def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
     for check in (BELOW, REACTS, STILL):
         assert check.judge(ended.trace()).blocked_by == "service_calls"
         assert FAULT_KEY in check.judge(crashed.trace()).evidence
+        idle = check.judge(asking(chapter, only_good).trace())
+        assert (idle.blocked_by, "then asked no more" in idle.reason) == ("service_calls", True)
         with pytest.raises(HarnessError):
-            check.judge(asking(chapter, only_good).trace())
+            check.judge(dataclasses.replace(asking(chapter, only_good).trace(), stop_ns=7_000_000_000))
     assert BELOW.judge(hangs.trace()).blocked_by == "service_calls"
     assert ABOVE.judge(ended.trace()).credit == 1
 

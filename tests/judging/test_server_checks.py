@@ -81,6 +81,17 @@ def test_several_clients_share_one_number(clients: int) -> None:
     assert "more than once" in SEQUENCE.judge(own).reason
 
 
+def test_a_server_that_lags_behind_counts_what_it_answers() -> None:
+    """Its queue overflows: some requests are lost, and the others are answered in the order of the queue."""
+    rec = Recording(30.0, process="battery_service_server.py").service("service", BATTERY, TRIGGER, "/battery_monitor")
+    for k in range(9):
+        rec.request(1.0 + 0.1 * k, BATTERY, k + 1)
+    for place, k in enumerate([0, 4, 2, 7]):
+        rec.response(3.0 + 2.0 * place, BATTERY, k + 1, status(84.5 - 0.5 * place))
+    assert SEQUENCE.judge(rec.trace()).credit == 1
+    assert ALL.judge(rec.trace()).credit == 0
+
+
 def test_a_lost_response_does_not_move_the_numbers() -> None:
     """It is missing in the one check, and its number was used up in the other."""
     source = levels()

@@ -17,9 +17,11 @@ from grader.judging.wording import counted, fault_sentence, moment, number, quot
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
 from grader.model.names import Pattern
-from grader.model.quantities import seconds
+from grader.model.quantities import NS_PER_S, seconds
 from grader.model.trace import OutputLine, Trace
 
+#: A client that has not asked again for so long does not ask again.
+_ASKS_AGAIN_NS = 5 * NS_PER_S
 _SAID = {
     Kind.FAILED: "a response without success",
     Kind.UNREADABLE: "an answer without a number",
@@ -80,7 +82,8 @@ class ReactsToResponses:
         before = episodes[episode.place - 2] if episode.place > 1 else None
         late = before is not None and before.kind is not Kind.GOOD
         # a client that looks at an answer when it asks again warns then about the one before
-        warned = [r for r in complaints(episode.sure) if not (late and r.t_ns <= episode.asked_ns)]
+        early = () if late else episode.awaiting
+        warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
         if warned:
             return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
         return "" if episode.outputs else "nothing is written"
@@ -231,7 +234,7 @@ def _never_asked(trace: Trace, process: str, service: str) -> Finding:
 
 
 def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Episode]) -> Finding:
-    """Return no credit where a client ended or stopped asking before an answer of the kind in question came.
+    """Return no credit where a client ended or asked no more before an answer of the kind in question came.
 
     Raises:
         HarnessError: It did neither, so no such answer was sent.
@@ -243,7 +246,9 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
         reason = f"{fault_sentence(fault)}; {asked} and did not get to the answer in question"
         return not_met(reason, hint=fault_hint(fault), fault=fault)
     ended = trace.marks("exited", process)
-    if ended or last.kind is Kind.UNANSWERED:
-        why = f"ended at {moment(ended[0].t_ns)}" if ended else "waits for a response that never comes"
+    stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
+    if ended or stopped or last.kind is Kind.UNANSWERED:
+        why = "waits for a response that never comes" if last.kind is Kind.UNANSWERED else "then asked no more"
+        why = f"ended at {moment(ended[0].t_ns)}" if ended else why
         return not_met(f"{asked} and {why}; the answer in question never came", blocked_by="service_calls")
     raise HarnessError(f"{service}: no answer of the kind in question was sent")

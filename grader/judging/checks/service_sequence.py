@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Any
@@ -36,7 +36,8 @@ class ServiceSequence:
     """A number in the responses of a student's server goes on by one step with each call, whoever calls.
 
     The number is read from a numeric field, or from a text: its first number, or what `pattern` finds. Calls of one
-    instant may be answered in any order. How the text is written otherwise is the question of `service_response`.
+    instant may be answered in any order, and a server that lags behind may answer in an order of its own. How the text
+    is written otherwise is the question of `service_response`.
 
     Attributes:
         service: Service name as on the wire.
@@ -62,10 +63,14 @@ class ServiceSequence:
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every number is the expected one; the reason names the first that is not."""
-        answers = self._answers(calls_of(trace, self.service, "grader"))
-        if len(answers) < max(1, self.at_least):
-            return too_few_responses(trace, self.service, len(answers), self.at_least)
-        wrong = [k for k, a in enumerate(answers) if a.got is None or not within(a.got, a.wanted, self.tolerance)]
+        calls = calls_of(trace, self.service, "grader")
+        answered = sorted((c for c in calls if c.response is not None), key=answered_ns)
+        if len(answered) < max(1, self.at_least):
+            return too_few_responses(trace, self.service, len(answered), self.at_least)
+        # A server that lags behind may lose requests, or take them in an order of its own.
+        orders = (self._answers(calls, asked_ns), self._answers(answered, answered_ns))
+        answers = min(orders, key=lambda order: len(self._wrong(order)))
+        wrong = self._wrong(answers)
         got = [a.got for a in answers]
         evidence: dict[str, Any] = {
             "service": self.service,
@@ -79,11 +84,14 @@ class ServiceSequence:
         reason = f"{self.service}: {counted(len(answers), 'response')} in the right order: {shown}"
         return met(f"{reason}, ... {number(answers[-1].wanted)}", evidence)
 
-    def _answers(self, calls: Sequence[Call]) -> list[_Answer]:
+    def _wrong(self, answers: Sequence[_Answer]) -> list[int]:
+        return [k for k, a in enumerate(answers) if a.got is None or not within(a.got, a.wanted, self.tolerance)]
+
+    def _answers(self, calls: Sequence[Call], instant: Callable[[Call], int]) -> list[_Answer]:
         """Return the responses in the order of their calls, those of one instant in the order of their numbers."""
         wanted = self._sequence()
         found: list[_Answer] = []
-        for _, group in groupby(calls, key=lambda c: c.request.t_ns):
+        for _, group in groupby(calls, key=instant):
             together = list(group)
             values = [next(wanted) for _ in together]
             responses = [c.response for c in together if c.response is not None]
@@ -156,3 +164,13 @@ class ServiceSequence:
         if sum(again) >= 0.4 * len(again):
             return f"numbers come more than once ({numbers(values[:4])}, ...)", _KEEP_HINT
         return "", ""
+
+
+def asked_ns(call: Call) -> int:
+    """Return when a call was sent."""
+    return call.request.t_ns
+
+
+def answered_ns(call: Call) -> int:
+    """Return when a call was answered; when it was sent, if it never was."""
+    return call.request.t_ns if call.response is None else call.response.t_ns
