@@ -36,7 +36,8 @@ def duration(duration_ns: int) -> str:
 
 def within(got: float, want: float, tolerance: float) -> bool:
     """Return whether `got` lies in `want ± tolerance`, the edges inside; NaN never does."""
-    return abs(got - want) <= tolerance + SLACK * max(1.0, abs(want), abs(tolerance))
+    difference = abs(got - want)
+    return difference <= tolerance or difference <= tolerance + SLACK * max(1.0, abs(want), abs(tolerance))
 
 
 @dataclass(frozen=True, slots=True)

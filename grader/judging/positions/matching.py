@@ -108,7 +108,13 @@ def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
 
 def _hits(entry: Entry, pairs: Sequence[Pair], track: Track, wanted: Wanted) -> set[Pair]:
     """Return the pairs that show a current pose: both numbers of one and the same."""
-    targets = [wanted(track.pose(k)) for k in track.current(entry.t_ns)]
+    current = track.current(entry.t_ns)
+    newest = _among(entry, pairs, [wanted(track.pose(current[-1]))])
+    # nearly every log shows the newest pose, and to look for a dozen older ones takes long
+    return newest if len(newest) == len(pairs) else _among(entry, pairs, [wanted(track.pose(k)) for k in current])
+
+
+def _among(entry: Entry, pairs: Sequence[Pair], targets: Sequence[tuple[float, float]]) -> set[Pair]:
     wanted_first, wanted_second = [a for a, _ in targets], [b for _, b in targets]
     firsts = {i: _shown_by(entry.numbers[i], wanted_first) for i in {i for i, _ in pairs}}
     seconds = {j: _shown_by(entry.numbers[j], wanted_second) for j in {j for i, j in pairs if firsts[i]}}
