@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from grader.model.quantities import NS_PER_MS, NS_PER_S
-from grader.model.scenario import MessageStream, Scenario, ServiceCalls, ServiceServer, Span
+from grader.model.scenario import ActionGoal, MessageStream, Scenario, ServiceCalls, ServiceServer, Span
 from grader.model.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
 from grader.reading.submission import stage_submission
 from grader.recording.codec import trace_to_json
@@ -154,6 +154,68 @@ def test_parameters_and_messages_of_fixed_types_reach_a_node(run):
     assert (response.t_ns, response.value["results"][0]["successful"]) == (1200 * NS_PER_MS, True)
     said = [(m.t_ns // NS_PER_MS, m.value["data"]) for m in trace.messages("/said")]
     assert said == [(1000, "a hello"), (1500, "a bye"), (2000, "b bye"), (2500, "b bye")]
+
+
+def test_a_lifecycle_node_is_led_through_its_states(run):
+    """It publishes while it is active; what its state machine tells has its instant too."""
+    asked = [({"transition": {"id": 0, "label": to}}, at) for to, at in (("configure", 600), ("activate", 1200))]
+    kind = "lifecycle_msgs/srv/ChangeState"
+    calls = [ServiceCalls("~/change_state", kind, (value,), start_ns=at * NS_PER_MS) for value, at in asked]
+    state = ServiceCalls("/living/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=1300 * NS_PER_MS)
+    trace = run(("lifecycle.py",), *calls, state, seconds=2, times=2)
+    assert [r.value["success"] for r in trace.responses("/living/change_state", "student")] == [True, True]
+    assert trace.responses("/living/get_state", "student")[0].value["current_state"]["label"] == "active"
+    assert [m.t_ns // NS_PER_MS for m in trace.messages("/out")] == [1500]
+    told = [(m.t_ns // NS_PER_MS, m.value["goal_state"]["label"]) for m in trace.messages("/living/transition_event")]
+    assert told == [(600, "configuring"), (600, "inactive"), (1200, "activating"), (1200, "active")]
+
+
+FIBONACCI, COUNT = "test_msgs/action/Fibonacci", "/count/_action"
+
+
+def test_goals_are_refused_cancelled_and_followed(run):
+    """An action server with threads that sleeps while it works: requests, feedback and results have their instants."""
+    pytest.importorskip("test_msgs")
+    refused = ActionGoal("/count", FIBONACCI, {"order": 80}, 500 * NS_PER_MS)
+    cancelled = ActionGoal("/count", FIBONACCI, {"order": 8}, NS_PER_S, 1200 * NS_PER_MS)
+    trace = run(("counting.py",), refused, cancelled, times=2)
+    sent = trace.responses(f"{COUNT}/send_goal", "student")
+    assert [(r.t_ns // NS_PER_MS, r.value["accepted"]) for r in sent] == [(500, False), (1000, True)]
+    (asked,) = trace.requests(f"{COUNT}/cancel_goal", "grader")
+    (result,) = trace.responses(f"{COUNT}/get_result", "student")
+    assert (asked.t_ns // NS_PER_MS, result.t_ns // NS_PER_MS) == (2200, 2500)
+    assert (result.value["status"], result.value["result"]["sequence"]) == (5, [0, 1, 2, 3])
+    told = [(m.t_ns // NS_PER_MS, m.value["feedback"]["sequence"]) for m in trace.messages(f"{COUNT}/feedback")]
+    assert told == [(1500, [0, 1]), (2000, [0, 1, 2]), (2500, [0, 1, 2, 3])]
+    states = [m.value["status_list"][0]["status"] for m in trace.messages(f"{COUNT}/status")]
+    assert states == [1, 2, 3, 5]  # accepted, executing, cancelling, cancelled
+
+
+def test_the_client_of_an_action_waits_for_its_server(run):
+    """Both are students; the server starts late."""
+    pytest.importorskip("test_msgs")
+    trace = run(("counting.py", "goal_client.py"), starts_ns=(("counting.py", NS_PER_S),), may_exit=("goal_client.py",))
+    assert [f"{r.t_ns // NS_PER_MS} {r.text}" for r in trace.records("goal_client.py")] == [
+        "1000 accepted True",
+        "1500 [0, 1]",
+        "2000 [0, 1, 2]",
+        "2500 [0, 1, 2, 3]",
+        "2500 result [0, 1, 2, 3]",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("file", "end"),
+    [
+        ("tidy.py", "1000 stopped tidy.py"),
+        ("clumsy.py", "1000 AttributeError: 'Node' object has no attribute 'motor'"),
+        ("deaf.py", "3000 did not end within 2 s after Ctrl-C"),
+    ],
+)
+def test_how_a_program_ends_after_ctrl_c_is_told(run, file, end):
+    """A second shutdown is normal; an exception of its own is not, and neither is to go on."""
+    trace = run((file,), seconds=1, shutdown_ns=2 * NS_PER_S)
+    assert [line for line in short(trace) if line.startswith(("1000", "3000"))] == [f"1000 stop_signal {file}", end]
 
 
 def test_the_wall_clock_sees_the_same(run):
