@@ -109,6 +109,15 @@ def test_fields_of_messages_and_imports_keep_their_names():
     )
 
 
+def test_a_variable_and_a_method_of_one_name_are_two_things():
+    """Each is renamed where it is meant, also through a variable that holds the object."""
+    source = "class A:\n    def b(self):\n        b = self.b()\n        return b\n\n\nx = A()\nx.b(b=1)\ny.b()\n"
+    assert VARIANTS["renamed_methods"](Program(source)) == source.replace("def b", "def do_b").replace(
+        "self.b", "self.do_b"
+    ).replace("x.b", "x.do_b")
+    assert "def b(self)" in VARIANTS["renamed_variables"](Program(source))
+
+
 def test_a_timer_that_the_program_keeps_is_no_loop():
     """Its name may be used elsewhere."""
     source = NODE.replace("        self.create_timer", "        self.timer = self.create_timer")
