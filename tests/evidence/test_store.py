@@ -11,7 +11,7 @@ import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
 from grader.model.errors import EvidenceError
-from grader.model.scenario import Span
+from grader.model.scenario import MessageStream, Scenario, Span
 from grader.recording.evidence.manifest import scenario_digest
 from grader.recording.evidence.store import check_place, first_report, found_under, open_evidence, run_of
 
@@ -236,3 +236,11 @@ def test_nothing_of_the_machine_is_kept(tmp_path):
     secret = Path("/somewhere/on/this/machine")
     kept_run(tmp_path, dataclasses.replace(run, submission=dataclasses.replace(run.submission, root=secret)))
     assert [name for name in files(tmp_path) if b"somewhere" in (tmp_path / name).read_bytes()] == []
+
+
+def test_scenarios_with_messages_have_digests_too():
+    """Fields of messages are mappings; the same ones give the same digest, others another."""
+    spans = [{"data": "a"}, {"data": "a"}, {"data": "b"}]
+    streams = [MessageStream("/t", "std_msgs/msg/String", (value,), period_ns=1) for value in spans]
+    first, same, other = (scenario_digest(Scenario("s", ("a.py",), Span(1), (stream,))) for stream in streams)
+    assert first == same != other
