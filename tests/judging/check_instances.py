@@ -56,4 +56,8 @@ INSTANCES: dict[str, Check] = {
     "clean_shutdown": CHECKS["clean_shutdown"]("velocity_publisher.py"),
     "parameter_declared": CHECKS["parameter_declared"]("speed", value=0.5),
     "parameter_takes_effect": CHECKS["parameter_takes_effect"]("speed", "/cmd_vel", field="linear.x"),
+    "action_result": CHECKS["action_result"]("/fibonacci"),
+    "action_feedback": CHECKS["action_feedback"]("/fibonacci"),
+    "lifecycle_states": CHECKS["lifecycle_states"](topic="/cmd_vel"),
+    "transform": CHECKS["transform"]("odom", "base_link"),
 }

@@ -1,5 +1,6 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
 
+from grader.judging.checks.actions import ActionFeedback, ActionResult
 from grader.judging.checks.clients import ServiceCalls, WaitsForService
 from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.checks.endings import CleanShutdown, NoFault
@@ -8,6 +9,7 @@ from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.graph import BidirectionalGraph
+from grader.judging.checks.lifecycle import LifecycleStates
 from grader.judging.checks.log_patterns import LogsMatching
 from grader.judging.checks.log_rhythm import LogsEvery
 from grader.judging.checks.log_values import LogsValues
@@ -22,6 +24,7 @@ from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, 
 from grader.judging.checks.timing import Latency, Period, Silence
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
+from grader.judging.checks.transforms import Transform
 
 #: Name in a rubric -> check; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {
@@ -65,6 +68,10 @@ CHECKS: dict[str, type] = {
     "clean_shutdown": CleanShutdown,
     "parameter_declared": ParameterDeclared,
     "parameter_takes_effect": ParameterTakesEffect,
+    "action_result": ActionResult,
+    "action_feedback": ActionFeedback,
+    "lifecycle_states": LifecycleStates,
+    "transform": Transform,
 }
 
 __all__ = ["CHECKS"]
