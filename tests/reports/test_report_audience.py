@@ -10,7 +10,7 @@ from report_samples import criterion, endpoint, exercise, hostile, report
 from grader.model.exercise import Location, Outcome
 from grader.model.feedback import Audience, Feedback, Shows
 from grader.model.figure import Chart, Excerpt, GraphFigure, Panel, Series, Stage
-from grader.model.report import ReportedFault
+from grader.model.report import ReportedFault, Reproduction
 from grader.model.trace import ClockKind, GraphSnapshot
 from grader.reports.audience import for_student, told, withholds
 from grader.reports.formats import FORMATS, Layout, rendered
@@ -86,6 +86,7 @@ def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
             situations={"open": "free", "numbers": "numbers", secret_id: "alone", "needs": "free"},
         ),
         seed=7357,
+        reproduce=Reproduction(("grade", SECRET, "--seed", NUMBER), (("pump", "sha256:" + NUMBER * 16),)),
     )
 
 
