@@ -9,13 +9,14 @@ from typing import Any
 
 from grader.authoring.answers import ANY, OF_THE_RUN, cases_seen, texts
 from grader.authoring.drafts import DraftCriterion, Quantity, as_id
+from grader.authoring.parameters import parameters
 from grader.judging.silence import student_endpoints
 from grader.judging.summary import summarise
 from grader.judging.values import carries_number, leaves
 from grader.judging.wording import counted, number
 from grader.model.quantities import seconds
 from grader.model.summary import TopicSummary
-from grader.model.trace import Delivery, Offer, Trace
+from grader.model.trace import Delivery, Trace
 
 #: Fewer messages tell no rate, and more spread of the intervals than this share of them is no rate.
 _FEWEST, _STEADY = 5, 0.2
@@ -190,17 +191,15 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
 
 
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
-    for offer in seen.driven.of(Offer):
-        if offer.kind != "parameter":
-            continue
-        node, _, parameter = offer.name.partition(":")
-        if parameter == "use_sim_time" or parameter.startswith(("qos_overrides", "start_type_description")):
-            continue
-        asked = {"node": node, "name": parameter}
-        comment = f"seen: {offer.detail}; decide: is its default asked for?"
-        hint = f"declare the parameter {parameter}"
-        title = f"Has the parameter {parameter}"
-        yield DraftCriterion(f"parameter_{as_id(parameter)}", title, "parameter_declared", asked, hint, "", comment)
+    for node, name, value in parameters(seen.alone):
+        asked: dict[str, Any] = {"name": name, **({"node": node} if node else {})}
+        comment = "decide: is this default asked for?"
+        if value is None:
+            comment = "its value is no number, text or truth value; decide: is it asked for at all?"
+        else:
+            asked["value"] = value
+        title, hint = f"Has the parameter {name}", f'declare_parameter("{name}", ...) before anybody asks for it'
+        yield DraftCriterion(f"parameter_{as_id(name)}", title, "parameter_declared", asked, hint, "", comment)
 
 
 def _logs(seen: Seen) -> Iterator[DraftCriterion]:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from grader.authoring.drafts import DraftStimulus, Quantity
+from grader.authoring.parameters import parameters
 from grader.judging.silence import student_endpoints
 from grader.judging.values import carries_number
 from grader.model.trace import Trace
@@ -31,7 +32,7 @@ def stimuli_for(
         duration_s: How long the scenario will last.
         given: Topic -> the fields of the messages to send there, where the author named some.
     """
-    return (*_topics(trace, duration_s, given), *_services(trace))
+    return (*_topics(trace, duration_s, given), *_services(trace), *_parameters(trace))
 
 
 def _topics(
@@ -77,3 +78,9 @@ def _services(trace: Trace) -> Iterator[DraftStimulus]:
         if service not in servers:
             given = {"service": service, "type": type_, "responses": [{}], "start": Quantity("1 s")}
             yield DraftStimulus("server", given, "decide: which responses? {} leaves all fields at their defaults")
+
+
+def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
+    for node, name, _ in parameters(trace):
+        asked = {"name": name, **({"node": node} if node else {}), "start": Quantity("1 s")}
+        yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: is it to be set as well?")

@@ -17,6 +17,7 @@ from grader.authoring.drafts import Draft, DraftCriterion, DraftStimulus, Quanti
 from grader.authoring.questions import Seen, questions
 from grader.authoring.skeleton import rubric_text
 from grader.authoring.stimulation import stimuli_for
+from grader.model.trace import Offer
 from grader.reading.rubric_file import read_rubric
 from grader.testing import TraceBuilder
 
@@ -105,6 +106,22 @@ def test_services_logs_and_calls_are_asked_for():
     assert rows["offers_empty"] == ("service_available", {"service": "/empty", "type": TRIGGER})
     assert rows["calls_fill"] == ("service_calls", {"service": "/fill", "calls": 2})
     assert rows["pump_logs"] == ("uses_logger", {"process": "pump.py"})
+
+
+def test_parameters_are_asked_for_their_defaults():
+    """Read as a node tells them; lists have no value in the rubric, and what every node has is left out."""
+    told = {"speed": "1.5", "mode": "'fast'", "on": "True", "limits": "[1, 2]", "use_sim_time": "True", "odd": "nan"}
+    builder = pump().add(*(Offer(0, "pump.py", "parameter", f"/pump:{name}", text) for name, text in told.items()))
+    rows = {name: parameters.get("value") for name, (_, parameters) in asked(builder).items()}
+    assert rows == {
+        "parameter_speed": 1.5,
+        "parameter_mode": "fast",
+        "parameter_on": True,
+        "parameter_limits": None,
+        "parameter_odd": None,
+    }
+    stimuli = [s.parameters["name"] for s in stimuli_for(builder.trace(), 10) if s.kind == "parameter"]
+    assert stimuli == ["speed", "mode", "on", "limits", "odd"]
 
 
 def test_nan_is_asked_for_nothing():
