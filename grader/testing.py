@@ -221,5 +221,5 @@ class TraceBuilder:
             return []
         ends = sorted(self._ends, key=lambda e: (e.kind, e.topic, e.node))
         services = sorted(self._services, key=lambda e: (e.kind, e.service, e.node))
-        nodes = sorted({e.node for e in (*ends, *services)})
+        nodes = sorted({*(end.node for end in ends), *(end.node for end in services)})
         return [GraphSnapshot(0, tuple(nodes), tuple(ends), tuple(services))]
