@@ -11,25 +11,16 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Offer, Trace
-from grader.recording.claims import (
-    announce,
-    compatible,
-    counts,
-    is_claim,
-    offered,
-    readers_of,
-    serves,
-    takes_ordinary,
-)
+from grader.model.trace import ClockKind, Fault, Mark, Offer, Trace
+from grader.recording.broadcasts import Broadcasts
+from grader.recording.claims import announce, compatible, counts, is_claim, readers_of
 from grader.recording.desk import Desk
 from grader.recording.ending import ending, never_stopped, reported_fault
-from grader.recording.exchanges import PlannedCalls, PlannedMessages
-from grader.recording.interfaces import built, message_class, plain_fields
+from grader.recording.fitness import hopeless, unfit
+from grader.recording.matching import Matching
 from grader.recording.observer import Observer, Taken, wait_until
 from grader.recording.plan import Plan
-from grader.recording.stimuli import APPEARANCES, BROADCASTS, Due, number_message, numeric_field, schedule
+from grader.recording.stimuli import APPEARANCES, BROADCASTS, Due, schedule
 from grader.recording.student import Student
 from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
 
@@ -37,23 +28,9 @@ from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
 EPOCH_NS = 1_767_225_600_000_000_000
 #: How long, in real time, an endpoint or a message that was announced is waited for.
 SETTLE_S = 5.0
-#: Looking at the graph costs much: not so often that it holds up what is looked for.
-GRAPH_PAUSE_S = 0.003
 #: After so many messages that never came, later ones are waited for only briefly.
 PATIENCE = 3
 IMPATIENT_S = 0.05
-#: A node that needs more processor seconds than this a virtual second is judged on the real clock.
-BUSY_SHARE = 0.5
-#: Beyond that share of the whole observation, and this much more, there is no need to go on in virtual time.
-HOPELESS_NS = 2 * NS_PER_S
-#: What a host says when its program does not settle, in words.
-UNSETTLED = {
-    "threads": "the node's threads wait for each other without blocking",
-    "outside": "the node waits for something that is neither ROS nor time",
-}
-#: Processor time that a process may have used beyond what it says, as a share of virtual time and besides: looking at
-#: the clock again and again is not charged, but costs something.
-HIDDEN_SHARE, HIDDEN_NS = 1.0, 5 * NS_PER_S
 #: Wake-ups of one scenario; more end it.
 STEPS = 400_000
 #: A process that has more to say than this before it waits or ends does not talk like the host, nor does one that says
@@ -78,11 +55,23 @@ class Conductor:
         self._free_until_ns = 0
         self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._due = schedule(plan)
-        self._streams: dict[str, str] = {}
-        self._fixed: dict[str, PlannedMessages] = {}
         self._tape = Tape(plan.limits)
         nodes = lambda: self._tape.graph.nodes  # noqa: E731 - it changes
         self._desk = Desk(plan, observer.services, self._tape, nodes=nodes, later=self._later)
+        self._matching = Matching(students, observer, self._tape, self._desk, self._bury)
+        topics = Broadcasts(students, observer, self._tape, self._matching)
+        self._actions: Mapping[str, Callable[[Due, int], None]] = {
+            "appear": topics.appear,
+            "offer": topics.offer,
+            "publish": topics.publish,
+            "say": topics.say,
+            "disappear": topics.disappear,
+            "serve": self._serve,
+            "dismiss": self._dismiss,
+            "answer": self._answer,
+            "meet": self._meet,
+            "call": self._call,
+        }
         self._starts_ns = dict(plan.starts_ns)
         self._stop_ns = 0
         self._losses = 0
@@ -99,15 +88,15 @@ class Conductor:
                 self._step(student)
         self._run_on()
         if not any(s.ended for s in self._students):
-            self._look_at_graph()  # what has ended disappears from the graph at a moment that is nobody's
+            self._matching.look(self._now_ns)  # what has ended disappears from the graph at a moment that is nobody's
         self._stop_ns = self._end_ns
-        unfit = self._unfit()
-        if self._plan.shutdown_ns and not (unfit or self._tape.full):
+        why_not = unfit(self._students, self._tape.observations, self._now_ns, full=bool(self._tape.full))
+        if self._plan.shutdown_ns and not (why_not or self._tape.full):
             self._shut_down()
         return Trace(
             scenario=self._plan.scenario,
             clock=ClockKind.VIRTUAL,
-            clock_reason=unfit,
+            clock_reason=why_not,
             stop_ns=self._stop_ns,
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
@@ -180,7 +169,7 @@ class Conductor:
         self._hear(student)
         self._dismiss_done()
         self._steps += 1
-        if self._plan.stop_when_unfit and self._hopeless():
+        if self._plan.stop_when_unfit and hopeless(self._students, self._end_ns):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
@@ -251,7 +240,9 @@ class Conductor:
                 self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
             student.claims = [c for c in endpoints[:CLAIMS] if is_claim(c)]
             self._note_offers(student)
-            self._match()
+            self._matching.match(self._now_ns)
+            for due in self._desk.ready(self._matching.is_served):
+                self._later(Due(self._now_ns, due.action, due.topic, due.payload))
 
     def _note_offers(self, student: Student) -> None:
         """Write down the services, clients and parameters that a process has not told of before."""
@@ -296,7 +287,8 @@ class Conductor:
         self._desk.write_down(self._now_ns)
 
     def _record(self, message: Taken) -> None:
-        if message.topic == self._plan.first_message_on and not self._tape.seen(message.topic):
+        first = message.topic == self._plan.first_message_on and not self._tape.seen(message.topic)
+        if first and not self._stop_ns:
             self._end_ns = self._now_ns + self._plan.duration_ns
         self._tape.message(self._now_ns, message)
 
@@ -322,113 +314,6 @@ class Conductor:
             if not student.ended and ends:
                 announce(student.arrivals, f"{kind} {service}", count)
 
-    def _match(self) -> None:
-        """Wait until every endpoint that the processes say they have is seen, watched and matched."""
-        claims = [c for s in self._students if not s.ended for c in s.claims]
-        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        if not wait_until(lambda: self._sees(claims), SETTLE_S, pause_s=GRAPH_PAUSE_S):
-            self._tape.note("an endpoint that a node created was not seen in the graph")
-        self._look_at_graph()
-        unknown = self._observer.watch(self._tape.graph)
-        self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
-        writers = [c for c in ends if c["kind"] == "publisher"]
-        wait_until(lambda: all(self._watched(c, writers) for c in writers), SETTLE_S)
-        self._tell_all_matches()
-        for due in self._desk.ready(self._is_served):
-            self._later(Due(self._now_ns, due.action, due.topic, due.payload))
-
-    def _tell_all_matches(self) -> None:
-        """Have every process wait for the counterparts of its endpoints."""
-        claims = [c for s in self._students if not s.ended for c in s.claims]
-        for student in self._students:
-            if not student.ended and student.claims:
-                self._tell_matches(student, claims)
-
-    def _sees(self, claims: list[dict[str, Any]]) -> bool:
-        """Return whether the graph holds what the processes claim."""
-        graph = self._graph_now()
-        seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
-        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
-        offered = {(e.kind, e.service, e.type) for e in graph.services}
-        exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        nodes = {c["name"] for c in claims if c["kind"] == "node"}
-        return (
-            all(seen[key] >= count for key, count in wanted.items())
-            and exchanging <= offered
-            and nodes <= set(graph.nodes)
-        )
-
-    def _graph_now(self) -> GraphSnapshot:
-        """Return the live graph, with services where a process has said that it has any."""
-        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
-        return self._observer.graph(self._now_ns, services=services or bool(self._tape.graph.services))
-
-    def _is_served(self, calls: PlannedCalls) -> bool:
-        """Return whether the server that some calls need is there and matched."""
-        service = self._desk.resolved(calls.service)
-        claims = [c for s in self._students if not s.ended for c in s.claims]
-        if service is None or not any(serves(c, service, calls.type) for c in claims):
-            return False
-        self._desk.meet(calls)
-        if wait_until(lambda: self._observer.services.met(service), SETTLE_S):
-            return True
-        self._tape.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
-        return False
-
-    def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
-        same = [
-            w
-            for w in writers
-            if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])
-        ]
-        matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
-        # A reader that takes best effort also matches reliable writers: it may see more than its own.
-        return matched >= len(same) or not self._readable(claim["name"])
-
-    def _tell_matches(self, student: Student, claims: list[dict[str, Any]]) -> None:
-        """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
-        expected: dict[str, dict[str, list[int]]] = {}
-        for claim in student.claims:
-            count = self._counterparts(claim, claims)
-            if count:
-                expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
-        gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
-        if expected == student.told or not (expected or gone):
-            return
-        student.told = expected
-        student.tell({"match": expected, "gone": gone})
-        answer = student.report()
-        if answer is None or answer.get("kind") != "matched":
-            self._bury(student)
-            return
-        student.nudged = True  # a match is an event that a node may have a callback for
-        missing = answer.get("missing")
-        for name in missing[:WORDS] if isinstance(missing, list) else ():
-            self._tape.note(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
-
-    def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
-        kind, name = claim["kind"], claim["name"]
-        if kind == "publisher":
-            students = sum(compatible(claim, c) for c in claims if c["kind"] == "subscription")
-            return students + sum(
-                1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
-            )
-        if kind == "subscription":
-            fixed = self._fixed.get(name)
-            fits = takes_ordinary(claim) if fixed is None else compatible(offered(fixed), claim)
-            stimulus = self._streams.get(name) == claim["type"] and fits
-            return int(stimulus) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
-        if kind != "client":
-            return 0
-        return int(
-            self._desk.serves(name, claim["type"])
-            or any((c["kind"], c["name"], c["type"]) == ("service", name, claim["type"]) for c in claims)
-        )
-
-    def _look_at_graph(self) -> None:
-        self._tape.look(self._graph_now(), self._observer.participants())
-
     def _write_output(self, student: Student, *, final: bool) -> None:
         self._tape.add(*student.output(self._now_ns, final=final))
 
@@ -451,7 +336,7 @@ class Conductor:
             if phase and self._due[0].action not in APPEARANCES:
                 return
             due = self._due.pop(0)
-            self._do(due)
+            self._actions[due.action](due, self._now_ns)
             if due.action == "call":
                 return  # the next one follows when this one has arrived: so their order is always the same
 
@@ -459,139 +344,33 @@ class Conductor:
         """Have something done at a time, after everything else that is due then."""
         bisect.insort(self._due, due, key=lambda d: d.t_ns)
 
-    def _do(self, due: Due) -> None:
-        action: dict[str, Callable[[Due], None]] = {
-            "appear": self._appear,
-            "offer": self._offer,
-            "publish": self._publish,
-            "say": self._say,
-            "disappear": self._disappear,
-            "serve": self._serve,
-            "dismiss": self._dismiss,
-            "answer": self._answer,
-            "meet": self._meet,
-            "call": self._call,
-        }
-        action[due.action](due)
-
-    def _disappear(self, due: Due) -> None:
-        self._streams.pop(due.topic, None)
-        self._fixed.pop(due.topic, None)
-        self._observer.withdraw(due.topic)
-        self._tape.add(Mark(self._now_ns, "stream_stops", due.topic))
-
-    def _meet(self, due: Due) -> None:
+    def _meet(self, due: Due, now_ns: int) -> None:
+        del now_ns
         self._desk.meet(due.payload)
 
-    def _serve(self, due: Due) -> None:
-        self._desk.serve(self._now_ns, due.payload)
-        self._tell_all_matches()
+    def _serve(self, due: Due, now_ns: int) -> None:
+        self._desk.serve(now_ns, due.payload)
+        self._matching.tell_all()
 
-    def _dismiss(self, due: Due) -> None:
-        self._desk.dismiss(self._now_ns, due.payload)
-        self._tell_all_matches()
+    def _dismiss(self, due: Due, now_ns: int) -> None:
+        self._desk.dismiss(now_ns, due.payload)
+        self._matching.tell_all()
 
     def _dismiss_done(self) -> None:
         """Let servers go that have given their last answer, when it has arrived."""
         for server in self._desk.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
-                self._dismiss(Due(self._now_ns, "dismiss", server.service, server))
+                self._dismiss(Due(self._now_ns, "dismiss", server.service, server), self._now_ns)
 
-    def _answer(self, due: Due) -> None:
+    def _answer(self, due: Due, now_ns: int) -> None:
         server, number = due.payload
-        if self._desk.answer(self._now_ns, server, number):
+        if self._desk.answer(now_ns, server, number):
             self._announce_exchange("response", server.service, 1)
 
-    def _call(self, due: Due) -> None:
+    def _call(self, due: Due, now_ns: int) -> None:
         """Send a request, or keep it until its server is there."""
-        if self._is_served(due.payload.calls):
-            service = self._desk.call(self._now_ns, due.payload)
+        if self._matching.is_served(due.payload.calls):
+            service = self._desk.call(now_ns, due.payload)
             self._announce_exchange("request", service, 1)
         else:
             self._desk.wait(due)
-
-    def _offer(self, due: Due) -> None:
-        """Create the publisher of messages of a fixed type."""
-        stream = due.payload
-        self._fixed[due.topic] = stream
-        self._streams[due.topic] = stream.type
-        self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
-        readers = [c for s in self._students for c in readers_of(s, due.topic) if compatible(offered(stream), c)]
-        wait_until(lambda: self._observer.subscribers_matched(due.topic) >= len(readers), SETTLE_S)
-        self._tell_all_matches()
-        self._tape.add(Mark(self._now_ns, "stream_starts", due.topic))
-
-    def _say(self, due: Due) -> None:
-        """Publish one message of a fixed type."""
-        stream, fields = due.payload
-        message = built(message_class(stream.type), fields, due.topic)
-        self._tape.add(Delivery(self._now_ns, due.topic, stream.type, plain_fields(message)))
-        self._observer.publish(due.topic, message)
-        for student in self._students:
-            if any(compatible(offered(stream), c) for c in readers_of(student, due.topic)):
-                announce(student.arrivals, f"topic {due.topic}", 1)
-
-    def _appear(self, due: Due) -> None:
-        """Create a stimulus's publisher, of the type and durability that the students' subscriptions ask for."""
-        self._start_stream(due.topic, due.payload)
-        self._tape.add(Mark(self._now_ns, "stream_starts", due.topic))
-
-    def _start_stream(self, topic: str, default: str) -> None:
-        asked = [c for s in self._students for c in readers_of(s, topic)]
-        carrying = [c for c in asked if default == c["type"] or numeric_field(c["type"]) is not None]
-        interface = carrying[0]["type"] if carrying and "nav_msgs" not in default else default
-        latched = any(c["latched"] for c in asked if c["type"] == interface)
-        self._observer.advertise(topic, interface, latched=latched)
-        self._streams[topic] = interface
-        readers = [c for c in asked if c["type"] == interface and takes_ordinary(c)]
-        wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
-        self._tell_all_matches()
-
-    def _publish(self, due: Due) -> None:
-        """Publish one message of a stimulus and note for whom it is on its way."""
-        self._follow_type(due.topic)
-        interface = self._streams[due.topic]
-        if interface == "nav_msgs/msg/Odometry":
-            cdr, value = due.payload
-            message: Any = cdr
-        else:
-            message, value = number_message(interface, due.payload)
-            cdr = b""
-        self._tape.add(Delivery(self._now_ns, due.topic, interface, value, cdr))
-        self._observer.publish(due.topic, message)
-        for student in self._students:
-            if any(c["type"] == interface and takes_ordinary(c) for c in readers_of(student, due.topic)):
-                announce(student.arrivals, f"topic {due.topic}", 1)
-
-    def _follow_type(self, topic: str) -> None:
-        """Change a stimulus's type or durability when a student's node subscribed with another one."""
-        current = self._streams[topic]
-        asked = [c for s in self._students for c in readers_of(s, topic)]
-        if current == "nav_msgs/msg/Odometry" or not asked or any(c["type"] == current for c in asked):
-            return
-        if any(numeric_field(c["type"]) is not None for c in asked):
-            self._observer.withdraw(topic)
-            self._start_stream(topic, current)
-
-    def _hopeless(self) -> bool:
-        """Return whether it is clear already that virtual time hides how much processor time a node needs."""
-        busiest_ns = max(s.used_ns for s in self._students)
-        return busiest_ns > BUSY_SHARE * self._end_ns + HOPELESS_NS or self._hides_work(self._end_ns)
-
-    def _hides_work(self, virtual_ns: int) -> bool:
-        """Return whether a process has used much more processor time than it says."""
-        hidden_ns = max((s.measured_ns - s.ready_ns - s.used_ns for s in self._students), default=0)
-        return hidden_ns > HIDDEN_SHARE * virtual_ns + HIDDEN_NS
-
-    def _unfit(self) -> str:
-        """Say why virtual time does not do these nodes justice, if it does not."""
-        seen = self._tape.observations
-        if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
-            return next((UNSETTLED[s.unsettled] for s in self._students if s.unsettled in UNSETTLED), "")
-        if self._tape.full:
-            return ""
-        virtual_ns = max(self._now_ns, NS_PER_S)
-        busiest_ns = max((s.used_ns for s in self._students), default=0)
-        if busiest_ns > BUSY_SHARE * virtual_ns or self._hides_work(virtual_ns):
-            return "the node needs so much processor time that virtual time would hide it"
-        return ""

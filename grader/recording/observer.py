@@ -17,7 +17,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from grader.model.limits import Limits
 from grader.model.quantities import MIB, size
@@ -218,6 +218,11 @@ class Observer:
     def withdraw(self, topic: str) -> None:
         """Take the publisher of a stimulus out of the graph."""
         self.node.destroy_publisher(self._writers.pop(topic))
+
+
+def size_of(message: Any) -> int:
+    """Return how many bytes a message takes on the wire."""
+    return len(serialize_message(message))
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float = 0.0003) -> bool:

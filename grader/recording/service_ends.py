@@ -15,6 +15,10 @@ from grader.recording.interfaces import interface_class
 BACKGROUND_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
 
 
+#: Requests that are taken at once at most.
+AT_ONCE = 1000
+
+
 @dataclass(frozen=True, slots=True)
 class Arrived:
     """A request or a response that came.
@@ -80,8 +84,11 @@ class ServiceEnds:
         server = self._servers[service]
         found = []
         with server.handle:
-            while (taken := server.handle.service_take_request(server.srv_type.Request))[0] is not None:
-                found.append(Arrived(service, taken[1].source_timestamp, taken[0], header=taken[1]))
+            for _ in range(AT_ONCE):
+                request, header = server.handle.service_take_request(server.srv_type.Request)
+                if request is None:
+                    break
+                found.append(Arrived(service, header.source_timestamp, request, header=header))
         return found
 
     def take_responses(self, service: str) -> list[Arrived]:

@@ -26,8 +26,8 @@ from scripted import (
 from grader.host import clock as host_clock
 from grader.model.limits import Limits
 from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
+from grader.recording import broadcasts, fitness, matching, tape
 from grader.recording import conductor as module
-from grader.recording import tape
 from grader.recording.conductor import Conductor
 from grader.recording.plan import PlannedRecording
 
@@ -35,7 +35,8 @@ from grader.recording.plan import PlannedRecording
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
     """Nothing in these tests is on its way in real time."""
-    monkeypatch.setattr(module, "SETTLE_S", 0.0)
+    for room in (module, matching, broadcasts):
+        monkeypatch.setattr(room, "SETTLE_S", 0.0)
     monkeypatch.setattr(module, "IMPATIENT_S", 0.0)
 
 
@@ -446,7 +447,7 @@ def test_notes_are_few_and_short():
 def test_a_program_that_does_not_settle_is_for_the_other_clock(why):
     """The host says which of the known reasons; any other word of its own counts for nothing."""
     hung = {"kind": "exited", "fault": {"kind": "hung", "text": "x"}}
-    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == module.UNSETTLED[why]
+    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == fitness.UNSETTLED[why]
     assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
 
 
