@@ -61,8 +61,10 @@ def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
     """Return a schema of values, each of which may be a variant instead."""
     for word in ("anyOf", "oneOf"):
         if word in node:
+            rest = {key: value for key, value in node.items() if key != word}
             options = [_inside(option) for option in node[word]]
-            return {**node, word: [*options, _REFERS] if any(map(_is_scalar, node[word])) else options}
+            # One mapping may look like several things: the fields of a message, something drawn, a variant.
+            return {**rest, "anyOf": [*options, _REFERS] if any(map(_is_scalar, node[word])) else options}
     return {"anyOf": [node, _REFERS]} if _is_scalar(node) else _inside(node)
 
 
