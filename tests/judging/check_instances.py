@@ -60,4 +60,6 @@ INSTANCES: dict[str, Check] = {
     "action_feedback": CHECKS["action_feedback"]("/fibonacci"),
     "lifecycle_states": CHECKS["lifecycle_states"](topic="/cmd_vel"),
     "transform": CHECKS["transform"]("odom", "base_link"),
+    "source_uses": CHECKS["source_uses"]("velocity_publisher.py", ("rclpy.node.Node",)),
+    "source_avoids": CHECKS["source_avoids"]("velocity_publisher.py", ("time.sleep",)),
 }

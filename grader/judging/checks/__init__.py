@@ -21,6 +21,7 @@ from grader.judging.checks.reactions import Reaction
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.service_sequence import ServiceSequence
 from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
+from grader.judging.checks.sources import SourceAvoids, SourceUses
 from grader.judging.checks.timing import Latency, Period, Silence
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
@@ -72,6 +73,8 @@ CHECKS: dict[str, type] = {
     "action_feedback": ActionFeedback,
     "lifecycle_states": LifecycleStates,
     "transform": Transform,
+    "source_uses": SourceUses,
+    "source_avoids": SourceAvoids,
 }
 
 __all__ = ["CHECKS"]
