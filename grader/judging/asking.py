@@ -13,7 +13,7 @@ from grader.judging.findings import not_met
 from grader.judging.silence import fault_hint, first_fault, student_endpoints
 from grader.judging.wording import fault_sentence, quote
 from grader.model.errors import HarnessError
-from grader.model.exercise import Criterion, Exercise, Finding
+from grader.model.exercise import Check, Criterion, Exercise, Finding, SourceCheck
 from grader.model.scenario import Scenario
 from grader.model.submission import Submission
 from grader.model.trace import Fault, FaultKind, Request, Response, Trace
@@ -44,8 +44,14 @@ def check_name(criterion: Criterion) -> str:
     return criterion.check_name or next(known, type(criterion.check).__name__)
 
 
-def ask(criterion: Criterion, exercise: Exercise, traces: Mapping[str, Trace], submission: Submission) -> Answer:
-    """Return what the criterion's check finds in the trace of its scenario."""
+def ask(
+    criterion: Criterion,
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None = None,
+) -> Answer:
+    """Return what the criterion's check finds in the trace of its scenario, or in the text of its files."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
     if missing:
@@ -55,13 +61,30 @@ def ask(criterion: Criterion, exercise: Exercise, traces: Mapping[str, Trace], s
         return Answer(problem=f"the scenario {scenario.id} was not recorded")
     if trace.harness_problem:
         return Answer(problem=trace.harness_problem)
-    return _judged(criterion, scenario, trace)
+    answer = _judged(criterion, scenario, trace, sources)
+    if answer.finding is None or not isinstance(criterion.check, SourceCheck):
+        return answer
+    return replace(answer, finding=_placed(answer.finding, submission))
 
 
-def _judged(criterion: Criterion, scenario: Scenario, trace: Trace) -> Answer:
+def _placed(finding: Finding, submission: Submission) -> Finding:
+    """Return the finding with the path under which its file was found."""
+    place = finding.location
+    found = submission.files[place.file].found if place is not None and place.file in submission.files else None
+    return finding if place is None or not found else replace(finding, location=replace(place, file=found))
+
+
+def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
+    """Return the finding of a check, which may want to see the students' files too."""
+    if sources is not None and isinstance(check, SourceCheck):
+        return check.judge_sources(trace, sources)
+    return check.judge(trace)
+
+
+def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None) -> Answer:
     name = check_name(criterion)
     try:
-        finding = criterion.check.judge(trace)
+        finding = _put(criterion.check, trace, sources)
     except HarnessError as error:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
     except (Exception, SystemExit) as error:  # a check that fails must cost no points and must not end the report

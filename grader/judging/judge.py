@@ -34,7 +34,7 @@ def judge_exercise(
     before is blocked by it, not lost once more. A check that raises, and a recording that failed, leave a criterion
     undecided.
     """
-    answers: dict[str, Answer] = {c.id: ask(c, exercise, traces, submission) for c in exercise.criteria}
+    answers: dict[str, Answer] = {c.id: ask(c, exercise, traces, submission, sources) for c in exercise.criteria}
     bench = Bench(exercise, answers, submission)
     recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from grader.model.feedback import OPEN, Feedback
 from grader.model.scenario import Scenario
@@ -58,6 +58,15 @@ class Check(Protocol):
 
     def judge(self, trace: Trace) -> Finding:
         """Return what the trace says; pure, and never raises for anything a student can do."""
+        ...
+
+
+@runtime_checkable
+class SourceCheck(Protocol):
+    """A check that also reads the text of the students' files."""
+
+    def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
+        """Return what the files, by their wanted names, and the trace say; as pure as `judge`."""
         ...
 
 

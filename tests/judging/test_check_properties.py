@@ -62,7 +62,9 @@ TRACES = {
     "empty": Recording(),
 }
 
-NAMES = st.sampled_from(["/cmd_vel", "/battery/get_status", "/odom", "/temperature", "/fan_speed", "/x", "/rosout"])
+NAMES = st.sampled_from(
+    ["/tf", "/cmd_vel", "/battery/get_status", "/odom", "/temperature", "/fan_speed", "/x", "/rosout"]
+)
 TYPES = st.sampled_from([TWIST, ODOMETRY, FLOAT32, "std_msgs/msg/String", "\ud800\n"])
 FILES = st.sampled_from(
     [
@@ -83,6 +85,13 @@ VALUES = st.one_of(
     st.builds(lambda a, b: twist((a, 0, 0), (0, 0, b)), NUMBERS, NUMBERS),
     POSITIONS,
     st.just({"linear": 3, "pose": "\ud800"}),
+    st.builds(lambda v: {"names": ["speed"], "values": [v]}, st.one_of(NUMBERS, st.just({"type": 3}))),
+    st.builds(
+        lambda v: {"parameters": [{"name": "speed", "value": {"type": 3, "double_value": v}}, v], "results": [v]},
+        NUMBERS,
+    ),
+    st.builds(lambda v: {"results": [{"successful": True, "reason": v}], "accepted": True, "status": v}, NUMBERS),
+    st.builds(lambda v: {"transition": {"id": v, "label": v}, "current_state": v, "transforms": [v, {}]}, NUMBERS),
     st.builds(lambda s, m: {"success": s, "message": m}, NUMBERS, st.one_of(NUMBERS, st.text(max_size=9))),
 )
 TEXTS = st.one_of(st.text(max_size=40), st.builds(lambda a, b: f"x={a} y={b}", st.floats(), st.floats()))
@@ -99,6 +108,10 @@ ENDPOINTS = st.builds(
 MARKS = st.sampled_from(
     ["stream_starts", "stream_stops", "limit", "server_starts", "server_stops", "exited", "stop_signal", "stopped"]
 )
+SERVICES = st.sampled_from(
+    [BATTERY, "/d/get_parameters", "/d/set_parameters", "/d/change_state", "/d/get_state"]
+    + [f"/fibonacci/_action/{name}" for name in ("send_goal", "get_result")]
+)
 SENDERS = st.sampled_from(["grader", "student"])
 SERVICE_ENDS = st.builds(
     ServiceEnd, st.sampled_from(["service", "client"]), st.sampled_from([BATTERY, "/b"]), TYPES, st.just("/a")
@@ -110,8 +123,8 @@ OBSERVATIONS = st.one_of(
     st.builds(OutputLine, TIMES, FILES, st.sampled_from(["stdout", "stderr"]), TEXTS),
     st.builds(Fault, TIMES, FILES, st.sampled_from(list(FaultKind)), TEXTS),
     st.builds(Mark, TIMES, MARKS, st.one_of(NAMES, FILES)),
-    st.builds(Request, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
-    st.builds(Response, TIMES, st.just(BATTERY), TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
+    st.builds(Request, TIMES, SERVICES, TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
+    st.builds(Response, TIMES, SERVICES, TYPES, st.integers(0, 3), SENDERS, st.integers(0, 2), VALUES),
     st.builds(lambda t, e: GraphSnapshot(t, (), (), tuple(e)), TIMES, st.lists(SERVICE_ENDS, max_size=3)),
     st.builds(lambda t, e: GraphSnapshot(t, (), tuple(e)), TIMES, st.lists(ENDPOINTS, max_size=4)),
 )

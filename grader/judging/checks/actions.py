@@ -1,0 +1,252 @@
+"""Checks on a student's action server: the result of a goal, and the feedback on the way to it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Literal
+
+from grader.judging.findings import met, not_met
+from grader.judging.paths import NoSuchField, at_path
+from grader.judging.rules import FieldRule, breach, broken_rules, shown, told
+from grader.judging.services import LATENESS_NS, Call, calls_of
+from grader.judging.silence import fault_hint, first_fault
+from grader.judging.values import as_number, published
+from grader.judging.wording import counted, fault_sentence, listed, moment, nearest, number, quote, span
+from grader.model.errors import HarnessError
+from grader.model.exercise import Finding
+from grader.model.quantities import DurationNs, seconds
+from grader.model.trace import Message, Trace
+
+#: Numbers of action_msgs/msg/GoalStatus.
+_STATUSES: Mapping[int, str] = {
+    1: "accepted",
+    2: "executing",
+    3: "canceling",
+    4: "succeeded",
+    5: "canceled",
+    6: "aborted",
+}
+_FINISH_HINTS = {
+    "succeeded": "call goal_handle.succeed() before the result is returned",
+    "canceled": "look at goal_handle.is_cancel_requested, then call goal_handle.canceled()",
+    "aborted": "call goal_handle.abort() before the result is returned",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ActionResult:
+    """Every goal that was sent to a student's action server is accepted and ends with the status and result expected.
+
+    Attributes:
+        action: Action name as on the wire, e.g. `/fibonacci`.
+        status: How a goal has to end; `rejected` for one that must not be accepted.
+        result: What is expected by field path of the result: a value, or `{equals, items, tolerance, low, high,
+            pattern, example}`.
+        within: How long it may take from the goal to its result; free if left out.
+    """
+
+    action: str
+    status: Literal["succeeded", "canceled", "aborted", "rejected"] = "succeeded"
+    result: Mapping[str, str | float | bool | FieldRule] = field(default_factory=dict)
+    within: DurationNs | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        result = f" with {told(self.result)}" if self.result else ""
+        within = "" if self.within is None else f" within {number(seconds(self.within))} s"
+        return f"every goal for {self.action} {self.status}{result}{within}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if all goals end so; the reason names the first that does not."""
+        goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
+        if not goals:
+            return explain_no_action(trace, self.action)
+        results = calls_of(trace, f"{self.action}/_action/get_result", "grader")
+        evidence = {"action": self.action, "goals": len(goals), "results": sum(r.response is not None for r in results)}
+        for place, goal in enumerate(goals, 1):
+            flaw, hint = self._flaw(trace, goal, results)
+            if flaw:
+                reason = f"{moment(goal.request.t_ns)}, {self.action}, goal {place}: {flaw}"
+                return _unless_crashed(trace, not_met(reason, evidence, hint=hint), goal)
+        reason = f"{self.action}: {counted(len(goals), 'goal')} {self.status}"
+        return met(f"{reason}{', ' + told(self.result) if self.result else ''}", evidence)
+
+    def _flaw(self, trace: Trace, goal: Call, results: Sequence[Call]) -> tuple[str, str]:
+        """Return what is wrong with the end of a goal, and a hint; empty if nothing is."""
+        if goal.response is None:
+            return "no answer to the goal", "spin the node, and return a GoalResponse from its goal callback"
+        accepted = goal.response.value.get("accepted") is True
+        if self.status == "rejected":
+            return ("accepted, expected that it is rejected", "") if accepted else ("", "")
+        if not accepted:
+            return f"rejected, expected that it {_ends(self.status)}", "accept the goal: GoalResponse.ACCEPT"
+        mine = next((r for r in results if _goal_id(r.request.value) == _goal_id(goal.request.value)), None)
+        if mine is None or mine.response is None:
+            if mine is not None and self._still_running(trace, goal):
+                raise HarnessError(f"{self.action}: the recording ends before the result is due")
+            return f"no result in {span(trace.stop_ns - goal.request.t_ns)}", ""
+        return self._result_flaw(trace, goal, mine)
+
+    def _result_flaw(self, trace: Trace, goal: Call, mine: Call) -> tuple[str, str]:
+        assert mine.response is not None
+        took = mine.response.t_ns - goal.request.t_ns
+        status = mine.response.value.get("status")
+        ended = _STATUSES.get(status, f"status {status}") if isinstance(status, int) else "without a status"
+        if ended != self.status:
+            return f"{ended}, expected that it {_ends(self.status)}", _FINISH_HINTS.get(self.status, "")
+        result = mine.response.value.get("result")
+        result = result if isinstance(result, Mapping) else {}
+        wrong = broken_rules(result, self.result)
+        if wrong:
+            return f"in its result {breach(result, wrong[0], self.result[wrong[0]])}", ""
+        if self.within is not None and took > self.within + LATENESS_NS[trace.clock]:
+            return f"its result came after {seconds(took):.3f} s, expected within {number(seconds(self.within))} s", ""
+        return "", ""
+
+    def _still_running(self, trace: Trace, goal: Call) -> bool:
+        return self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
+
+
+@dataclass(frozen=True, slots=True)
+class ActionFeedback:
+    """While a goal is worked on, a student's action server publishes feedback: so often, rightly, and growing.
+
+    Attributes:
+        action: Action name as on the wire.
+        at_least: Fewest messages of feedback for each goal.
+        at_most: Most messages of feedback for each goal; any number if left out.
+        fields: What is expected in each of them by field path of the feedback, as in `action_result`.
+        grows: Field path of a number that rises, or of a list that gets longer, from each to the next.
+        period: Average time expected from one to the next; free if left out.
+        tolerance: Largest difference of the average, as a share of the period.
+    """
+
+    action: str
+    at_least: int = 1
+    at_most: int | None = None
+    fields: Mapping[str, str | float | bool | FieldRule] = field(default_factory=dict)
+    grows: str | None = None
+    period: DurationNs | None = None
+    tolerance: float = 0.1
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        grows = f", {self.grows} growing" if self.grows else ""
+        each = f", in each {told(self.fields)}" if self.fields else ""
+        return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if the feedback on every accepted goal is right; the reason names the first mistake."""
+        goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
+        if not goals:
+            return explain_no_action(trace, self.action)
+        accepted = [g for g in goals if g.response is not None and g.response.value.get("accepted") is True]
+        if not accepted:
+            reason = f"{self.action}: none of {counted(len(goals), 'goal')} was accepted"
+            return _unless_crashed(trace, not_met(reason, blocked_by="action_result"), goals[0])
+        messages = published(trace, f"{self.action}/_action/feedback")
+        counts = []
+        for place, goal in enumerate(accepted, 1):
+            mine = [m for m in messages if _goal_id(m.value) == _goal_id(goal.request.value)]
+            counts.append(len(mine))
+            flaw = self._count_flaw(mine) or self._content_flaw(mine) or self._pace_flaw(mine)
+            if flaw:
+                evidence = {"goals": len(accepted), "feedback": counts}
+                hint = "call goal_handle.publish_feedback(...) at each step" if not mine else ""
+                return _unless_crashed(
+                    trace, not_met(f"{self.action}, goal {place}: {flaw}", evidence, hint=hint), goal
+                )
+        reason = f"{self.action}: {', '.join(map(str, counts[:10]))} messages of feedback"
+        return met(reason, {"goals": len(accepted), "feedback": counts})
+
+    def _count_flaw(self, mine: Sequence[Message]) -> str:
+        if self.at_least <= len(mine) and (self.at_most is None or len(mine) <= self.at_most):
+            return ""
+        most = "" if self.at_most is None else f" and at most {self.at_most}"
+        return f"{counted(len(mine), 'message')} of feedback, expected at least {self.at_least}{most}"
+
+    def _content_flaw(self, mine: Sequence[Message]) -> str:
+        for message in mine:
+            wrong = broken_rules(_feedback(message), self.fields)
+            if wrong:
+                said = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
+                return f"in the feedback at {moment(message.t_ns)} {said}"
+        if self.grows is None:
+            return ""
+        for before, after in pairwise(mine):
+            sizes = _size(before, self.grows), _size(after, self.grows)
+            if sizes[0] is None or sizes[1] is None or not sizes[1] > sizes[0]:
+                found = shown(_held(after, self.grows))
+                return f"{self.grows} is {found} at {moment(after.t_ns)}, after {shown(_held(before, self.grows))}"
+        return ""
+
+    def _pace_flaw(self, mine: Sequence[Message]) -> str:
+        if self.period is None or len(mine) < 2:
+            return ""
+        average = (mine[-1].t_ns - mine[0].t_ns) / (len(mine) - 1)
+        if abs(average - self.period) <= self.tolerance * self.period * (1 + 1e-9):
+            return ""
+        wanted = f"{number(seconds(self.period))} s ± {number(100 * self.tolerance)} %"
+        return f"one message every {average / 1e9:.3f} s on average, expected every {wanted}"
+
+
+def _ends(status: str) -> str:
+    return {"succeeded": "succeeds", "canceled": "is canceled", "aborted": "aborts"}.get(status, status)
+
+
+def _goal_id(value: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(at_path(value, "goal_id.uuid"), default=str)
+    except NoSuchField:
+        return ""
+
+
+def _feedback(message: Message) -> Mapping[str, Any]:
+    found = message.value.get("feedback")
+    return found if isinstance(found, Mapping) else {}
+
+
+def _held(message: Message, path: str) -> Any:
+    try:
+        return at_path(_feedback(message), path)
+    except NoSuchField:
+        return None
+
+
+def _size(message: Message, path: str) -> float | None:
+    found = _held(message, path)
+    return float(len(found)) if isinstance(found, (list, tuple, str)) else as_number(found)
+
+
+def _unless_crashed(trace: Trace, finding: Finding, goal: Call) -> Finding:
+    """Return the finding, or the fault that came after the goal was sent and explains it."""
+    fault = first_fault(trace)
+    if fault is None or fault.t_ns < goal.request.t_ns:
+        return finding
+    reason = f"{fault_sentence(fault)}; {finding.reason}"
+    return not_met(reason, finding.evidence, hint=fault_hint(fault), fault=fault)
+
+
+def explain_no_action(trace: Trace, action: str) -> Finding:
+    """Return no credit and why no goal could be sent to an action.
+
+    Raises:
+        HarnessError: There was nothing to keep one from being sent.
+    """
+    fault = first_fault(trace)
+    if fault is not None:
+        reason = f"{fault_sentence(fault)}; no goal could be sent to {action}"
+        return not_met(reason, hint=fault_hint(fault), fault=fault)
+    ends = [e.service for e in trace.service_ends("service")]
+    seen = sorted({e.partition("/_action/")[0] for e in ends if "/_action/" in e})
+    if action in seen:
+        raise HarnessError(f"{action}: the recording sends it no goal")
+    near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
+    found = f"; seen: {listed(seen)}" if seen else ""
+    hint = f"name the action {action} instead of {quote(near)}" if near else ""
+    return not_met(f"{action}: no action server in {span(trace.stop_ns)}{found}", {"seen": seen[:20]}, hint=hint)
