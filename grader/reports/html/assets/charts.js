@@ -2,7 +2,7 @@
 const Charts = (() => {
   const colour = (tone) => `var(--c-${tone})`;
   const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect" };
-  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER] = [52, 150, 210, 48, 34, 20, 40, 26];
+  const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER, LABEL] = [52, 150, 210, 48, 34, 20, 40, 26, 15];
   const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
 
   function number(value) {
@@ -52,6 +52,20 @@ const Charts = (() => {
     return extent([...values, ...panel.bands.flatMap((b) => [b.low, b.high]), ...panel.levels.map((l) => l.value)]);
   }
 
+  // How far down each band's label has to move so that none lies on another: upwards where there is room, else downwards.
+  function shifts(bands, axis, height) {
+    const top = bands.map((band) => ((axis.max - band.high) / (axis.max - axis.min)) * height);
+    const order = [...bands.keys()].sort((a, b) => top[a] - top[b]);
+    const wanted = top.map((place) => Math.min(place, height - LABEL));
+    for (let k = order.length - 2; k >= 0; k -= 1) {
+      wanted[order[k]] = Math.max(0, Math.min(wanted[order[k]], wanted[order[k + 1]] - LABEL));
+    }
+    for (let k = 1; k < order.length; k += 1) {
+      wanted[order[k]] = Math.max(wanted[order[k]], wanted[order[k - 1]] + LABEL);
+    }
+    return wanted.map((place, index) => place - top[index]);
+  }
+
   // Where each panel lies, from the top; heights in pixels.
   function places(figure, width) {
     let top = figure.moments.length ? MOMENTS : 0;
@@ -99,6 +113,10 @@ const Charts = (() => {
     };
   }
 
+  function rangeY(panel, ends) {
+    return ends ? { min: ends[0], max: ends[1] } : niceAxis(...extentY(panel));
+  }
+
   function yAxis(panel, index, ends) {
     const shared = {
       gridIndex: index,
@@ -117,7 +135,7 @@ const Charts = (() => {
       const data = [...panel.lanes].reverse();
       return { ...shared, type: "category", data, axisLabel: label, z: 4 };
     }
-    const round = ends ? { min: ends[0], max: ends[1] } : niceAxis(...extentY(panel));
+    const round = rangeY(panel, ends);
     const label = { ...FONT, formatter: number, showMinLabel: !ends, showMaxLabel: !ends };
     return { ...shared, type: "value", ...round, axisLabel: label };
   }
@@ -170,7 +188,7 @@ const Charts = (() => {
   }
 
   // Bands, thresholds and moments: what is drawn behind the points.
-  function background(figure, panel, index, ends) {
+  function background(figure, panel, index, ends, height, endsY) {
     const label = { ...FONT, fontSize: 11, textBorderColor: "var(--card)", textBorderWidth: 3 };
     const levels = panel.levels.map((level) => ({
       yAxis: level.value,
@@ -184,11 +202,12 @@ const Charts = (() => {
         align: alignment(moment.x, ends) },
     }));
     const grid = panel.grid ? gridLines(panel, ends) : [];
-    const bands = panel.bands.map((band) => [
+    const moved = shifts(panel.bands, rangeY(panel, endsY), height);
+    const bands = panel.bands.map((band, at) => [
       {
         yAxis: band.low,
         itemStyle: { color: colour(band.tone), opacity: 0.14 },
-        label: { ...label, show: true, position: "insideTopRight", formatter: () => band.label },
+        label: { ...label, show: true, position: "insideTopRight", offset: [0, moved[at]], formatter: () => band.label },
       },
       { yAxis: band.high },
     ]);
@@ -295,7 +314,7 @@ const Charts = (() => {
     const series = [];
     const known = {};
     figure.panels.forEach((panel, index) => {
-      series.push(background(figure, panel, index, ends));
+      series.push(background(figure, panel, index, ends, place.rows[index].height, square && square.y));
       for (const one of panel.series) {
         known[series.length] = { panel, series: one };
         series.push(seriesOption(panel, index, one));
