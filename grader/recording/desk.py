@@ -60,6 +60,7 @@ class Desk:
         self._requests: Counter[str] = Counter()
         self._clients: dict[tuple[str, int, int], int] = {}
         self._called: dict[str, str] = {}
+        self._kept: list[PlannedCalls] = []  # clients are known by the identity of their calls, which must last
         self._open: dict[tuple[str, int, int], tuple[int, Call]] = {}
         self._waiting: list[Due] = []
         self._arrived: list[Arrived] = []
@@ -102,6 +103,7 @@ class Desk:
             key = (service, id(calls), client)
             if key not in self._clients:
                 self._called[service] = calls.type
+                self._kept.append(calls)
                 number = 1 + sum(known == service for known, _, _ in self._clients)
                 self._clients[key] = number
                 self._ends.meet(service, calls.type, number)
