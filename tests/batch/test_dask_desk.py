@@ -140,6 +140,7 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path):
     done = []
     with pytest.raises(HarnessError, match="found it gone"):
         done.extend(a.task.name for a in here.run([task(tmp_path, n) for n in NAMES], lambda name, step: None))
+    assert done == ["ada", "bob"]
     assert client.cancelled == []
 
 

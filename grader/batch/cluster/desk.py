@@ -18,6 +18,7 @@ from grader.batch.cluster.fleet import Fleet, lost
 from grader.batch.cluster.sending import answer_in, errand_of, failed, files_wanted, taken_in
 from grader.batch.parcels import Terms, pack
 from grader.batch.tasks import Attempt, Hear, Task
+from grader.model.errors import HarnessError
 
 #: Larger parcels are laid down on a worker instead of travelling through the scheduler with what is to be done.
 SCATTERED_BYTES = 1 << 20
@@ -85,7 +86,16 @@ class Desk:
             if key is not None and key in self._under_way:
                 attempt = self._settled(key)
                 if attempt is not None:
-                    yield attempt
+                    yield from self._handed_over(attempt, wanted)
+
+    def _handed_over(self, attempt: Attempt, wanted: Sequence[str]) -> Generator[Attempt, None, None]:
+        """Yield what came of a submission when others are on their way: no worker waits for the disk here."""
+        try:
+            yield from self._send_due(wanted)
+        except HarnessError:
+            yield attempt
+            raise
+        yield attempt
 
     def close(self) -> None:
         """Give up what is under way."""

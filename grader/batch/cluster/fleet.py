@@ -96,6 +96,15 @@ class Fleet:
         try:
             return dict(self._client.nthreads())
         except (OSError, TimeoutError):
+            if self._client.status != "running":
+                raise lost() from None
+        # One connection of several was closed, perhaps with what a worker that ended had to do with it.
+        return self._threads_once_more()
+
+    def _threads_once_more(self) -> dict[str, int]:
+        try:
+            return dict(self._client.nthreads())
+        except (OSError, TimeoutError):
             raise lost() from None
 
     def _check_scheduler(self) -> None:
