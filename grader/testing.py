@@ -55,14 +55,18 @@ def judge(check: Check, trace: Trace) -> Finding:
         trace: The trace.
 
     Raises:
-        ValueError: It gave something that is no good Finding, or another one when it was asked again.
+        ValueError: It gave something that is no good Finding, or another one when it was asked again, or it changed the
+            trace, which other checks read too.
     """
+    before = repr(trace)
     finding = check.judge(trace)
     wrong = breach(finding)
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
     if repr(check.judge(trace)) != repr(finding):  # NaN is no other NaN
         raise ValueError(f"{type(check).__name__} found something else when it was asked again")
+    if repr(trace) != before:
+        raise ValueError(f"{type(check).__name__} changed the trace")
     return finding
 
 

@@ -86,6 +86,18 @@ def test_a_finding_that_no_report_could_show_is_refused(finding, wrong):
         judge(Gives(finding), pump().trace())
 
 
+def test_a_check_that_changes_the_trace_is_refused():
+    """Other checks read it too."""
+
+    class Sorts:
+        def judge(self, trace):
+            trace.messages()[0].value["data"] = 0.0
+            return met("sorted")
+
+    with pytest.raises(ValueError, match="Sorts changed the trace"):
+        judge(Sorts(), pump().message(1, "/flow", FLOAT, {"data": 1.5}).trace())
+
+
 def test_a_check_that_changes_its_mind_is_refused():
     """Checks are pure: the same trace gives the same finding."""
 
