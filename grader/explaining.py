@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -123,9 +123,27 @@ def _written(value: Any, annotation: Any) -> str:
         return "none"
     if unit is not None:
         return format_quantity(value, unit)
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key}: {_written(inner, None)}" for key, inner in value.items())
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, (Mapping, tuple)):
+        return _several(value)
+    if is_dataclass(value):
+        return _parts(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _several(values: Mapping[str, Any] | tuple[Any, ...]) -> str:
+    if isinstance(values, tuple):
+        return ", ".join(_written(inner, None) for inner in values) or "none"
+    return ", ".join(f"{key}: {_written(inner, None)}" for key, inner in values.items()) or "none"
+
+
+def _parts(value: Any) -> str:
+    """Return those parts of a parameter that a rubric gives, as it writes them."""
+    hints = get_type_hints(type(value), include_extras=True)
+    given = [f for f in fields(value) if getattr(value, f.name) not in (f.default, (), {}, None)]
+    parts = (f"{f.name}: {_written(getattr(value, f.name), hints[f.name])}" for f in given)
+    return f"{{{', '.join(parts)}}}"
 
 
 def _unit(annotation: Any) -> Unit | None:

@@ -37,7 +37,9 @@ _PREFIX = "p_"
 
 #: What a parameter of a certain name has to look like, beyond being text.
 _BY_NAME: Mapping[str, Any] = {
-    **dict.fromkeys(("topic", "input", "output", "forward", "back", "service", "action"), Topic),
+    **dict.fromkeys(
+        ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
+    ),
     "type": MessageType,
     "process": PythonFile,
 }
@@ -122,7 +124,7 @@ def _accepted_generic(annotation: object, name: str) -> object:
     if origin in (Union, types.UnionType):
         return Union[tuple(_accepted(a, name) for a in arguments)]  # noqa: UP007
     if origin is tuple:
-        return tuple[tuple(a if a is ... else _accepted(a) for a in arguments)]  # type: ignore[misc]
+        return tuple[tuple(a if a is ... else _accepted(a, name) for a in arguments)]  # type: ignore[misc]
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return dict[str, _accepted(arguments[1])]  # type: ignore[misc]
     if origin is Literal or annotation is type(None):
