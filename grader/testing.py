@@ -18,7 +18,7 @@ from typing import Any
 
 from grader.judging.contract import breach
 from grader.judging.findings import met, not_met, partly
-from grader.model.exercise import Check, Finding
+from grader.model.exercise import Check, Finding, SourceCheck
 from grader.model.quantities import NS_PER_S, nanoseconds
 from grader.model.trace import (
     ClockKind,
@@ -47,27 +47,34 @@ _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
 Value = Mapping[str, Any] | Callable[[int], Mapping[str, Any]]
 
 
-def judge(check: Check, trace: Trace) -> Finding:
+def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) -> Finding:
     """Return what a check finds in a trace, after making sure that a report could be made of it.
 
     Args:
         check: The check; it is asked twice.
         trace: The trace.
+        sources: Text of the students' files by name, for a check that has `judge_sources`.
 
     Raises:
         ValueError: It gave something that is no good Finding, or another one when it was asked again, or it changed the
             trace, which other checks read too.
     """
     before = repr(trace)
-    finding = check.judge(trace)
+    finding = _asked(check, trace, sources)
     wrong = breach(finding)
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
-    if repr(check.judge(trace)) != repr(finding):  # NaN is no other NaN
+    if repr(_asked(check, trace, sources)) != repr(finding):  # NaN is no other NaN
         raise ValueError(f"{type(check).__name__} found something else when it was asked again")
     if repr(trace) != before:
         raise ValueError(f"{type(check).__name__} changed the trace")
     return finding
+
+
+def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
+    if sources is not None and isinstance(check, SourceCheck):
+        return check.judge_sources(trace, sources)
+    return check.judge(trace)
 
 
 @dataclass(slots=True)

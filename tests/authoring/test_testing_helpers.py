@@ -86,6 +86,20 @@ def test_a_finding_that_no_report_could_show_is_refused(finding, wrong):
         judge(Gives(finding), pump().trace())
 
 
+def test_a_check_may_see_the_files():
+    """It is then asked about them as well, and about the trace alone where there are none."""
+
+    class Short:
+        def judge(self, trace):
+            return met("not looked at")
+
+        def judge_sources(self, trace, sources):
+            return met(f"{len(sources['pump.py'])} characters")
+
+    assert judge(Short(), pump().trace(), {"pump.py": "abc"}).reason == "3 characters"
+    assert judge(Short(), pump().trace()).reason == "not looked at"
+
+
 def test_a_check_that_changes_the_trace_is_refused():
     """Other checks read it too."""
 
