@@ -35,7 +35,25 @@ POINTS = {
         "runs_together": 5,
         "bidirectional_graph": 4,
     },
+    "joint_publisher": {"publishes_float64": 6, "rate": 10, "angle": 9, "log_every_10th": 5},
+    "joint_subscriber": {"subscribes_joint_commands": 6, "logs_radians": 8, "logs_degrees": 8, "waits_gracefully": 8},
+    "battery_service": {
+        "offers_service": 3,
+        "answers_many_clients": 3,
+        "response_text": 4,
+        "drains_half_percent": 5,
+        "starts_again_at_100": 3,
+        "waits_for_service": 4,
+        "asks_five_times": 3,
+        "goes_on_above_20": 3,
+        "aborts_at_or_below_20": 3,
+        "no_go_when_refused": 2,
+        "no_go_when_puzzled": 2,
+        "no_go_when_deserted": 1,
+        "runs_together": 4,
+    },
 }
+PROJECTS = ("joint_publisher", "joint_subscriber", "battery_service")
 
 
 def exercise(name):
@@ -48,7 +66,9 @@ def test_the_criteria_and_points_are_the_promised_ones():
     assert got == POINTS
     assert [list(criteria) for criteria in got.values()] == [list(criteria) for criteria in POINTS.values()]
     assert list(got) == list(POINTS)
-    assert sum(sum(criteria.values()) for criteria in got.values()) == 100
+    assert sum(sum(criteria.values()) for name, criteria in got.items() if name not in PROJECTS) == 100
+    assert sum(sum(got[name].values()) for name in PROJECTS) == 100
+    assert [name for name in got if exercise(name).by_request] == list(PROJECTS)
 
 
 @pytest.mark.parametrize("name", list(POINTS))
@@ -158,8 +178,9 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatc
 
 
 def test_every_criterion_says_which_part_of_the_chapter_asks_for_it():
-    """By the exercise's number, and the number of the criterion or task there."""
+    """By the exercise's number and that of the criterion or task there; by the project's, and a name in its listing."""
     for path in builtin_rubrics().values():
         exercise = read_rubric(path)
-        begin = rf"Exercise {exercise.number}, (acceptance criterion|task) \d"
+        task = rf"Exercise {exercise.number}, (acceptance criterion|task) \d"
+        begin = rf"Part 2, {exercise.number}, \w" if exercise.id in PROJECTS else task
         assert [c.id for c in exercise.criteria if not re.match(begin, c.chapter)] == []

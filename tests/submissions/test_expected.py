@@ -18,6 +18,9 @@ FILES = {
     "velocity_publisher": {"velocity_publisher.py"},
     "odom_subscriber": {"odom_subscriber.py"},
     "two_node_communication": {"temperature_sensor.py", "fan_controller.py"},
+    "joint_publisher": {"simple_publisher.py"},
+    "joint_subscriber": {"simple_subscriber.py"},
+    "battery_service": {"battery_service_server.py", "battery_service_client.py"},
 }
 CRITERIA = {
     "velocity_publisher": {"publishes_twist", "rate", "linear_velocity", "angular_velocity", "logging"},
@@ -30,6 +33,23 @@ CRITERIA = {
         "fan_off_at_or_below_25",
         "runs_together",
         "bidirectional_graph",
+    },
+    "joint_publisher": {"publishes_float64", "rate", "angle", "log_every_10th"},
+    "joint_subscriber": {"subscribes_joint_commands", "logs_radians", "logs_degrees", "waits_gracefully"},
+    "battery_service": {
+        "offers_service",
+        "answers_many_clients",
+        "response_text",
+        "drains_half_percent",
+        "starts_again_at_100",
+        "waits_for_service",
+        "asks_five_times",
+        "goes_on_above_20",
+        "aborts_at_or_below_20",
+        "no_go_when_refused",
+        "no_go_when_puzzled",
+        "no_go_when_deserted",
+        "runs_together",
     },
 }
 
