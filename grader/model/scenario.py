@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from grader.model.limits import Limits
@@ -108,7 +108,8 @@ class Written:
     decimals: int = 1
 
 
-#: What a field of a planned message may hold; mappings are nested messages, tuples are sequences.
+#: What a field of a planned message may hold; mappings are nested messages, tuples are sequences. Mappings have no
+#: hash: stimuli that differ in nothing else share theirs, and are told apart by comparing them.
 FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
 
 
@@ -130,7 +131,7 @@ class MessageStream:
 
     topic: str
     type: str
-    values: tuple[Mapping[str, FieldSpec], ...]
+    values: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
     period_ns: int
     start_ns: int = 0
     repeats: int = 1
@@ -156,7 +157,7 @@ class ServiceServer:
 
     service: str
     type: str
-    responses: tuple[Mapping[str, FieldSpec], ...]
+    responses: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
     start_ns: int = 0
     stop_ns: int = 0
     delay_ns: int = 0
@@ -181,7 +182,7 @@ class ServiceCalls:
 
     service: str
     type: str
-    requests: tuple[Mapping[str, FieldSpec], ...]
+    requests: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
     calls: int = 1
     clients: int = 1
     period_ns: int = NS_PER_S
@@ -205,7 +206,7 @@ class ActionGoal:
 
     action: str
     type: str
-    goal: Mapping[str, FieldSpec]
+    goal: Mapping[str, FieldSpec] = field(hash=False)
     start_ns: int = 0
     cancel_after_ns: int = 0
 

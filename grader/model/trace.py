@@ -192,7 +192,7 @@ class GraphSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A student's process raised, hung or exited before the stop signal.
+    """A student's process raised, hung or exited; after the stop signal only where a scenario looks at that.
 
     Attributes:
         t_ns: When.
@@ -262,7 +262,7 @@ class Trace:
         scenario: Scenario id.
         clock: Which clock the nodes ran on.
         clock_reason: Why virtual time does not do these nodes justice; empty if it does.
-        stop_ns: When observation ended; the window is [0, stop_ns).
+        stop_ns: When observation ended; the window is [0, stop_ns). What comes after it followed the stop signal.
         observations: In order.
         notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
         harness_problem: What failed on our side or the machine's, and forbids judging; empty if nothing did.

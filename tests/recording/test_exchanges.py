@@ -12,8 +12,19 @@ pytest.importorskip("rclpy")
 from scripted import plan
 
 from grader.model.errors import HarnessError
-from grader.model.scenario import ActionGoal, Between, Choose, MessageStream, ServiceCalls, ServiceServer, Written
+from grader.model.scenario import (
+    ActionGoal,
+    Between,
+    Choose,
+    MessageStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    Span,
+    Written,
+)
 from grader.recording.desk import check_types
+from grader.recording.evidence.manifest import scenario_digest
 from grader.recording.exchanges import (
     PlannedServer,
     drawn_fields,
@@ -165,3 +176,13 @@ def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli, message):
 def test_a_type_is_known_by_its_name_and_kind(interface, kind, known):
     """Names come from students too: nothing else is looked up."""
     assert (interface_class(interface, kind) is not None) == known
+
+
+def test_scenarios_can_be_told_apart_and_looked_up():
+    """By their digest, which is remembered: what only differs in a field is another one."""
+    one, same, other = (
+        Scenario("a", ("a.py",), Span(5), (ServiceServer("/s", TRIGGER, ({"message": text},)),)) for text in "aab"
+    )
+    assert {one: 1}[same] == 1
+    assert one != other
+    assert scenario_digest(one) == scenario_digest(same) != scenario_digest(other)
