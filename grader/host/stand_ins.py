@@ -6,6 +6,7 @@ Tutorials import it without using it, and every full ROS installation has it, bu
 from __future__ import annotations
 
 import sys
+from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
@@ -46,24 +47,21 @@ def _missing() -> ModuleNotFoundError:
     return ModuleNotFoundError(f"No module named '{PACKAGE}'", name=PACKAGE)
 
 
-class StandIns:
+class StandIns(MetaPathFinder, Loader):
     """An importer that comes last: whatever is installed, or lies in the submission, goes before it."""
 
-    @staticmethod
-    def find_spec(name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+    def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
         """Return how to make a module of the package, or None for any other."""
-        package, _, rest = name.partition(".")
+        package, _, rest = fullname.partition(".")
         if package != PACKAGE or (rest and rest not in INTERFACES):
             return None
-        return ModuleSpec(name, StandIns(), is_package=not rest)
+        return ModuleSpec(fullname, self, is_package=not rest)
 
-    @staticmethod
-    def create_module(spec: ModuleSpec) -> ModuleType | None:
+    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
         """Leave the making to the interpreter."""
         return None
 
-    @staticmethod
-    def exec_module(module: ModuleType) -> None:
+    def exec_module(self, module: ModuleType) -> None:
         """Fill a module with its names."""
         for interface in INTERFACES.get(module.__name__.partition(".")[2], ()):
             setattr(module, interface, _Missing(interface, (), {"__module__": module.__name__}))
@@ -71,4 +69,4 @@ class StandIns:
 
 def install_stand_ins() -> None:
     """Let what is not installed be imported."""
-    sys.meta_path.append(StandIns())  # type: ignore[arg-type]
+    sys.meta_path.append(StandIns())
