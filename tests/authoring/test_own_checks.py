@@ -14,7 +14,10 @@ from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
 from grader import cli
+from grader.batch.cluster.errands import lay_out
 from grader.batch.cluster.sending import checks_of
+from grader.batch.keys import Conditions
+from grader.batch.parcels import Errand, Terms
 from grader.exporting.bundles import Chosen, classroom50
 from grader.judging.judge import judge_exercise
 from grader.model.errors import RubricError
@@ -217,12 +220,19 @@ def test_a_bundle_for_a_platform_holds_it(tmp_path):
 
 
 def test_it_travels_to_a_cluster(tmp_path, monkeypatch):
-    """As bytes, with its path from where the class is graded."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "course").mkdir()
-    write_rubric(tmp_path / "course")
+    """As bytes, with its path from where the class is graded; there the rubric is the same."""
+    for folder in ("here/course", "there"):
+        (tmp_path / folder).mkdir(parents=True)
+    before = read_rubric(write_rubric(tmp_path / "here" / "course")).digest
+    monkeypatch.chdir(tmp_path / "here")
     rubric = Path("course/pump.yaml")
-    assert [*checks_of([rubric])] == [(b"course/pump_checks.py", CHECKS_FILE.encode())]
+    checks = tuple(checks_of([rubric]))
+    assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
+    conditions = Conditions("0", (), "", None, "auto", "auto")
+    terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), b"", (), False, 1.0, checks)
+    task = lay_out(terms, Errand("ada", b"ada", b"class/ada", b""), tmp_path / "there")
+    (found,) = (tmp_path / "there").rglob("pump.yaml")
+    assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
 
 
 @pytest.mark.ros
