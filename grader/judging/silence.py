@@ -27,10 +27,16 @@ _AT_ONCE_NS = NS_PER_S
 
 
 def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
-    """Return the fault that came first; of one instant the one that says most."""
+    """Return the fault that came first; of one instant the one that says most. What follows Ctrl-C is none here."""
     # a recording that a fault cut short stops at the instant of the fault
-    found = [f for f in trace.faults(process) if f.t_ns <= trace.stop_ns]
+    found = [f for f in faults_before_stop(trace, process) if f.t_ns <= trace.stop_ns]
     return min(found, key=lambda f: (f.t_ns, _URGENCY[f.kind]), default=None)
+
+
+def faults_before_stop(trace: Trace, process: str | None = None) -> list[Fault]:
+    """Return the faults of processes that had not been told to stop by then."""
+    told = {m.detail: m.t_ns for m in reversed(trace.marks("stop_signal"))}
+    return [f for f in trace.faults(process) if f.process not in told or f.t_ns < told[f.process]]
 
 
 def fault_hint(fault: Fault) -> str:

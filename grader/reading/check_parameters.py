@@ -150,10 +150,16 @@ def build(cls: type[T], parameters: Shape) -> T:
 def _built(annotation: object, value: object) -> object:
     if isinstance(value, Shape):
         classes = [a for a in (annotation, *get_args(annotation)) if dataclasses.is_dataclass(a)]
-        return build(classes[0], value)  # type: ignore[arg-type]
+        return build(classes[0], value)
     if isinstance(value, tuple):
-        inner = get_args(annotation)
+        inner = get_args(_member(annotation, tuple))
         return tuple(_built(inner[0] if ... in inner else inner[i], item) for i, item in enumerate(value))
     if isinstance(value, dict):
-        return {key: _built(get_args(annotation)[1], item) for key, item in value.items()}
+        return {key: _built(get_args(_member(annotation, Mapping))[1], item) for key, item in value.items()}
     return value
+
+
+def _member(annotation: object, kind: type) -> object:
+    """Return an annotation, or that part of a union, whose values are of a kind."""
+    parts = (annotation, *get_args(annotation))
+    return next(p for p in parts if isinstance(get_origin(p), type) and issubclass(get_origin(p), kind))

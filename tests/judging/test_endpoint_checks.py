@@ -138,8 +138,13 @@ def test_no_fault_means_none_before_the_stop() -> None:
     assert found.reason == "t = 3.000 s: node.py:12: ValueError: no; 2 faults in all"
     assert FAULT_KEY in found.evidence
     assert NoFault("other.py").judge(talking().crashed(3.0).trace()).credit == 1
-    stopped = talking().mark(5.0, "stop_signal", "node.py").crashed(5.1)
-    assert NoFault().judge(stopped.trace()).credit == 1
+    for late in (5.0, 5.1):
+        stopped = talking().mark(5.0, "stop_signal", "node.py").crashed(late)
+        assert NoFault().judge(stopped.trace()).credit == 1
+        # nor does it explain what is missing
+        missing = GraphEdges((GraphEdge("/b"),)).judge(stopped.trace())
+        assert (missing.credit, FAULT_KEY in missing.evidence) == (0, False)
+    assert NoFault().judge(talking().mark(5.0, "stop_signal", "other.py").crashed(5.1).trace()).credit == 0
 
 
 CLEAN = CleanShutdown("node.py")

@@ -77,6 +77,10 @@ def test_the_reason_holds_count_and_text() -> None:
 
 WRONG = {
     "every message": (written(chapter, lambda n: True), "with 100 of 100 messages"),
+    "every message, and others": (
+        written(chapter, lambda n: True).log(3.0, "go to the kitchen").log(4.0, "0.5 rad").log(5.0, "0.6 rad"),
+        "with 100 of 100 messages",
+    ),
     "every second": (written(chapter, lambda n: n % 2 == 0), "with 50 of 100 messages"),
     "every fifth": (written(chapter, lambda n: n % 5 == 0), "one for 5 messages"),
     "every ninth": (written(chapter, lambda n: n % 9 == 0), "one for 9 messages"),

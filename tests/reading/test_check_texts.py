@@ -4,12 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from grader.judging.checks.actions import ActionResult
 from grader.judging.checks.endpoints import GraphEdge, GraphEdges, TopicNames
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.checks.log_values import LogsValues
 from grader.judging.checks.reactions import Reaction, ReactionCase
 from grader.judging.checks.services import ServiceResponse
 from grader.judging.checks.timing import Silence
+from grader.judging.checks.transforms import Transform
 from grader.judging.rules import FieldRule
 from grader.model.errors import RubricError
 from grader.model.quantities import NS_PER_MS
@@ -67,6 +69,14 @@ def read(tmp_path: Path, check: str):
         (
             "graph_edges: {edges: [{topic: /a, source: /n}, {topic: /b}], at_once: true}",
             GraphEdges((GraphEdge("/a", "/n"), GraphEdge("/b")), at_once=True),
+        ),
+        (
+            "action_result: {action: /count, result: {sequence: {items: [0, 1, 1]}, name: x}}",
+            ActionResult("/count", result={"sequence": FieldRule(items=(0.0, 1.0, 1.0)), "name": "x"}),
+        ),
+        (
+            "transform: {parent: a, child: b, translation: {x: 1, z: 2}, rate: 10 Hz}",
+            Transform("a", "b", translation={"x": 1.0, "z": 2.0}, rate=10.0),
         ),
         ("topic_names: {publishes: [/a, /b], exactly: true}", TopicNames(("/a", "/b"), exactly=True)),
         ("silence: {topic: /a, after: stream_stops, of: /b}", Silence("/a", "stream_stops", of="/b")),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from grader.judging.findings import met, not_met
 from grader.judging.services import LATENESS_NS
-from grader.judging.silence import fault_hint, first_fault
+from grader.judging.silence import fault_hint, faults_before_stop, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, span
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
@@ -35,9 +35,7 @@ class NoFault:
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if there is no fault; the reason names the first."""
-        stops = trace.marks("stop_signal", self.process)
-        until_ns = min((m.t_ns for m in stops), default=trace.stop_ns)
-        faults = [f for f in trace.faults(self.process) if f.t_ns <= until_ns]
+        faults = faults_before_stop(trace, self.process)
         if not faults:
             return met(f"{self.process or 'every process'}: no fault in {span(trace.stop_ns)}", {"faults": 0})
         first = first_fault(trace, self.process) or faults[0]

@@ -84,7 +84,7 @@ class LogsEvery:
         return self._wrong(messages, logged or printed)
 
     def _rhythms(self, trace: Trace, messages: Sequence[Message], outputs: Sequence[Output]) -> list[_Rhythm]:
-        """Return the rhythms that the outputs may be meant in, the likeliest first; the last is that of them all."""
+        """Return the rhythms that the outputs may be meant in, the likeliest first; that of them all is among them."""
         jitter_ns = JITTER_NS[trace.clock]
         times = [m.t_ns for m in messages]
         placed = [(bisect_right(times, o.t_ns + jitter_ns) - 1, o) for o in outputs]
@@ -122,11 +122,12 @@ class LogsEvery:
 
     def _flooded(self, found: Sequence[_Rhythm], messages: Sequence[Message]) -> Finding | None:
         """Return that there is a log for every message or nearly so; None if there is not."""
-        if self.every < 3 or not found or len(found[-1].places) < _FLOOD * len(messages):
+        most = max(found, key=lambda rhythm: len(rhythm.places), default=_Rhythm(()))
+        if self.every < 3 or len(most.places) < _FLOOD * len(messages):
             return None
-        reason = f"{self.process}: something is written with {len(found[-1].places)} of {len(messages)} messages; "
+        reason = f"{self.process}: something is written with {len(most.places)} of {len(messages)} messages; "
         hint = f"count the messages, and log when the count is divisible by {self.every}: count % {self.every} == 0"
-        return not_met(reason + self._wanted, self._evidence(found[-1], messages), hint=hint)
+        return not_met(reason + self._wanted, self._evidence(most, messages), hint=hint)
 
     @property
     def _wanted(self) -> str:
