@@ -30,7 +30,33 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
     if len(edges) > MOST_EDGES:
         lines.append(f"and {len(edges) - MOST_EDGES} more")
-    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely_nodes(graph)]
+    calls = service_edges(graph)
+    lines += [_called(*edge) for edge in calls[:MOST_EDGES]]
+    joined = {name for client, _, server in calls for name in (client, server)}
+    lonely = [node for node in lonely_nodes(graph) if node not in joined]
+    return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely]
+
+
+def service_edges(graph: GraphSnapshot) -> list[tuple[str, str, str]]:
+    """Return every client with every server that it may call, and those that have nobody; without parts of actions."""
+    ends = [end for end in graph.services if not _hidden(end.service)]
+    clients = [end for end in ends if end.kind == "client"]
+    servers = [end for end in ends if end.kind == "service"]
+    found = [
+        (client.node, client.service, server.node)
+        for client in clients
+        for server in servers
+        if (client.service, client.type) == (server.service, server.type)
+    ]
+    called, calling = {(e[1], e[2]) for e in found}, {(e[0], e[1]) for e in found}
+    found += [(c.node, c.service, NOBODY) for c in clients if (c.node, c.service) not in calling]
+    found += [(NOBODY, s.service, s.node) for s in servers if (s.service, s.node) not in called]
+    return found
+
+
+def _called(client: str, service: str, server: str) -> str:
+    names = (shown(part, limit=_NAME_LIMIT) for part in (client, service, server))
+    return "{} ┄┄{}┄┄▶ {}".format(*names)
 
 
 def graph_edges(graph: GraphSnapshot) -> list[Edge]:

@@ -25,7 +25,7 @@ from grader.judging.figures.pictures import MAKERS, figures_of, illustrated
 from grader.judging.judge import judge_exercise
 from grader.model.figure import GraphFigure, Look, Tone
 from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind
+from grader.model.trace import FaultKind, Mark, Request, Response
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 
 EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
@@ -156,6 +156,22 @@ def test_the_timeline_has_a_row_for_each_kind_of_thing():
     assert panel.series[-1].texts == ("velocity_publisher.py:12: ValueError: no", "more than 3 lines")
     silent = titled(figures_of(ONE, {"alone": Recording(10).trace()}), "Logs")
     assert silent.panels[0].lanes == ("velocity_publisher.py: logged",)
+
+
+def test_the_timeline_has_a_row_for_each_service_that_was_called():
+    """Requests and responses with what they say, and when servers and processes came and went."""
+    kind, value = "std_srvs/srv/Trigger", {"message": "85.0"}
+    asked = Request(10**9, "/battery", kind, 1, "grader", 1, {})
+    answered = Response(2 * 10**9, "/battery", kind, 1, "student", 1, value)
+    marks = (Mark(0, "server_starts", "/other"), Mark(10**9, "process_starts", "late.py"))
+    trace = replace(Recording(10).trace(), observations=(*marks, asked, answered))
+    chart = titled(figures_of(ONE, {"alone": trace}), "Logs")
+    assert chart.panels[0].lanes == ("velocity_publisher.py: logged", "/battery: called")
+    assert [(s.name, s.points, s.texts) for s in chart.panels[0].series] == [
+        ("request", ((1.0, 1.0),), ("request 1 of the grader: {}",)),
+        ("response", ((2.0, 1.0),), ("response 1 of the student: {'message': '85.0'}",)),
+    ]
+    assert [m.label for m in chart.moments] == ["/other: server appears", "late.py starts", "end"]
 
 
 def test_a_flood_becomes_a_picture_of_bounded_size():

@@ -32,7 +32,7 @@ from rich.cells import cell_len
 
 from grader.model.exercise import Location, Outcome
 from grader.model.report import Reproduction
-from grader.model.trace import GraphSnapshot
+from grader.model.trace import GraphSnapshot, ServiceEnd
 from grader.reports.escape import shown
 from grader.reports.graph import draw_graph
 from grader.reports.text import render_text
@@ -241,6 +241,26 @@ def test_the_graph_is_drawn_both_ways_without_what_every_node_has():
 def test_a_narrow_graph_breaks_at_the_node():
     """An arrow stays whole."""
     assert draw_graph(both_ways(), width=40)[2:] == ["/temperature_sensor", "  ──/temperature──▶ /fan_controller"]
+
+
+def test_services_are_drawn_from_client_to_server():
+    """One line each; what nobody calls or serves is told, and parts of actions are left out."""
+    kind = "std_srvs/srv/Trigger"
+    ends = (
+        ServiceEnd("client", "/battery", kind, "/a"),
+        ServiceEnd("client", "/lost", kind, "/a"),
+        ServiceEnd("client", "/mixed", "std_srvs/srv/Empty", "/a"),
+        ServiceEnd("service", "/battery", kind, "/b"),
+        ServiceEnd("service", "/count/_action/send_goal", kind, "/b"),
+        ServiceEnd("service", "/mixed", kind, "/b"),
+    )
+    assert draw_graph(GraphSnapshot(0, ("/a", "/b", "/idle"), (), ends), width=80) == [
+        "/a ┄┄/battery┄┄▶ /b",
+        "/a ┄┄/lost┄┄▶ (nobody)",
+        "/a ┄┄/mixed┄┄▶ (nobody)",
+        "(nobody) ┄┄/mixed┄┄▶ /b",
+        "/idle (no topics)",
+    ]
 
 
 def test_loose_ends_and_quarrels_are_drawn():

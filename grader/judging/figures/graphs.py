@@ -18,7 +18,7 @@ def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure
     stages = [stage for s in exercise.scenarios if s.id in traces for stage in _stages(s, exercise, traces[s.id])]
     told: dict[tuple[object, ...], Stage] = {}
     for stage in stages:
-        told.setdefault((stage.graph.nodes, stage.graph.endpoints), stage)
+        told.setdefault((stage.graph.nodes, stage.graph.endpoints, stage.graph.services), stage)
     distinct = [stage for stage in told.values() if stage.graph.nodes]
     if not distinct:
         return None
@@ -42,7 +42,7 @@ def _own(graph: GraphSnapshot) -> GraphSnapshot:
 
 
 def _size(graph: GraphSnapshot) -> int:
-    return len(graph.endpoints)
+    return len(graph.endpoints) + len(graph.services)
 
 
 def _about(stages: list[Stage]) -> str:
@@ -59,4 +59,6 @@ def _said(graph: GraphSnapshot) -> str:
     served = {p.topic for p in publishers}
     unserved = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in served]
     parts += [f"{e.node} subscribes to {e.topic}" for e in unserved]
+    visible = [e for e in graph.services if "/_" not in e.service]
+    parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {e.service}" for e in visible]
     return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"

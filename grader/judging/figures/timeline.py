@@ -9,8 +9,10 @@ from grader.judging.output import printed_lines
 from grader.judging.wording import counted, fault_sentence, quote
 from grader.model.figure import Chart, Look, Moment, Panel, Series, Tone
 from grader.model.quantities import seconds
-from grader.model.trace import Trace
+from grader.model.trace import Request, Response, Trace
 
+#: Lanes for services; a node's parameters and an action are several.
+MOST_SERVICES = 6
 _TONES = {"DEBUG": Tone.FAINT, "INFO": Tone.MAIN, "WARN": Tone.WARNING, "ERROR": Tone.BAD, "FATAL": Tone.BAD}
 
 
@@ -21,9 +23,14 @@ def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
     for process in processes:
         _logs(trace, process, lanes, rows)
         _prints(trace, process, lanes, rows)
+    _exchanges(trace, lanes, rows)
     _faults(trace, lanes, rows)
     moments = [Moment(seconds(m.t_ns), f"{m.detail} begins") for m in trace.marks("stream_starts")]
     moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("stream_stops")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server appears") for m in trace.marks("server_starts")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server disappears") for m in trace.marks("server_stops")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail} starts") for m in trace.marks("process_starts")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("exited")]
     moments += [Moment(seconds(trace.stop_ns), "end")]
     return Chart(
         id="timeline",
@@ -51,6 +58,20 @@ def _prints(trace: Trace, process: str, lanes: list[str], rows: list[Series]) ->
     if lines:
         lanes.append(f"{process}: printed")
         rows.append(written_in_lane("printed", lines, len(lanes) - 1, Tone.SECOND))
+
+
+def _exchanges(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
+    """Add a lane for each service that was called: its requests and responses, with what they say."""
+    sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
+    exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
+    for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:
+        lanes.append(f"{service}: called")
+        for name, kind, tone in (("request", Request, Tone.SECOND), ("response", Response, Tone.MAIN)):
+            some = [o for o in exchanges if isinstance(o, kind) and o.service == service]
+            points = [(seconds(o.t_ns), float(len(lanes) - 1)) for o in some]
+            texts = [f"{name} {o.number} of the {o.sender}: {dict(o.value)}" for o in some]
+            if some:
+                rows.append(series(name, points, look=Look.DOTS, tone=tone, texts=texts))
 
 
 def _faults(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
