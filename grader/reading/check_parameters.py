@@ -150,7 +150,7 @@ def build(cls: type[T], parameters: Shape) -> T:
 def _built(annotation: object, value: object) -> object:
     if isinstance(value, Shape):
         classes = [a for a in (annotation, *get_args(annotation)) if dataclasses.is_dataclass(a)]
-        return build(classes[0], value)
+        return build(classes[0], value)  # type: ignore[arg-type]
     if isinstance(value, tuple):
         inner = get_args(_member(annotation, tuple))
         return tuple(_built(inner[0] if ... in inner else inner[i], item) for i, item in enumerate(value))
