@@ -92,11 +92,19 @@ class Bench:
         return None if ahead and back is not None and back.id == criterion.id else target.id
 
     def _named(self, criterion: Criterion, name: str) -> Criterion | None:
-        """Return the criterion of that id, else the first of the same scenario whose check has that name."""
+        """Return the criterion of that id, else the first whose check has that name, nearest scenarios first.
+
+        These are the criterion's own, and then those in which the same processes run.
+        """
         criteria = self.exercise.criteria
         by_id = next((c for c in criteria if c.id == name), None)
-        same = (c for c in criteria if c.scenario == criterion.scenario and check_name(c) == name)
-        return by_id or next(same, None)
+        named = [c for c in criteria if check_name(c) == name]
+        same = [c for c in named if c.scenario == criterion.scenario]
+        alike = [c for c in named if self._processes(c) == self._processes(criterion)]
+        return by_id or next(iter([*same, *alike]), None)
+
+    def _processes(self, criterion: Criterion) -> tuple[str, ...]:
+        return next((s.processes for s in self.exercise.scenarios if s.id == criterion.scenario), ())
 
     def _blocked(self, criterion: Criterion, needed: str, outcome: Outcome) -> Verdict:
         reason = f"not judged: needs {needed} ({_SAID.get(outcome, 'not met')})"

@@ -147,6 +147,19 @@ def test_a_finding_can_name_the_kind_of_check_that_blocks_it() -> None:
     assert judged(criterion("range", spread))["range"].outcome is Outcome.NOT_MET
 
 
+def test_the_kind_of_check_that_blocks_may_ask_about_another_scenario_of_the_same_files() -> None:
+    """A client that asks no more in one situation asked no more in the other: it is told once."""
+    rate = CHECKS["topic_rate"]("/temperature", 5.0, 0.25, 10 * SECOND)
+    scenarios = tuple(Scenario(name, files, Span(SECOND)) for name, files in (("a", (FILE,)), ("b", (FILE,))))
+    criteria = (criterion("pace", rate, scenario="a"), criterion("late", Says(Fraction(0), "topic_rate"), scenario="b"))
+    traces = {"a": Recording().trace(), "b": Recording().trace()}
+    report = judge_exercise(exercise(*criteria, scenarios=scenarios), traces, handed_in(FILE))
+    assert outcomes(report) == {"pace": "not_met", "late": "blocked"}
+    others = (scenarios[0], Scenario("b", (FILE, ODOM), Span(SECOND)))
+    report = judge_exercise(exercise(*criteria, files=(FILE, ODOM), scenarios=others), traces, handed_in(FILE, ODOM))
+    assert outcomes(report) == {"pace": "not_met", "late": "not_met"}
+
+
 def test_a_failed_recording_leaves_everything_undecided() -> None:
     """Our fault costs no points and is not a zero either; what needs it is undecided too."""
     given = judged(criterion("a", Says()), criterion("b", Says(), "a"), harness_problem="the worker died")
