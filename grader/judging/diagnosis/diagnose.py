@@ -18,12 +18,14 @@ from grader.judging.diagnosis.endings import ENDINGS
 from grader.judging.diagnosis.fan import FAN
 from grader.judging.diagnosis.fields import FIELDS
 from grader.judging.diagnosis.files import FILES
+from grader.judging.diagnosis.formulas import FORMULAS
 from grader.judging.diagnosis.imports import IMPORTS
 from grader.judging.diagnosis.lateness import LATENESS
 from grader.judging.diagnosis.logs import LOGS
 from grader.judging.diagnosis.positions import POSITIONS
 from grader.judging.diagnosis.rates import RATES
 from grader.judging.diagnosis.sensor import SENSOR
+from grader.judging.diagnosis.services import SERVICES
 from grader.judging.diagnosis.silence import SILENCE
 from grader.judging.diagnosis.source import Source, read
 from grader.judging.diagnosis.syntax import SYNTAX
@@ -46,6 +48,7 @@ CAUSES: tuple[Cause, ...] = (
     *WAITING,
     *RATES,
     *FIELDS,
+    *FORMULAS,
     *FILES,
     *LOGS,
     *POSITIONS,
@@ -53,6 +56,7 @@ CAUSES: tuple[Cause, ...] = (
     *LATENESS,
     *COMPARISONS,
     *FAN,
+    *SERVICES,
 )
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 #: Evidence key that holds the id of the cause.
