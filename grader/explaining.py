@@ -44,7 +44,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
         GraderError: Nothing has that name.
         RubricError: A rubric cannot be used.
     """
-    exercises = read_exercises(Request("", rubrics=rubrics, draw=First()))
+    exercises = read_exercises(Request("", every=True, rubrics=rubrics, draw=First()))
     pairs = [(e, c) for e in exercises for c in e.criteria]
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
     if found:
@@ -61,7 +61,7 @@ def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation
     Raises:
         RubricError: A rubric cannot be used.
     """
-    return [_criterion(e, c) for e in read_exercises(Request("", rubrics=rubrics, draw=First())) for c in e.criteria]
+    return [_criterion(e, c) for e in read_exercises(Request("", every=True, rubrics=rubrics, draw=First())) for c in e.criteria]
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
@@ -70,7 +70,7 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     Raises:
         RubricError: A rubric cannot be used.
     """
-    pairs = [(e, c) for e in read_exercises(Request("", rubrics=rubrics, draw=First())) for c in e.criteria]
+    pairs = [(e, c) for e in read_exercises(Request("", every=True, rubrics=rubrics, draw=First())) for c in e.criteria]
     used: dict[str, list[str]] = {}
     for e, c in pairs:
         used.setdefault(check_name(c), []).append(f"{e.id}/{c.id}")
