@@ -44,8 +44,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
         GraderError: Nothing has that name.
         RubricError: A rubric cannot be used.
     """
-    exercises = read_exercises(Request("", every=True, rubrics=rubrics, draw=First()))
-    pairs = [(e, c) for e in exercises for c in e.criteria]
+    pairs = _pairs(rubrics)
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
     if found:
         return list(found)
@@ -61,7 +60,7 @@ def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation
     Raises:
         RubricError: A rubric cannot be used.
     """
-    return [_criterion(e, c) for e in read_exercises(Request("", every=True, rubrics=rubrics, draw=First())) for c in e.criteria]
+    return [_criterion(e, c) for e, c in _pairs(rubrics)]
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
@@ -70,12 +69,17 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     Raises:
         RubricError: A rubric cannot be used.
     """
-    pairs = [(e, c) for e in read_exercises(Request("", every=True, rubrics=rubrics, draw=First())) for c in e.criteria]
+    pairs = _pairs(rubrics)
     used: dict[str, list[str]] = {}
     for e, c in pairs:
         used.setdefault(check_name(c), []).append(f"{e.id}/{c.id}")
     own = {name: kind for path in rubrics for name, kind in own_checks(path).items()}
     return [_check(name, kind, used.get(name, [])) for name, kind in {**CHECKS, **own}.items()]
+
+
+def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
+    exercises = read_exercises(Request("", every=True, rubrics=rubrics, draw=First()))
+    return [(e, c) for e in exercises for c in e.criteria]
 
 
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
