@@ -1,5 +1,6 @@
 """Every check is tried on golden traces and on real nodes: the table says where, and these are the real runs."""
 
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,12 @@ NODES = ROOT / "tests" / "recording" / "service_nodes"
 TABLE = YAML(typ="safe").load((ROOT / "tests" / "checks_real.yaml").read_text(encoding="utf-8"))
 
 
+@lru_cache
+def asked_in(rubric):
+    """Return the names of the checks that a rubric asks, in its order."""
+    return [check_name(criterion) for criterion in read_rubric(rubric).criteria]
+
+
 def test_the_table_misses_no_check():
     """A new check needs golden traces and a real run, or a reason why it has none."""
     assert list(TABLE) == list(CHECKS)
@@ -29,16 +36,15 @@ def test_the_table_tells_the_truth(name):
     golden = (ROOT / row["golden"]).read_text(encoding="utf-8")
     assert CHECKS[name].__name__ in golden
     if "real" in row:
-        assert name in {check_name(criterion) for criterion in read_rubric(ROOT / row["real"]).criteria}
+        assert name in asked_in(ROOT / row["real"])
 
 
 def outcomes(folder, rubric):
     """Grade a folder and return the outcome of each criterion by its check's name, with its reason."""
     report = grade(Request(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
-    names = [check_name(criterion) for criterion in read_rubric(REAL / rubric).criteria]
     verdicts = report.exercises[0].verdicts
     told = {v.id: v.reason for v in verdicts}
-    return [(name, v.outcome.value) for name, v in zip(names, verdicts, strict=True)], told
+    return [(name, v.outcome.value) for name, v in zip(asked_in(REAL / rubric), verdicts, strict=True)], told
 
 
 @pytest.mark.ros
