@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from ruamel.yaml import YAML
 from tracing import (
     FLOAT32,
     ODOMETRY,
+    TRIGGER,
     TWIST,
     Recording,
     driving,
@@ -29,6 +31,8 @@ from grader.model.trace import FaultKind, Trace
 from grader.reading.rubric_file import builtin_rubrics, read_rubric
 
 HERE = Path(__file__).parent / "diagnosis"
+FLOAT64 = "std_msgs/msg/Float64"
+BATTERY = "/battery/get_status"
 EXERCISES: dict[str, Exercise] = {name: read_rubric(path) for name, path in builtin_rubrics().items()}
 EXERCISES = {exercise.id: exercise for exercise in EXERCISES.values()}
 RIGHT = {path.stem: path.read_text(encoding="utf-8") for path in sorted((HERE / "right").glob("*.py.txt"))}
@@ -321,6 +325,34 @@ def cool() -> Recording:
     return rec
 
 
+_SWINGS: dict[str, Callable[[int], float]] = {
+    "right": lambda n: math.sin(0.1 * n),
+    "zero": lambda _: 0.0,
+    "from_one": lambda n: math.sin(0.1 * (n + 1)),
+}
+
+
+def swinging(what: str = "right") -> Recording:
+    """A joint publisher that logs every tenth message."""
+    rec = Recording(12.1, process="simple_publisher.py")
+    rec.endpoint("publisher", "/joint_commands", FLOAT64, "/joint_commander")
+    for n in range(120):
+        rec.number(0.1 + 0.1 * n, "/joint_commands", _SWINGS[what](n), FLOAT64)
+        if n % 10 == 0:
+            rec.log(0.1 + 0.1 * n, f"sent {_SWINGS[what](n):.2f} rad")
+    return rec
+
+
+def asking_once() -> Recording:
+    """A client that waits, asks, and does nothing more."""
+    rec = Recording(40.0, process="battery_service_client.py")
+    rec.service("client", BATTERY, TRIGGER, "/mission").mark(7.0, "server_starts", BATTERY)
+    for second in range(1, 7):
+        rec.log(second, "waiting for the battery server ...")
+    answer = {"success": True, "message": "Battery: 62.5% remaining"}
+    return rec.request(7.0, BATTERY, 1, "student").response(7.05, BATTERY, 1, answer, "grader")
+
+
 def misnamed() -> Recording:
     """Both processes, of which the controller answers on another topic."""
     rec = Recording(20.2, process="temperature_sensor.py")
@@ -357,4 +389,6 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "answering_text": ("controller_alone", answering_text),
     "answering_late": ("controller_alone", answering_late),
     "answering_once": ("controller_alone", answering_once),
+    "swinging": ("alone", swinging),
+    "asking_once": ("client_waits", asking_once),
 }

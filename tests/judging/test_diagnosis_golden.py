@@ -112,6 +112,9 @@ def test_a_right_program_that_does_right_is_left_alone(file: str) -> None:
         "odom_subscriber.py": ("logging", {}),
         "temperature_sensor.py": ("sensing", {}),
         "fan_controller.py": ("answering", {}),
+        "simple_publisher.py": ("swinging", {}),
+        "battery_service_client.py": ("asking_once", {}),
+        "battery_service_server.py": ("asking_once", {}),
     }[file]
     scenario, build = RECORDINGS[given[0]]
     traces = {scenario: build(**given[1]).trace(scenario)}
