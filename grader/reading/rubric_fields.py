@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Discriminator, Field, Strict, Tag, model_validator
 from typing_extensions import Self, TypeAliasType
@@ -66,19 +66,22 @@ def _kind(value: object) -> str:
     return kinds.get(type(value), "<number>")
 
 
-FieldValue = TypeAliasType(
-    "FieldValue",
-    Annotated[
-        Annotated[DrawnFieldShape, Tag("<drawn>")]
-        | Annotated[dict[FieldName, "FieldValue"], Tag("<parts>")]
-        | Annotated[tuple["FieldValue", ...], Tag("<list>")]
-        | Annotated[str, Strict(), Tag("<text>")]
-        | Annotated[YesNo, Tag("<bool>")]
-        | Annotated[Whole, Tag("<whole>")]
-        | Annotated[FieldNumber, Tag("<number>")],
-        Discriminator(_kind),
-    ],
-)
+if TYPE_CHECKING:
+    FieldValue = Any  # an alias that holds itself is beyond the type checker; pydantic reads the one below
+else:
+    FieldValue = TypeAliasType(
+        "FieldValue",
+        Annotated[
+            Annotated[DrawnFieldShape, Tag("<drawn>")]
+            | Annotated[dict[FieldName, "FieldValue"], Tag("<parts>")]
+            | Annotated[tuple["FieldValue", ...], Tag("<list>")]
+            | Annotated[str, Strict(), Tag("<text>")]
+            | Annotated[YesNo, Tag("<bool>")]
+            | Annotated[Whole, Tag("<whole>")]
+            | Annotated[FieldNumber, Tag("<number>")],
+            Discriminator(_kind),
+        ],
+    )
 Fields = dict[FieldName, FieldValue]
 
 
