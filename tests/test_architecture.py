@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 
 #: All rooms but the host's, and but the commands: what stands at the top may use them.
 BELOW_COMMANDS = {
-    *("entry", "batch", "authoring", "selftest", "exporting"),
+    *("entry", "batch", "similarity", "authoring", "selftest", "exporting"),
     *("reports", "recording", "judging", "reading", "model"),
 }
 #: Room -> rooms it may import. Entries are at the top, the vocabulary at the bottom.
@@ -20,7 +20,9 @@ MAY_IMPORT = {
     "entry": BELOW_COMMANDS | {"commands"},
     "commands": BELOW_COMMANDS | {"commands"},
     # A class is graded by what grades one submission.
-    "batch": {"batch", "entry", "reports", "recording", "reading", "model"},
+    "batch": {"batch", "entry", "similarity", "reports", "recording", "reading", "model"},
+    # Submissions of a class are compared by what was handed in, and never run for it.
+    "similarity": {"similarity", "reports", "reading", "model"},
     # A skeleton is written from what the reference does, and tried on it as a submission would be.
     "authoring": {"authoring", "entry", "reading", "judging", "model"},
     # Mutants of a reference are recorded and judged as submissions are.

@@ -27,6 +27,7 @@ from grader.batch.outputs import CLASS, class_files, exports
 from grader.batch.people import read_roster
 from grader.batch.request import Course
 from grader.batch.running import ClassRun
+from grader.batch.similar import compare_class, link_of_before
 from grader.batch.store import Store, open_store
 from grader.batch.summary import Graded, summary_json
 from grader.batch.tasks import MakeScheduler
@@ -79,11 +80,11 @@ def grade_class(
         began = time.monotonic()
         try:
             not_replaced = run.grade(due, warn, make_scheduler)
+            graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
         except (KeyboardInterrupt, HarnessError):
             with suppress(GraderError):  # what stopped the run says more
                 _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
             raise
-        graded = Graded(book(), len(due), before, not_replaced)
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
@@ -124,6 +125,14 @@ def _book(
     )
 
 
+def _compared(graded: Graded, intake: Intake, course: Course, store: Store) -> Graded:
+    """Return the class with what is said of similar submissions, if that was asked for."""
+    if course.given is None:
+        return replace(graded, links=link_of_before(store))
+    found = compare_class(intake.entries, graded.book.rows, course.given, store)
+    return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
+
+
 def _run(course: Course, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
     """Return what belongs to this run alone; without what was graded it is one that was stopped."""
     return RunOfClass(
@@ -146,10 +155,11 @@ def _written(graded: Graded, run: RunOfClass, store: Store, course: Course) -> G
     results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}
     made = exports(graded.book, wanted, results)
     left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
-    remarks = tuple(export.remark for export in made.values() if export.remark)
+    remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
     graded = replace(graded, left_out=left_out, remarks=remarks)
     files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
-    return replace(graded, files=_write({CLASS: summary_json(graded).encode(), **files}, store))
+    written = _write({CLASS: summary_json(graded).encode(), **files}, store)
+    return replace(graded, files=(*graded.files, *written))
 
 
 def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:

@@ -9,6 +9,7 @@ from grader.batch.choosing import CHANGED
 from grader.batch.layouts import AUTO
 from grader.batch.outputs import Platforms
 from grader.session import Request
+from grader.similarity.contents import Program
 
 _GRADING = Request("")
 _NO_PLATFORMS = Platforms()
@@ -30,6 +31,7 @@ class Course:
         rerun: See `choosing`.
         standalone: Whether each HTML report can be sent away alone.
         platforms: What else is written for the class.
+        given: What everybody was given, to compare the submissions without it; None to compare none.
     """
 
     sources: tuple[Path, ...]
@@ -43,3 +45,4 @@ class Course:
     rerun: str = CHANGED
     standalone: bool = False
     platforms: Platforms = _NO_PLATFORMS
+    given: tuple[Program, ...] | None = None

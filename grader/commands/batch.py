@@ -13,6 +13,7 @@ from grader.batch.cluster.extra import require_dask
 from grader.model.containment import TIERS
 from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED
 from grader.reports.escape import encoded, shown
+from grader.similarity.extra import require_library
 
 if TYPE_CHECKING:
     from grader.batch.summary import Graded
@@ -45,6 +46,15 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
 @click.option("--moodle", type=PATH, metavar="CSV", help="Write moodle.csv for the users in this export of Moodle.")
 @click.option("--gradescope", is_flag=True, help="Write gradescope.csv, and results.json for each submission.")
+@click.option("--similarity", is_flag=True, help="List submissions that are alike; no score depends on it.")
+@click.option(
+    "--template",
+    "templates",
+    type=PATH,
+    metavar="FOLDER",
+    multiple=True,
+    help="What students were given, taken out before comparing; repeatable; by default the project's own templates.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the class as JSON, and nothing else.")
 @click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
 def command(  # noqa: PLR0913  one parameter an option
@@ -71,6 +81,8 @@ def command(  # noqa: PLR0913  one parameter an option
     canvas_gradebook: Path | None,
     moodle: Path | None,
     gradescope: bool,
+    similarity: bool,
+    templates: tuple[Path, ...],
     as_json: bool,
     no_progress: bool,
 ) -> int:
@@ -84,14 +96,20 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     if scheduler is not None:
         require_dask()
+    if similarity:
+        require_library()
     from grader.batch.course import grade_class  # noqa: PLC0415  the rest of the grader
     from grader.batch.outputs import platforms  # noqa: PLC0415  as above
     from grader.batch.request import Course  # noqa: PLC0415  as above
     from grader.batch.watching import shown_watcher  # noqa: PLC0415  as above
+    from grader.reading.shipped import shipped_templates  # noqa: PLC0415  as above
     from grader.session import Request  # noqa: PLC0415  as above
+    from grader.similarity.reading import read_given  # noqa: PLC0415  as above
 
     if canvas_gradebook is not None and canvas is None:
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
+    if templates and not similarity:
+        raise click.BadParameter("--template needs --similarity")
     course = Course(
         sources=sources,
         results=results,
@@ -114,6 +132,7 @@ def command(  # noqa: PLR0913  one parameter an option
         rerun=rerun,
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
+        given=read_given(templates or (shipped_templates(),)) if similarity else None,
     )
     try:
         with _graders(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:

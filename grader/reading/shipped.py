@@ -12,6 +12,13 @@ def shipped_folder() -> Path:
     return inside if inside.is_dir() else package.parent / "rubrics"
 
 
+def shipped_templates() -> Path:
+    """Return the folder of the templates that students begin with."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "student_template"
+    return inside if inside.is_dir() else package.parent / "student_template"
+
+
 def builtin_odometry() -> Path:
     """Return the project's own /odom recording."""
     return shipped_folder() / "odometry"

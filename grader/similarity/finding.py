@@ -1,0 +1,138 @@
+"""Finds submissions that are alike in a class, after taking out what was given and what everybody writes."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from grader.similarity.contents import Handed, Likeness, Pair, Program, Same, Side, Similar
+from grader.similarity.library import PIECE, Print, TooSlow, make_print, overlap_of
+
+#: Two files are listed if this share of one's own code is in the other, at least the second share of the other's own
+#: code is in the first, and they have so many signs in common. Tried on programs written independently and on disguised
+#: copies of them; the documentation for instructors has the figures.
+THRESHOLD, LEAST_SHARE, LEAST_OVERLAP = 0.65, 0.4, 80
+#: What more than this share of the class writes is common; a few friends are no class, however small it is.
+COMMON_SHARE, COMMON_LEAST = 0.1, 4
+
+
+@dataclass(slots=True)
+class _File:
+    """One file that takes part: whose it is, and what stands for it."""
+
+    owner: int
+    program: Program
+    print: Print
+
+
+def find_similar(handed: Sequence[Handed], given: Sequence[Program]) -> Similar:
+    """Return which submissions of a class are alike.
+
+    Args:
+        handed: The submissions.
+        given: The files that everybody was given.
+    """
+    as_given = {program.digest for program in given}
+    kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
+    files, kept = _prints(kept)
+    common_from = max(COMMON_LEAST, int(COMMON_SHARE * len(handed)))
+    _take_out(files, given, common_from)
+    return Similar(
+        handed=tuple(kept),
+        pairs=tuple(_pairs(kept, files)),
+        same=tuple(_same(kept)),
+        given=tuple((h, p.name) for h in handed for p in h.programs if p.digest in as_given),
+        common_from=common_from,
+        threshold=THRESHOLD,
+        least_share=LEAST_SHARE,
+        given_files=tuple(program.name for program in given),
+    )
+
+
+def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
+    """Return the files that take part, and the submissions with a word on each that cannot."""
+    files, told = [], []
+    for owner, one in enumerate(handed):
+        slow = []
+        for program in one.programs:
+            made = _print(program)
+            if made is None:
+                slow.append(f"{program.name}: reading its tokens takes too long")
+            else:
+                files.append(_File(owner, program, made))
+        told.append(replace(one, passed_over=(*one.passed_over, *slow)))
+    return files, told
+
+
+def _print(program: Program) -> Print | None:
+    try:
+        return make_print(program.text)
+    except (TooSlow, MemoryError, RecursionError):
+        return None
+
+
+def _take_out(files: Sequence[_File], given: Sequence[Program], common_from: int) -> None:
+    """Leave each file its own pieces: those that were not given, and that only few others have."""
+    owners: dict[int, set[int]] = defaultdict(set)
+    for file in files:
+        for piece in file.print.pieces:
+            owners[piece].add(file.owner)
+    handed_out = {piece for program in given for piece in make_print(program.text).pieces}
+    own = {piece for piece, who in owners.items() if len(who) <= common_from and piece not in handed_out}
+    shared = {piece for piece in own if len(owners[piece]) > 1}
+    for file in files:
+        file.print.keep(shared, own)
+
+
+def _pairs(handed: Sequence[Handed], files: Sequence[_File]) -> list[Pair]:
+    found: dict[tuple[int, int], list[Likeness]] = defaultdict(list)
+    for left, right in _candidates(handed, files):
+        overlap = overlap_of(left.print, right.print)
+        alike = max(overlap.shares) >= THRESHOLD and min(overlap.shares) >= LEAST_SHARE
+        if alike and overlap.signs >= LEAST_OVERLAP:
+            one = Side(left.program, overlap.shares[0], overlap.lines[0])
+            other = Side(right.program, overlap.shares[1], overlap.lines[1])
+            found[left.owner, right.owner].append(Likeness(one, other, overlap.signs))
+    pairs = [
+        Pair(handed[a], handed[b], tuple(sorted(likenesses, key=lambda one: (-one.share, -one.overlap))))
+        for (a, b), likenesses in found.items()
+    ]
+    return sorted(pairs, key=lambda pair: (-pair.share, -pair.overlap, pair.left.name, pair.right.name))
+
+
+def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tuple[_File, _File]]:
+    """Yield the files of different people that have enough pieces in common to be compared."""
+    holders: dict[int, list[int]] = defaultdict(list)
+    for index, file in enumerate(files):
+        for piece in file.print.fingerprint.hashes:
+            holders[piece].append(index)
+    counts: Counter[tuple[int, int]] = Counter()
+    for indices in holders.values():
+        counts.update(combinations(indices, 2))
+    # One piece has as many signs as the next few begin with, so far fewer pieces may make the overlap.
+    least = LEAST_OVERLAP // PIECE
+    for (a, b), count in sorted(counts.items()):
+        left, right = files[a], files[b]
+        if count >= least and left.owner != right.owner and handed[right.owner].name not in handed[left.owner].own:
+            yield left, right
+
+
+def _same(handed: Sequence[Handed]) -> list[Same]:
+    """Return files that several people handed in byte for byte; empty ones say nothing."""
+    holders: dict[str, list[tuple[Handed, Program]]] = defaultdict(list)
+    for one in handed:
+        for digest, program in {program.digest: program for program in one.programs}.items():
+            if program.text.strip():
+                holders[digest].append((one, program))
+    found = [
+        Same(who[0][1].name, tuple(h for h, _ in who), len({_all_of(h) for h, _ in who}) == 1)
+        for who in holders.values()
+        if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
+    ]
+    return sorted(found, key=lambda same: (-len(same.holders), same.file, same.holders[0].name))
+
+
+def _all_of(handed: Handed) -> tuple[str, ...]:
+    return tuple(sorted(program.digest for program in handed.programs))

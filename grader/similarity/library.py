@@ -1,0 +1,125 @@
+"""The library that compares programs: k-grams of the tokens, names and texts left aside; nothing else knows it."""
+
+from __future__ import annotations
+
+import io
+import signal
+import threading
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any
+
+from grader.similarity.contents import Lines
+
+#: Signs that a piece must have to count, with all names cut to one sign.
+PIECE = 25
+#: Processor time for one file: hundreds of times what a program of a student takes.
+FILE_LIMIT_S = 5.0
+
+
+class TooSlow(Exception):  # noqa: N818  what it is
+    """A file took longer than any program does."""
+
+
+@dataclass(slots=True)
+class Print:
+    """What stands for one file in comparisons.
+
+    Attributes:
+        pieces: Digest of the piece that begins at each sign; equal in this process alone.
+        fingerprint: The library's own value.
+        skipped: Empty lines at the beginning, which the library leaves out.
+    """
+
+    pieces: list[int]
+    fingerprint: Any
+    skipped: int
+
+    def keep(self, shared: Collection[int], own: Collection[int]) -> None:
+        """Count only the pieces in `own` as the file's own code, and compare only those of them in `shared`."""
+        from copydetect.utils import get_token_coverage  # noqa: PLC0415  a heavy, optional library
+
+        where: dict[int, list[int]] = {}
+        for index, piece in enumerate(self.pieces):
+            where.setdefault(piece, []).append(index)
+        mine = {piece: places for piece, places in where.items() if piece in own}
+        self.fingerprint.token_coverage = get_token_coverage(mine, PIECE, len(self.fingerprint.filtered_code))
+        self.fingerprint.hash_idx = {piece: places for piece, places in mine.items() if piece in shared}
+        self.fingerprint.hashes = set(self.fingerprint.hash_idx)
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """What two files have in common: signs, the share of each one's own code, and the lines in each."""
+
+    signs: int
+    shares: tuple[float, float]
+    lines: tuple[Lines, Lines]
+
+
+def make_print(text: str) -> Print:
+    """Return what stands for a program in comparisons; it is read by its tokens and never run.
+
+    Raises:
+        TooSlow: It takes longer than any program does.
+    """
+    import numpy as np  # noqa: PLC0415  comes with the library
+    from copydetect import CodeFingerprint  # noqa: PLC0415  a heavy, optional library
+
+    written = text.lstrip("\n")
+    with _limited(FILE_LIMIT_S):
+        # Every piece is kept, not a sample: which ones a sample has depends on the process.
+        made = CodeFingerprint("program.py", PIECE, 1, language="python", fp=io.StringIO(written))
+    pieces = [0] * max(0, len(made.filtered_code) - PIECE + 1)
+    for piece, places in made.hash_idx.items():
+        for place in places:
+            pieces[place] = int(piece)
+    made.hashes, made.hash_idx = set(), {}
+    if len(made.offsets):  # those of class names are not summed up as all others are
+        made.offsets[:, 1] = np.maximum.accumulate(made.offsets[:, 1])
+    return Print(pieces, made, len(text) - len(written))
+
+
+def overlap_of(left: Print, right: Print) -> Overlap:
+    """Return what two files have in common, of the pieces that both were told to keep."""
+    from copydetect import compare_files  # noqa: PLC0415  a heavy, optional library
+
+    signs, shares, slices = compare_files(left.fingerprint, right.fingerprint)
+    if not signs:
+        return Overlap(0, (0.0, 0.0), ((), ()))
+    first, second = (min(1.0, float(share)) for share in shares)
+    return Overlap(int(signs), (first, second), (_lines(left, slices[0]), _lines(right, slices[1])))
+
+
+def _lines(file: Print, slices: Any) -> Lines:
+    """Return the lines that slices of the text touch; ends may lie in the empty end of a line."""
+    text = file.fingerprint.raw_code
+    found: set[int] = set()
+    for start, stop in zip(slices[0].tolist(), slices[1].tolist(), strict=True):
+        piece = text[int(start) : int(stop)]
+        inside = piece.strip()
+        begin = int(start) + len(piece) - len(piece.lstrip())
+        first = text.count("\n", 0, begin) + 1 + file.skipped
+        found.update(range(first, first + inside.count("\n") + 1) if inside else ())
+    return tuple(sorted(found))
+
+
+@contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """Raise TooSlow after so much processor time of this process; only the main thread can be stopped like this."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(_signum: int, _frame: FrameType | None) -> None:
+        raise TooSlow
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)

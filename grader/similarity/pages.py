@@ -1,0 +1,144 @@
+"""The pages and the table of similar submissions, from templates that escape everything they are given."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
+
+from grader.reports.class_page.render import REPORT_PAGE, result_link
+from grader.reports.escape import csv_cell, shown
+from grader.reports.html.bundle import bundle
+from grader.similarity.contents import Handed, Pair, Side, Similar
+
+#: Pairs beyond these are in the table only.
+MOST_PAGES = 200
+#: A file of more lines is shown around what is alike, and no file with more lines than the second.
+WHOLE, MOST_LINES = 400, 1_500
+_AROUND = 3
+_LINE_LIMIT = 400
+OVERVIEW = "index.html"
+COLUMNS = (
+    *("kind", "page", "submission", "name", "file", "share"),
+    *("other_submission", "other_name", "other_file", "other_share", "signs"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line as a page shows it; number 0 stands for lines that were left out."""
+
+    number: int
+    text: str
+    alike: bool = False
+
+
+def render_overview(similar: Similar) -> str:
+    """Return the page that lists what was found."""
+    return _template("overview.html").render(
+        similar=similar,
+        pages=[page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))],
+        most=MOST_PAGES,
+        passed_over=[(one, sentence) for one in similar.handed for sentence in one.passed_over],
+    )
+
+
+def render_pair(similar: Similar, rank: int) -> str:
+    """Return the page that shows a pair side by side; `rank` is its place in the list, from 0 on."""
+    last = min(MOST_PAGES, len(similar.pairs)) - 1
+    return _template("pair.html").render(
+        pair=similar.pairs[rank],
+        rank=rank,
+        count=len(similar.pairs),
+        before=page_name(rank - 1) if rank else "",
+        after=page_name(rank + 1) if rank < last else "",
+        overview=OVERVIEW,
+    )
+
+
+def page_name(rank: int) -> str:
+    """Return the file name of the page of a pair."""
+    return f"pair-{rank + 1:03}.html"
+
+
+def render_table(similar: Similar) -> str:
+    """Return everything that was found as CSV: a row for each two files."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(COLUMNS)
+    for rank, pair in enumerate(similar.pairs):
+        writer.writerows(_pair_rows(pair, f"similarity/{page_name(rank)}" if rank < MOST_PAGES else ""))
+    for same in similar.same:
+        first = same.holders[0]
+        for other in same.holders[1:]:
+            sides = (*_cells(first, same.file, 1.0), *_cells(other, same.file, 1.0))
+            writer.writerow(["identical", "", *sides, ""])
+    return text.getvalue()
+
+
+def _pair_rows(pair: Pair, page: str) -> Iterator[list[str]]:
+    for one in pair.likenesses:
+        left = _cells(pair.left, one.left.program.name, one.left.share)
+        right = _cells(pair.right, one.right.program.name, one.right.share)
+        yield ["similar", page, *left, *right, str(one.overlap)]
+
+
+def _cells(handed: Handed, file: str, share: float) -> tuple[str, str, str, str]:
+    return csv_cell(handed.name), csv_cell(handed.label), csv_cell(file), f"{share:.2f}"
+
+
+def lines_of(side: Side) -> Sequence[Line]:
+    """Return a file line by line, with what is alike marked; long files around that alone."""
+    texts = side.program.text.expandtabs(4).rstrip("\n").split("\n")
+    alike = frozenset(side.alike)
+    wanted = set(range(1, len(texts) + 1))
+    if len(texts) > WHOLE:
+        wanted &= {near for number in alike for near in range(number - _AROUND, number + _AROUND + 1)}
+    made: list[Line] = []
+    before = 0
+    for number in sorted(wanted)[:MOST_LINES]:
+        if number != before + 1:
+            made.append(_gap(number - before - 1))
+        made.append(Line(number, shown(texts[number - 1], limit=_LINE_LIMIT), number in alike))
+        before = number
+    return [*made, _gap(len(texts) - before)] if before < len(texts) else made
+
+
+def _gap(count: int) -> Line:
+    return Line(0, f"{count} lines not shown")
+
+
+@cache
+def _template(name: str) -> Template:
+    templates = Environment(
+        loader=PackageLoader("grader.similarity"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    own = files(__package__).joinpath("templates/similarity.css").read_text(encoding="utf-8")
+    templates.filters |= {"shown": shown, "percent": _percent}
+    templates.globals |= {
+        "style": Markup(f"{bundle().style}\n{own}"),  # noqa: S704  our own
+        "lines_of": lines_of,
+        "report_of": report_of,
+    }
+    return templates.get_template(name)
+
+
+def report_of(handed: Handed) -> str:
+    """Return the link from a page to the report of a submission; empty if there is none."""
+    link = result_link(handed.name, REPORT_PAGE) if handed.reported else ""
+    return f"../{link}" if link else ""
+
+
+def _percent(share: float) -> str:
+    # Rounded down: what is not all is never shown as all.
+    return f"{int(100 * share)} %"
