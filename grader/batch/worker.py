@@ -17,13 +17,13 @@ from typing import Any
 import msgspec
 
 from grader.batch import standing as kept
-from grader.batch.keys import unusable_digest
+from grader.batch.keys import Conditions, unusable_digest
 from grader.batch.parcels import read_collected
 from grader.batch.standing import Standing, State
 from grader.batch.tasks import Task
 from grader.keeping import Keeper
 from grader.model.errors import GraderError, SubmissionError
-from grader.model.report import Report
+from grader.model.report import Report, Reproduction
 from grader.reading.variants import Recorded
 from grader.reports.audience import for_student
 from grader.reports.destination import write_whole
@@ -95,8 +95,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
     for name, text in _files(report, task, today).items():
         write_whole(task.into / name, text.encode())
     keeper.write(report)
-    given = report.reproduce
-    key = replace(conditions, rubrics=given.rubrics, recording=given.recording).key(report.digest)
+    key = _used(conditions, report.reproduce).key(report.digest)
     return Standing(
         state=State.GRADED if report.final else State.UNDECIDED,
         key=key,
@@ -105,6 +104,15 @@ def _graded(task: Task, progress: Progress) -> Standing:
         score=float(report.score),
         max_score=float(report.max_score),
     )
+
+
+def _used(conditions: Conditions, given: Reproduction) -> Conditions:
+    """Return the conditions with what was really read; of what a submission has no file of, as it was found before."""
+    if not conditions.every:
+        return replace(conditions, rubrics=given.rubrics, recording=given.recording)
+    read = dict(given.rubrics)
+    rubrics = tuple((id_, read.get(id_, digest)) for id_, digest in conditions.rubrics)
+    return replace(conditions, rubrics=rubrics, recording=given.recording or conditions.recording)
 
 
 def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:

@@ -1,5 +1,6 @@
 """What grading one submission comes to in its process: whose fault it is decides, and nothing of ours is a mark."""
 
+import dataclasses
 from fractions import Fraction
 
 import pytest
@@ -11,7 +12,7 @@ from grader.batch.tasks import Task
 from grader.model.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.model.exercise import Outcome
 from grader.model.feedback import Feedback, Shows
-from grader.model.report import Environment, ExerciseReport, Report, Verdict
+from grader.model.report import Environment, ExerciseReport, Report, Reproduction, Verdict
 from grader.model.trace import ClockKind
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
@@ -55,6 +56,25 @@ def test_the_same_reason_to_refuse_has_the_same_key(tmp_path, monkeypatch):
     same = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
     other = attempt(tmp_path, monkeypatch, SubmissionError("x: found two"))
     assert one.key == same.key != other.key
+
+
+def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path, monkeypatch):
+    """Where only exercises count of which there is a file, the others do not make it look changed."""
+    rubrics = (("a", "sha256:1"), ("e", "sha256:2"))
+    every = Conditions("0", rubrics, "sha256:9", None, "auto", "auto", every=True)
+    verdict = Verdict("b", "B", Outcome.MET, Fraction(2), Fraction(2), "fine")
+    exercise = ExerciseReport("e", "1", "E", True, ClockKind.VIRTUAL, "", (verdict,))
+    environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
+    digest = "sha256:" + "0" * 64
+    given = Reproduction(rubrics=rubrics[1:])
+    report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, every, 1, False, 60.0)
+    assert worker.attempt(task, lambda step: None).key == every.key(digest)
+    changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: changed)
+    task = dataclasses.replace(task, into=tmp_path / "again")
+    assert worker.attempt(task, lambda step: None).key != every.key(digest)
 
 
 def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path, monkeypatch):

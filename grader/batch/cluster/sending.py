@@ -93,7 +93,7 @@ def taken_in(task: Task, answer: Answer) -> Attempt:
         return failed(task, f"{answer.machine}: expected a result, found something else")
     conditions = task.conditions
     has_report = standing.state in (State.GRADED, State.UNDECIDED)
-    if has_report and not conditions.every and standing.key != conditions.key(standing.digest):
+    if has_report and standing.key != conditions.key(standing.digest):
         return failed(task, f"{answer.machine}: graded by other rubrics or another recording than those here")
     try:
         if has_report:
