@@ -82,7 +82,7 @@ def judgement(
     chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
 ) -> Judgement:
     """Return how to judge; raises RubricError for a rubric that cannot be used or an exercise that none has."""
-    exercises = read_exercises(Request("", exercises=chosen, rubrics=rubrics, draw=First()))
+    exercises = read_exercises(Request("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
     return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
 
 

@@ -21,7 +21,7 @@ from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
 from grader.reading.collected import Collected
 from grader.reading.quoting import listed, shown
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.rubric_file import builtin_headers, read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_collected, stage_submission
@@ -140,19 +140,27 @@ def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[E
     Raises:
         RubricError: A rubric cannot be used, or none has an exercise that was asked for.
     """
-    paths: Sequence[Path] = request.rubrics or tuple(builtin_rubrics().values())
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
+    paths = request.rubrics or _builtin(request)
     exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in paths]
-    known = [exercise.id for exercise in exercises]
-    for wanted in request.exercises:
+    _refuse_unknown(request.exercises, [exercise.id for exercise in exercises])
+    return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
+
+
+def _builtin(request: Request) -> list[Path]:
+    """Return the files of the built-in rubrics that are asked for; the others need not be read."""
+    headers = builtin_headers()
+    _refuse_unknown(request.exercises, [header.id for header in headers])
+    wanted = request.exercises or [h.id for h in headers if request.every or not h.by_request]
+    return [header.path for header in headers if header.id in wanted]
+
+
+def _refuse_unknown(exercises: Sequence[str], known: Sequence[str]) -> None:
+    for wanted in exercises:
         if wanted not in known:
             nearest = difflib.get_close_matches(wanted, known, n=1, cutoff=0.3)
             hint = f"did you mean {nearest[0]}" if nearest else f"known are {', '.join(known)}"
             raise RubricError(f"--exercise {wanted}: expected one of {', '.join(known)}, found {wanted}", hint)
-    if request.exercises:
-        return [exercise for exercise in exercises if exercise.id in request.exercises]
-    everything = request.every or bool(request.rubrics)
-    return [exercise for exercise in exercises if everything or not exercise.by_request]
 
 
 def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:

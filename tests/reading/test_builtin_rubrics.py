@@ -12,7 +12,7 @@ from grader.judging.checks import CHECKS
 from grader.model.quantities import NS_PER_S
 from grader.model.scenario import OdometryStream
 from grader.reading import shipped
-from grader.reading.rubric_file import NOTES, builtin_rubrics, read_rubric
+from grader.reading.rubric_file import NOTES, builtin_headers, builtin_rubrics, read_rubric
 from grader.reading.rubric_schema import rubric_schema, schema_text
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
@@ -69,6 +69,13 @@ def test_the_criteria_and_points_are_the_promised_ones():
     assert sum(sum(criteria.values()) for name, criteria in got.items() if name not in PROJECTS) == 100
     assert sum(sum(got[name].values()) for name in PROJECTS) == 100
     assert [name for name in got if exercise(name).by_request] == list(PROJECTS)
+
+
+def test_the_header_of_a_rubric_is_what_the_whole_of_it_says():
+    """The scenarios need not be read to know what a rubric is about."""
+    for header in builtin_headers():
+        whole = read_rubric(header.path)
+        assert (header.id, header.number, header.by_request) == (whole.id, whole.number, whole.by_request)
 
 
 @pytest.mark.parametrize("name", list(POINTS))
