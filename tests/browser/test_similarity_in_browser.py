@@ -39,7 +39,7 @@ def test_two_submissions_side_by_side(browser, results, width):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert page.locator(".side").first.locator("mark").count() > 20
     assert EVIL in page.inner_text("h1")
-    assert page.title() == f"Pair 1: {EVIL} and bob"
+    assert page.title() == f"Pair 1: bob and {EVIL}"
     assert "<script>document.title='owned'</script>" in page.inner_text("main")
     assert asked == [(results / "similarity" / "pair-001.html").as_uri()]
     assert said == []
