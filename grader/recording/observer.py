@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
@@ -38,6 +39,10 @@ INFINITE_NS = 9_000_000_000_000_000_000
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
 
+#: Participants of the grader's at most, and how long the name of a new one is waited for.
+PARTICIPANTS, NAME_S = 8, 2.0
+
+
 @dataclass(frozen=True, slots=True)
 class Taken:
     """One message as it came: topic, type, bytes and decoded fields."""
@@ -49,7 +54,7 @@ class Taken:
 
 
 class Observer:
-    """A node in a context of its own.
+    """A node in a context of its own, and a few more where topics have several types.
 
     Args:
         domain: ROS domain to join.
@@ -58,19 +63,10 @@ class Observer:
 
     def __init__(self, domain: int, limits: Limits) -> None:
         self._limits = limits
-        self._context = Context()
-        self._context.init(domain_id=domain)
-        self._name = f"_observer_{secrets.token_hex(8)}"  # a student's node can't guess it
-        self.node = Node(
-            self._name,
-            context=self._context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-            enable_logger_service=False,
-            # The node would serve descriptions of types to everybody; students' nodes are served nothing.
-            parameter_overrides=[Parameter("start_type_description_service", value=False)],
-        )
+        self._domain = domain
+        self.node = _make_node(domain)
+        self._nodes = [self.node]
+        self._names = {self.node.get_name()}
         self._readers: dict[tuple[str, str, bool], Any] = {}
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
@@ -80,8 +76,28 @@ class Observer:
 
     def close(self) -> None:
         """Leave the graph."""
-        self.node.destroy_node()
-        self._context.shutdown()
+        for node in self._nodes:
+            node.destroy_node()
+            node.context.shutdown()
+
+    def _make(self, create: Callable[[Node], Any]) -> Any:
+        """Make an endpoint, beside the others if its topic has another type there: a participant takes only one.
+
+        Raises:
+            RCLError: It cannot be made at all.
+        """
+        for node in self._nodes:
+            try:
+                return create(node)
+            except rclpy_implementation.RCLError:  # noqa: PERF203 - the first one nearly always does
+                if len(self._nodes) >= PARTICIPANTS:
+                    raise
+        other = _make_node(self._domain)
+        self._nodes.append(other)
+        self._names.add(other.get_name())
+        # Until its name is known, its endpoints would be taken for a student's.
+        wait_until(lambda: other.get_name() in self.node.get_node_names(), NAME_S)
+        return create(other)
 
     def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
         """Return the live graph without the grader's own node, everything sorted.
@@ -93,7 +109,7 @@ class Observer:
             services: Whether to look at services as well, which costs something.
         """
         names = [
-            pair for pair in self.node.get_node_names_and_namespaces() if pair[0] not in (self._name, UNKNOWN_NODE)
+            pair for pair in self.node.get_node_names_and_namespaces() if pair[0] not in {*self._names, UNKNOWN_NODE}
         ]
         nodes = sorted({_full_name(name, space) for name, space in names})
         offered = self.services.graph(sorted(set(names))) if services else ()
@@ -113,7 +129,7 @@ class Observer:
         return len(self._participants)
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
-        own = info.node_name == self._name
+        own = info.node_name in self._names
         prefix = bytes(info.endpoint_gid[:12])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
         latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
@@ -144,7 +160,7 @@ class Observer:
                 continue
             reliability = ReliabilityPolicy.RELIABLE if key[2] else ReliabilityPolicy.BEST_EFFORT
             qos = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=reliability)
-            self._readers[key] = self.node.create_subscription(message, end.topic, _nothing, qos, raw=True)
+            self._readers[key] = self._make(_subscribing(message, end.topic, qos))
         return unknown
 
     def reads(self, topic: str) -> bool:
@@ -205,7 +221,7 @@ class Observer:
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
         qos = QoSProfile(depth=100, reliability=reliability, durability=durability)
-        self._writers[topic] = self.node.create_publisher(message, topic, qos)
+        self._writers[topic] = self._make(lambda node: node.create_publisher(message, topic, qos))
 
     def subscribers_matched(self, topic: str) -> int:
         """Return how many subscriptions the publisher of a stimulus has."""
@@ -217,7 +233,28 @@ class Observer:
 
     def withdraw(self, topic: str) -> None:
         """Take the publisher of a stimulus out of the graph."""
-        self.node.destroy_publisher(self._writers.pop(topic))
+        writer = self._writers.pop(topic)
+        next(node for node in self._nodes if writer in node.publishers).destroy_publisher(writer)
+
+
+def _make_node(domain: int) -> Node:
+    """Return a node in a participant of its own, without services and under a name no student's node can guess."""
+    context = Context()
+    context.init(domain_id=domain)
+    return Node(
+        f"_observer_{secrets.token_hex(8)}",
+        context=context,
+        use_global_arguments=False,
+        enable_rosout=False,
+        start_parameter_services=False,
+        enable_logger_service=False,
+        # The node would serve descriptions of types to everybody; students' nodes are served nothing.
+        parameter_overrides=[Parameter("start_type_description_service", value=False)],
+    )
+
+
+def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], Any]:
+    return lambda node: node.create_subscription(message, topic, _nothing, qos, raw=True)
 
 
 def size_of(message: Any) -> int:
