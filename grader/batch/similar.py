@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.batch.classbook import Row
@@ -41,7 +42,8 @@ def compare_class(entries: Sequence[Entry], rows: Sequence[Row], given: Sequence
         HarnessError: They cannot be written.
     """
     standing = {row.name: row for row in rows}
-    similar = find_similar([_handed(entry, standing.get(entry.name)) for entry in entries], given)
+    handed = [_handed(entry, standing.get(entry.name)) for entry in entries]
+    similar = find_similar(_told_apart(handed), given)
     pages = [page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))]
     for rank, name in enumerate(pages):
         store.write(f"{FOLDER}/{name}", render_pair(similar, rank).encode())
@@ -73,6 +75,12 @@ def _handed(entry: Entry, row: Row | None) -> Handed:
         own=() if row is None else row.twin_of,
         reported=row is not None and row.report is not None,
     )
+
+
+def _told_apart(handed: Sequence[Handed]) -> list[Handed]:
+    """Return the submissions; people of the same name are called by that of the submission too."""
+    count = Counter(one.label for one in handed)
+    return [replace(one, label=f"{one.label} ({one.name})") if count[one.label] > 1 else one for one in handed]
 
 
 def _counted(similar: Similar) -> str:

@@ -80,6 +80,15 @@ def test_a_submission_that_cannot_be_used_stops_nothing(source):
     assert "it cannot be read" in (source.parent / "out" / "similarity" / "index.html").read_text()
 
 
+def test_people_of_the_same_name_are_told_apart(source):
+    """By the names of their submissions; all others are called by their own."""
+    roster = source.parent / "roster.csv"
+    roster.write_text("name,folder\nAda,ada\nAda,bob\nCleo,cleo\n", encoding="utf-8")
+    compared(source, roster=roster)
+    page = (source.parent / "out" / "similarity" / "pair-001.html").read_text(encoding="utf-8")
+    assert "<title>Pair 1: Ada (ada) and Ada (bob)</title>" in page
+
+
 def test_without_the_library_nothing_begins(source, monkeypatch):
     """Exit code 2 and what to install, before anybody is graded."""
     monkeypatch.setattr(extra, "find_spec", lambda name: None)
