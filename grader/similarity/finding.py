@@ -95,11 +95,19 @@ def _pairs(handed: Sequence[Handed], files: Sequence[_File]) -> list[Pair]:
             one = Side(left.program, overlap.shares[0], overlap.lines[0])
             other = Side(right.program, overlap.shares[1], overlap.lines[1])
             found[left.owner, right.owner].append(Likeness(one, other, overlap.signs))
-    pairs = [
-        Pair(handed[a], handed[b], tuple(sorted(likenesses, key=lambda one: (-one.share, -one.overlap))))
-        for (a, b), likenesses in found.items()
-    ]
+    pairs = [Pair(handed[a], handed[b], tuple(_best(likenesses))) for (a, b), likenesses in found.items()]
     return sorted(pairs, key=lambda pair: (-pair.share, -pair.overlap, pair.left.name, pair.right.name))
+
+
+def _best(likenesses: Sequence[Likeness]) -> Iterator[Likeness]:
+    """Yield the most alike files first, each file once: its own two files may be alike as well."""
+    left: set[str] = set()
+    right: set[str] = set()
+    for one in sorted(likenesses, key=lambda one: (-one.share, -one.overlap)):
+        if one.left.program.name not in left and one.right.program.name not in right:
+            left.add(one.left.program.name)
+            right.add(one.right.program.name)
+            yield one
 
 
 def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tuple[_File, _File]]:

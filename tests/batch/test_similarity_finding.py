@@ -135,6 +135,14 @@ def test_code_is_found_in_a_file_of_another_name():
     ]
 
 
+def test_each_file_is_shown_beside_the_one_it_is_most_like():
+    """Two files of one student that are alike make no four pairs of files."""
+    one = text_of("odom_csv")
+    both = (one, copies.reordered(one, 1) + "\nprint([number % 7 for number in range(12) if number > 3])\n" * 3)
+    likenesses = find_similar([handed("ada", *both), handed("bob", *both)], ()).pairs[0].likenesses
+    assert [(k.left.program.name, k.right.program.name) for k in likenesses] == [("file_1.py",) * 2, (FILE,) * 2]
+
+
 BODY = """
     def on_message(self, odometry):
         position = odometry.pose.pose.position
