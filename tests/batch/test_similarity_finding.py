@@ -99,6 +99,28 @@ def test_code_that_was_handed_out_does_not_count():
     assert pairs(find_similar([ada, bob], given)) == []
 
 
+OBVIOUS = {
+    "ada": "self.pub = self.create_publisher(Twist, '/cmd_vel', 10)|self.timer = self.create_timer(0.05, self.tick)||"
+    "def tick(self):|    self.pub.publish(self.msg)|    self.get_logger().info('published')",
+    "bob": "self.publisher_ = self.create_publisher(Twist, '/cmd_vel', 10)|self.timer = self.create_timer(0.05, "
+    "self.callback)||def callback(self):|    self.publisher_.publish(self.msg)|    self.get_logger().info('sending')",
+    "cleo": "self.p = self.create_publisher(Twist, 'cmd_vel', 10)|period = 0.05|self.timer = self.create_timer(period, "
+    "self.send)||def send(self):|    self.p.publish(self.msg)|    self.get_logger().info(f'v = {self.msg.linear.x}')",
+}
+
+
+def test_who_fills_the_gaps_of_a_template_in_the_obvious_way_is_not_listed():
+    """There is hardly another way, and two of three in a small class are no crowd whose code is taken out."""
+    template = (ROOT / "student_template" / "velocity_publisher.py").read_text(encoding="utf-8")
+    before, after = template[: template.index("        # TODO: create a pub")], template[template.index("def main") :]
+    group = []
+    for name, lines in OBVIOUS.items():
+        filled = "\n".join(("    " if "def " in ln or ln[:1] == " " else "        ") + ln for ln in lines.split("|"))
+        group.append(handed(name, f"{before}{filled}\n\n\n{after}"))
+    compile(group[0].programs[0].text, "ada", "exec")
+    assert pairs(find_similar(group, read_given([ROOT / "student_template"]))) == []
+
+
 def test_what_many_write_does_not_count():
     """In a small class, what more than a few have is what everybody writes; byte for byte the same is told anyway."""
     few = [handed(f"friend {k}", text_of("odom_csv")) for k in range(COMMON_LEAST)]
