@@ -1,8 +1,9 @@
 """Writes golden.yaml: what a student reads for every fault of the wrong and broken ones. Run by hand; read the changes.
 
-Usage: python tests/submissions/make_golden.py
+Usage: python tests/submissions/make_golden.py [PREFIX...]     with prefixes such as wrong/joint, only these again
 """
 
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -39,15 +40,18 @@ def golden_of(folder, exercises):
 def main():
     """Grade every wrong or broken submission and write what was told."""
     expected = YAML(typ="safe").load((HERE / "expected.yaml").read_text(encoding="utf-8"))
-    folders = [folder for folder in expected if folder.startswith(("wrong/", "broken/")) and folder not in UNSTEADY]
+    faulty = [folder for folder in expected if folder.startswith(("wrong/", "broken/")) and folder not in UNSTEADY]
+    folders = [folder for folder in faulty if folder.startswith(tuple(sys.argv[1:]) or ("",))]
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(lambda folder: golden_of(folder, expected[folder]["graded"]), folders))
-    golden = {folder: verdicts for folder, verdicts in zip(folders, found, strict=True) if verdicts is not None}
+    before = YAML(typ="safe").load((HERE / "golden.yaml").read_text(encoding="utf-8")) or {}
+    made = {**before, **dict(zip(folders, found, strict=True))}
+    golden = {folder: made[folder] for folder in faulty if made.get(folder) is not None}
     yaml = YAML()
     yaml.width = 1000
     with (HERE / "golden.yaml").open("w", encoding="utf-8") as out:
         yaml.dump(golden, out)
-    print(f"{len(golden)} of {len(folders)} folders")  # noqa: T201
+    print(f"{len(golden)} of {len(faulty)} folders")  # noqa: T201
 
 
 if __name__ == "__main__":
