@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from fractions import Fraction
@@ -54,6 +54,7 @@ class Explained:
         survivors: Why some mutants survive.
         expected: Which criteria should notice others.
         variants: Why some correct variants lose points.
+        criteria: Criterion id -> why no mutant turns it.
     """
 
     reference: Path | None = None
@@ -62,6 +63,7 @@ class Explained:
     survivors: Sequence[Explanation] = field(default_factory=tuple)
     expected: Sequence[Explanation] = field(default_factory=tuple)
     variants: Sequence[Explanation] = field(default_factory=tuple)
+    criteria: Mapping[str, str] = field(default_factory=dict)
 
 
 class _Shape(BaseModel):
@@ -83,6 +85,11 @@ class _Variant(_Shape):
     because: _Text
 
 
+class _Criterion(_Shape):
+    criterion: _Text
+    because: _Text
+
+
 class _File(_Shape):
     schema_: Literal["grader/selftest-notes/v1"] = Field(alias="schema")
     reference: _Text | None = None
@@ -91,6 +98,7 @@ class _File(_Shape):
     survivors: Annotated[tuple[_Survivor, ...], Field(strict=False)] = ()
     expected: Annotated[tuple[_Expected, ...], Field(strict=False)] = ()
     variants: Annotated[tuple[_Variant, ...], Field(strict=False)] = ()
+    criteria: Annotated[tuple[_Criterion, ...], Field(strict=False)] = ()
 
 
 def beside(rubric: Path) -> Path:
@@ -139,6 +147,7 @@ def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
             Explanation(one.variants, because=_line(one.because), where=_where(path, tree, ("variants", n)))
             for n, one in enumerate(read.variants)
         ),
+        criteria={one.criterion: _line(one.because) for one in read.criteria},
     )
 
 
@@ -165,14 +174,21 @@ def _refuse(path: Path, mistakes: Sequence[Mistake]) -> NoReturn:
 
 def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> list[Mistake]:
     known = [criterion.id for criterion in exercise.criteria]
-    mistakes = []
-    for n, one in enumerate(read.expected):
-        for k, id_ in enumerate(one.killed_by):
-            if id_ not in known:
-                place = tree.values["expected", n, "killed_by", k]
-                text = f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`"
-                mistakes.append(place.mistake(text, nearest(id_, known)))
-    return mistakes
+    named: list[tuple[str, TreePath]] = [
+        *(
+            (id_, ("expected", n, "killed_by", k))
+            for n, e in enumerate(read.expected)
+            for k, id_ in enumerate(e.killed_by)
+        ),
+        *((one.criterion, ("criteria", n, "criterion")) for n, one in enumerate(read.criteria)),
+    ]
+    return [
+        tree.values[at].mistake(
+            f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`", nearest(id_, known)
+        )
+        for id_, at in named
+        if id_ not in known
+    ]
 
 
 def _where(path: Path, tree: YamlTree, at: TreePath) -> str:

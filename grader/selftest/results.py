@@ -120,6 +120,7 @@ class Result:
         variants: Correct programs, in order.
         whole: Whether every mutant ran, and not only some.
         idle: Patterns of the author's that explain nothing, with their places.
+        unturned: Criterion id -> why no mutant turns it, as the author says.
         recordings: How many scenarios were recorded.
         duration_s: Real time.
     """
@@ -134,6 +135,7 @@ class Result:
     variants: tuple[Trial, ...]
     whole: bool = True
     idle: tuple[str, ...] = field(default_factory=tuple)
+    unturned: Mapping[str, str] = field(default_factory=dict)
     recordings: int = 0
     duration_s: float = 0.0
 
@@ -154,9 +156,11 @@ class Result:
 
     @property
     def never_turned(self) -> tuple[str, ...]:
-        """Criteria that noticed no mutant at all; nothing is said if only some ran."""
+        """Criteria that noticed no mutant at all, and nobody explained why; nothing is said if only some ran."""
         turned = {id_ for trial in self.mutants for id_ in trial.standing.turned}
-        return tuple(id_ for id_ in self.criteria if id_ not in turned) if self.whole else ()
+        return (
+            tuple(id_ for id_ in self.criteria if id_ not in turned and id_ not in self.unturned) if self.whole else ()
+        )
 
     @property
     def template_fits(self) -> bool:

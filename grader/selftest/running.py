@@ -149,6 +149,7 @@ def _tested(path: Path, bench: Bench, explained: Explained, options: Options) ->
         variants=correct,
         whole=whole,
         idle=_idle(explained, tried, correct) if whole else (),
+        unturned=explained.criteria,
         recordings=bench.recordings,
         duration_s=time.perf_counter() - started,
     )
@@ -211,8 +212,10 @@ def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Tri
     survived = [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]
     lost = [trial.id for trial in variants if trial.fate is Fate.KILLED]
     every = [trial.id for trial in mutants]
+    turned = {id_ for trial in mutants for id_ in trial.standing.turned}
     return (
         *idle(explained.survivors, lambda e: any(map(e.fits, survived))),
         *idle(explained.expected, lambda e: any(map(e.fits, every))),
         *idle(explained.variants, lambda e: any(map(e.fits, lost))),
+        *(f"{id_}: the notes say why no mutant turns it, but some do" for id_ in explained.criteria if id_ in turned),
     )

@@ -74,6 +74,8 @@ def _result(console: Console, result: Result) -> None:
     _listed(console, "Noticed by another criterion than expected", others, "yellow")
     _listed(console, "Explained survivors", [t for t in result.mutants if t.because], _QUIET)
     _listed(console, "Explained variants", [t for t in result.variants if t.because], _QUIET)
+    for id_, because in result.unturned.items():
+        _put(console, 2, f"{id_} is turned by no mutant because {shown(because, limit=600)}", _QUIET)
     for line in result.idle:
         _put(console, 2, line, "yellow")
 
@@ -189,6 +191,7 @@ def _as_data(result: Result) -> Mapping[str, Any]:
             {"id": id_, "turned_by": sum(id_ in t.standing.turned for t in result.mutants)} for id_ in result.criteria
         ],
         "never_turned": list(result.never_turned),
+        "unturned_because": {id_: valid_unicode(because) for id_, because in result.unturned.items()},
         "mutants": [_trial_data(trial) for trial in result.mutants],
         "variants": [_trial_data(trial) for trial in result.variants],
         "idle": [valid_unicode(line) for line in result.idle],

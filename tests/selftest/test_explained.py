@@ -24,6 +24,8 @@ expected:
   - {mutants: "*:period:*", killed_by: [rate]}
 variants:
   - {variants: "*:renamed_nodes", because: the name is asked for}
+criteria:
+  - {criterion: logging, because: nobody forgets it}
 """
 
 
@@ -52,6 +54,7 @@ def test_what_notes_say(tmp_path):
     assert not survivor.fits("a.py:3:texts:b")
     assert said.expected[0].criteria == ("rate",)
     assert said.variants[0].because == "the name is asked for"
+    assert said.criteria == {"logging": "nobody forgets it"}
 
 
 def test_without_a_file_nothing_is_said(tmp_path):
@@ -72,7 +75,8 @@ def test_without_a_file_nothing_is_said(tmp_path):
         (GOOD.replace("[rate]", "[speed]"), "11:41: expected a criterion of velocity_publisher ("),
         (GOOD.replace("[rate]", "[]"), "11:40: expected a list with at least one entry"),
         (GOOD.replace("2.5", "-1"), "4:17: "),
-        (GOOD + "schema: twice\n", "14:1: expected each key once"),
+        (GOOD.replace("criterion: logging", "criterion: log"), "15:17: expected a criterion of velocity_publisher ("),
+        (GOOD + "schema: twice\n", "16:1: expected each key once"),
         ("schema: [\n", "2:1: not valid YAML"),
     ],
 )

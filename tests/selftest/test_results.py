@@ -89,6 +89,13 @@ def test_a_part_of_the_mutants_says_nothing_about_what_never_turned():
     assert replace(result(), mutants=(), whole=False).never_turned == ()
 
 
+def test_a_criterion_that_nothing_turns_may_be_explained():
+    """The text shows why."""
+    found = replace(result(), mutants=(trial(1, rate=NOT_MET),), unturned={"speed": "it is the last"})
+    assert found.passed
+    assert "speed is turned by no mutant because it is the last" in render_results([found], width=80, colour=False)
+
+
 def test_only_a_named_criterion_kills_as_expected():
     """Where the author names some, one of them has to be turned."""
     assert trial(1, rate=NOT_MET, expected=("rate", "speed")).as_expected
