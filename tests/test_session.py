@@ -4,6 +4,7 @@ import pytest
 
 from grader.model.errors import RecordingError, RubricError
 from grader.recording.plan import seed_of
+from grader.reading.rubric_file import builtin_rubrics
 from grader.session import Request, read_exercises, read_recording
 
 
@@ -21,7 +22,7 @@ def test_an_unknown_exercise_names_the_nearest():
     assert error.value.hint == "did you mean velocity_publisher"
     with pytest.raises(RubricError) as error:
         read_exercises(Request("x", exercises=("3",)))
-    assert error.value.hint == "known are velocity_publisher, odom_subscriber, two_node_communication"
+    assert error.value.hint == f"known are {', '.join(builtin_rubrics())}"
 
 
 def test_the_recording_is_read_only_where_it_is_played(tmp_path):

@@ -29,7 +29,7 @@ def info(node: str, number: int) -> Any:
 def observer(publishers: list[Any], nodes: list[tuple[str, str]]) -> Observer:
     """An observer that sees a graph without joining any."""
     found: Observer = Observer.__new__(Observer)
-    found._name, found._participants = "_observer_1", {}
+    found._names, found._participants = {"_observer_1"}, {}
     found.node = SimpleNamespace(  # type: ignore[assignment]
         get_node_names_and_namespaces=lambda: nodes,
         get_topic_names_and_types=lambda no_demangle: [("/fan_speed", ["std_msgs/msg/Float32"])],
