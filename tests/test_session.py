@@ -3,8 +3,8 @@
 import pytest
 
 from grader.model.errors import RecordingError, RubricError
-from grader.recording.plan import seed_of
 from grader.reading.rubric_file import builtin_rubrics
+from grader.recording.plan import seed_of
 from grader.session import Request, read_exercises, read_recording
 
 
