@@ -50,10 +50,10 @@ def level_of(answer: Answer) -> float | None:
 def asking(
     write: Callable[[Answer], Said],
     answers: Sequence[Answer] = ANSWERS,
-    header: str = "--- Mission {} ---",
+    header: str = "== run {} ==",
     pause_s: float = 1.0,
     delay_s: float = 0.1,
-    waiting: Said = (("INFO", "Waiting for battery service..."),),
+    waiting: Said = (("INFO", "nobody there yet"),),
     appears_s: float = 3.0,
     clock: ClockKind = ClockKind.VIRTUAL,
 ) -> Recording:
@@ -63,7 +63,7 @@ def asking(
     for k in range(1, 3):
         say(rec, float(k), waiting)
     t = appears_s + 0.25
-    say(rec, t, [("INFO", "Mission Planner ready")])
+    say(rec, t, [("INFO", "planner is up")])
     for place, answer in enumerate(answers, 1):
         say(rec, t, [("INFO", header.format(place))] if header else [])
         rec.request(t, BATTERY, place, sender="student")
@@ -86,13 +86,13 @@ def say(rec: Recording, t_s: float, texts: Said) -> None:
 
 
 def chapter(answer: Answer) -> Said:
-    said = [("INFO", f"Battery status: {answer[1]}")] if answer else [("ERROR", "Service call failed")]
+    said = [("INFO", f"the answer: {answer[1]}")] if answer else [("ERROR", "no answer came")]
     level = level_of(answer)
     if level is None:
         return said
     return [
         *said,
-        ("INFO", "Battery OK, starting mission") if level > 20 else ("WARN", "Low battery, aborting mission"),
+        ("INFO", "charge is fine, off it goes") if level > 20 else ("WARN", "charge is low, it stays"),
     ]
 
 
@@ -112,7 +112,7 @@ def pausing(answer: Answer) -> Said:
 
 
 def silent_go(answer: Answer) -> Said:
-    return [s for s in chapter(answer) if "starting" not in s[1]]
+    return [s for s in chapter(answer) if "off it goes" not in s[1]]
 
 
 def as_error(answer: Answer) -> Said:
@@ -156,14 +156,14 @@ def deciding(go: Callable[[float], bool], unknown: float | None = None) -> Calla
         level = unknown if level is None else level
         if level is None:
             return chapter(answer)
-        said = [("INFO", f"Battery status: {answer[1]}")] if answer else [("ERROR", "Service call failed")]
-        return [*said, ("INFO", "Battery OK, starting mission") if go(level) else ("WARN", "Low, aborting")]
+        said = [("INFO", f"the answer: {answer[1]}")] if answer else [("ERROR", "no answer came")]
+        return [*said, ("INFO", "charge is fine, off it goes") if go(level) else ("WARN", "low, it stays")]
 
     return write
 
 
 def low_is_info(answer: Answer) -> Said:
-    return [("INFO" if "Low" in text else level, text) for level, text in chapter(answer)]
+    return [("INFO" if "low" in text else level, text) for level, text in chapter(answer)]
 
 
 def says_nothing(answer: Answer) -> Said:
@@ -176,7 +176,7 @@ def always_warns(answer: Answer) -> Said:
 
 def goes_on(kinds: Sequence[Answer]) -> Callable[[Answer], Said]:
     def write(answer: Answer) -> Said:
-        return [*chapter(answer), ("INFO", "Battery OK, starting mission")] if answer in kinds else chapter(answer)
+        return [*chapter(answer), ("INFO", "charge is fine, off it goes")] if answer in kinds else chapter(answer)
 
     return write
 
@@ -186,21 +186,21 @@ def goes_on(kinds: Sequence[Answer]) -> Callable[[Answer], Said]:
     [
         (deciding(lambda v: v >= 20), BELOW, "no record of severity WARN after 20, expected that it warns"),
         (deciding(lambda v: v > 10), BELOW, "no record of severity WARN after 20"),
-        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: Low, aborting after 20.1, expected that it goes on"),
-        (deciding(lambda v: v <= 20), REACTS, "WARN at t = 3.350 s: Low, aborting after 84.5"),
+        (deciding(lambda v: v > 30), ABOVE, "WARN at t = 4.450 s: low, it stays after 20.1, expected that it goes on"),
+        (deciding(lambda v: v <= 20), REACTS, "WARN at t = 3.350 s: low, it stays after 84.5"),
         (deciding(lambda v: False), ABOVE, "after 84.5"),
         (low_is_info, BELOW, "no record of severity WARN after 20"),
         (says_nothing, ABOVE, "nothing is written after"),
         (always_warns, ABOVE, "WARN at"),
         (deciding(lambda v: v > 20, 60.0), STILL, "after a response without success (request 4)"),
-        (goes_on([FAILED]), STILL, "'Battery OK, starting mission' after a response without success (request 4)"),
+        (goes_on([FAILED]), STILL, "'charge is fine, off it goes' after a response without success (request 4)"),
         (goes_on([UNREADABLE]), STILL, "after an answer without a number (request 5)"),
         (goes_on([None]), STILL, "after a request that got no response (request 6)"),
     ],
 )
 def test_wrong_decisions_are_named(write: Callable[[Answer], Said], check: Check, said: str) -> None:
     """With the moment, the text and the number."""
-    header = "" if write is says_nothing else "--- Mission {} ---"
+    header = "" if write is says_nothing else "== run {} =="
     finding = check.judge(asking(write, header=header).trace())
     assert finding.credit == 0
     assert said in finding.reason
@@ -225,7 +225,7 @@ def test_a_client_without_a_pause_between_the_words_is_compared_leniently() -> N
 def test_printing_is_half() -> None:
     """Of the waiting and of the decisions; going on without an answer is wrong in print as well."""
     rec = asking(as_print, header="", waiting=(("print", "waiting"),))
-    rec.items = [o for o in rec.items if getattr(o, "text", "") != "Mission Planner ready"]
+    rec.items = [o for o in rec.items if getattr(o, "text", "") != "planner is up"]
     for check in (WAITS, REACTS, ABOVE, BELOW):
         finding = check.judge(rec.trace())
         assert finding.credit == Fraction(1, 2), finding.reason

@@ -27,7 +27,7 @@ def written(
     early_s: float = 0.0,
 ) -> Recording:
     """A publisher that started with a log, and writes at some of its messages; empty texts are not written."""
-    rec = Recording(10.1, clock, "simple_publisher.py").log(0.0, "Joint Command Publisher started")
+    rec = Recording(10.1, clock, "simple_publisher.py").log(0.0, "joint publisher is up")
     for n in range(count):
         value = math.sin(0.1 * n)
         rec.number(0.1 + 0.1 * n, "/joint_commands", value, FLOAT64)
@@ -39,7 +39,7 @@ def written(
 
 
 def chapter(n: int, value: float) -> str:
-    return f"Publishing joint command: {value:.3f} rad"
+    return f"sent {value:.3f} rad"
 
 
 RIGHT = {
@@ -72,7 +72,7 @@ def test_one_log_for_ten_messages_is_met(rec: Recording) -> None:
 def test_the_reason_holds_count_and_text() -> None:
     """As the student wrote it."""
     reason = CHECK.judge(RIGHT["chapter"].trace()).reason
-    assert reason.startswith("simple_publisher.py: 10 times logged, one for 10 messages on /joint_commands: Publishing")
+    assert reason.startswith("simple_publisher.py: 10 times logged, one for 10 messages on /joint_commands: sent")
 
 
 WRONG = {

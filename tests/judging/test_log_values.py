@@ -39,7 +39,7 @@ def hearing(
 
 
 def chapter(angle: float) -> str:
-    return f"Received joint command: {angle:.3f} rad ({angle * (180.0 / 3.14159):.1f}°)"
+    return f"got {angle:.3f} rad ({angle * 180 / 3.14159:.1f}°)"
 
 
 RIGHT: dict[str, Callable[[float], str]] = {

@@ -30,7 +30,7 @@ def main(args=None):
         response = node.ask()
         if response and response.success:
             try:
-                percent = float(response.message.split(':')[1].split('%')[0])
+                percent = float(response.message.split()[1].rstrip('%'))
             except Exception:
                 percent = 100.0
             if percent > 20.0:

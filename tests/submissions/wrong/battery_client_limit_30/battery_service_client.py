@@ -29,7 +29,7 @@ def main(args=None):
         node.get_logger().info(f'mission {i + 1}')
         response = node.ask()
         if response and response.success:
-            percent = float(response.message.split(':')[1].split('%')[0])
+            percent = float(response.message.split()[1].rstrip('%'))
             if percent > 30.0:
                 node.get_logger().info('battery fine, mission starts')
             else:
