@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import platform
 import time
 from collections.abc import Callable, Sequence
@@ -13,15 +12,16 @@ from typing import Protocol
 import grader
 from grader.early import EarlyReports
 from grader.judging.whole import judge_run
-from grader.model.errors import RubricError, SubmissionError
-from grader.model.exercise import Exercise
+from grader.model.errors import SubmissionError
+from grader.model.exercise import Exercise, exercise_name
 from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
+from grader.reading.builtin_rubrics import builtin_headers, require_exercises
 from grader.reading.collected import Collected
 from grader.reading.quoting import listed, shown
-from grader.reading.rubric_file import builtin_headers, read_rubric
+from grader.reading.rubric_file import read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_collected, stage_submission
@@ -143,24 +143,16 @@ def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[E
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     paths = request.rubrics or _builtin(request)
     exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in paths]
-    _refuse_unknown(request.exercises, [exercise.id for exercise in exercises])
+    require_exercises(request.exercises, [exercise.id for exercise in exercises])
     return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
 
 
 def _builtin(request: Request) -> list[Path]:
     """Return the files of the built-in rubrics that are asked for; the others need not be read."""
     headers = builtin_headers()
-    _refuse_unknown(request.exercises, [header.id for header in headers])
+    require_exercises(request.exercises, [header.id for header in headers])
     wanted = request.exercises or [h.id for h in headers if request.every or not h.by_request]
     return [header.path for header in headers if header.id in wanted]
-
-
-def _refuse_unknown(exercises: Sequence[str], known: Sequence[str]) -> None:
-    for wanted in exercises:
-        if wanted not in known:
-            nearest = difflib.get_close_matches(wanted, known, n=1, cutoff=0.3)
-            hint = f"did you mean {nearest[0]}" if nearest else f"known are {', '.join(known)}"
-            raise RubricError(f"--exercise {wanted}: expected one of {', '.join(known)}, found {wanted}", hint)
 
 
 def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:
@@ -178,19 +170,13 @@ def plan_jobs(
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
-            f"{step_name(exercise)}: {scenario.id.replace('_', ' ')}",
+            f"{exercise_name(exercise.number).lower()}: {scenario.id.replace('_', ' ')}",
             plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
         )
         for exercise in exercises
         for scenario in exercise.scenarios
         if all(submission.files[name].found for name in scenario.processes)
     }
-
-
-def step_name(exercise: Exercise) -> str:
-    """Return what an exercise is called while it is recorded: `exercise 1`, but `project 1` if its number says so."""
-    number = exercise.number
-    return f"exercise {number}" if number[:1].isdigit() else number.lower()
 
 
 def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:

@@ -12,8 +12,9 @@ from grader import cli, explaining, session
 from grader.explaining import explain
 from grader.judging.checks import CHECKS
 from grader.model.errors import GraderError
+from grader.reading.builtin_rubrics import builtin_rubrics
 from grader.reading.manuals import manual_of
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.rubric_file import read_rubric
 
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from grader.model.errors import RecordingError, RubricError
-from grader.reading.rubric_file import builtin_rubrics
+from grader.reading.builtin_rubrics import builtin_rubrics
 from grader.recording.plan import seed_of
 from grader.session import Request, read_exercises, read_recording
 

@@ -81,7 +81,7 @@ def test_a_key_that_cannot_be_used_is_refused(tmp_path, content, found):
 @pytest.fixture
 def sheet(tmp_path):
     """Run `grade rubric variant` on exercise 1 with a rate that varies."""
-    from grader.reading.rubric_file import builtin_rubrics
+    from grader.reading.builtin_rubrics import builtin_rubrics
 
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {choose: [10 Hz, 15 Hz, 20 Hz]}\nscenarios:", 1)

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from grader import cli
-from grader.reading.rubric_file import builtin_rubrics
+from grader.reading.builtin_rubrics import builtin_rubrics
 from grader.reading.shipped import shipped_folder
 from grader.reports.json_report import report_schema
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from grader.exporting.parts import integration, pins, wheel, zipped
 from grader.model.errors import GraderError, RubricError
-from grader.reading.rubric_file import builtin_rubrics, own_check_files, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics, require_exercises
+from grader.reading.rubric_file import own_check_files, read_rubric
 from grader.reading.variants import First
 
 #: Files that are run; the others are read.
@@ -103,7 +104,4 @@ def _check(chosen: Chosen) -> None:
         if found.variant is not None:
             text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
             raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
-    known = [exercise.id for exercise in exercises]
-    for exercise in chosen.exercises:
-        if exercise not in known:
-            raise RubricError(f"--exercise {exercise}: expected one of {', '.join(known)}, found {exercise}")
+    require_exercises(chosen.exercises, [exercise.id for exercise in exercises])

@@ -14,6 +14,11 @@ from grader.model.trace import Trace
 from grader.model.variant import Variant
 
 
+def exercise_name(number: str) -> str:
+    """Return what an exercise is called by its number: `Exercise 1`, but `Project 1` if the number says so itself."""
+    return f"Exercise {number}" if number[:1].isdigit() else number
+
+
 class Outcome(str, Enum):
     """What judging a criterion came to."""
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -33,7 +33,6 @@ from grader.reading.rubric_model import (
 )
 from grader.reading.rubric_stimuli import stimulus_of
 from grader.reading.rubric_types import CHECK_FILE
-from grader.reading.shipped import shipped_folder
 from grader.reading.variants import (
     Draw,
     First,
@@ -269,48 +268,3 @@ def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
         may_exit=shape.may_exit,
         shutdown_ns=shape.shutdown or 0,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Header:
-    """What a rubric that comes with the grader says of its exercise before its scenarios; see Exercise."""
-
-    path: Path
-    id: str
-    number: str
-    by_request: bool
-
-
-def builtin_rubrics() -> Mapping[str, Path]:
-    """Return the rubrics that come with the grader: exercise id to YAML file, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
-    return {header.id: header.path for header in builtin_headers()}
-
-
-def builtin_headers() -> tuple[Header, ...]:
-    """Return the headers of the rubrics that come with the grader, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
-    folder = shipped_folder()
-    paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
-    if not paths:
-        raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")
-    return tuple(sorted(map(_header, paths), key=lambda header: _number_order(header.number)))
-
-
-def _header(path: Path) -> Header:
-    """Read the beginning of a file of ours, whose scenarios need not be looked at to know what it is about."""
-    above, _, _ = path.read_text(encoding="utf-8").partition("\nscenarios:")
-    tree: Any = read_yaml(above).data
-    said = tree["exercise"]
-    return Header(path, said["id"], str(said["number"]), said.get("by_request", False))
-
-
-def _number_order(number: str) -> list[tuple[int, str]]:
-    """Return a sort key under which 2 comes before 10 and numbers before words."""
-    return [(int(part), "") if part.isdigit() else (1 << 62, part) for part in re.findall(r"[0-9]+|[^0-9]+", number)]

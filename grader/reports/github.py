@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from grader.model.exercise import Location, Outcome
+from grader.model.exercise import Location, Outcome, exercise_name
 from grader.model.report import ExerciseReport, Report, Verdict
 from grader.reports import wording
 from grader.reports.escape import log_lines, shown, workflow_message, workflow_property
@@ -63,7 +63,7 @@ def _annotation(exercise: ExerciseReport, verdict: Verdict) -> _Annotation:
     word = wording.OUTCOME_WORDS[verdict.outcome]
     return _Annotation(
         kind=_KINDS[verdict.outcome],
-        title=f"{wording.numbered(number)}, {shown(verdict.title)}: {word}, {score}",
+        title=f"{exercise_name(number)}, {shown(verdict.title)}: {word}, {score}",
         message="\n".join(wording.explanation(verdict)),
         location=verdict.location,
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from grader.model.containment import NO_WALLS, summarised
-from grader.model.exercise import Outcome
+from grader.model.exercise import Outcome, exercise_name
 from grader.model.quantities import seconds
 from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind
@@ -60,12 +60,7 @@ def exercise_line(exercise: ExerciseReport) -> str:
     """Return number, title and score of an exercise; safe to show as a line of text."""
     number, title = (shown(text, limit=NAME_LIMIT) for text in (exercise.number, exercise.title))
     score = f"{points(exercise.score)} of {points(exercise.max_score)} points"
-    return f"{numbered(number)}: {title} ({score}{'' if exercise.required else ', optional'})"
-
-
-def numbered(number: str) -> str:
-    """Return what an exercise is called by its number: `Exercise 1`, but `Project 1` if the number says so itself."""
-    return f"Exercise {number}" if number[:1].isdigit() else number
+    return f"{exercise_name(number)}: {title} ({score}{'' if exercise.required else ', optional'})"
 
 
 def warnings(report: Report) -> list[str]:

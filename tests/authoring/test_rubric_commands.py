@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from grader import cli
 from grader.judging.checks import CHECKS
-from grader.reading.rubric_file import builtin_rubrics
+from grader.reading.builtin_rubrics import builtin_rubrics
 from grader.reading.rubric_schema import schema_text
 
 GOOD = """\

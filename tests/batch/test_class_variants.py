@@ -11,7 +11,8 @@ from grader.batch.standing import State
 from grader.batch.tasks import Task
 from grader.model.errors import ClassError, HarnessError, VariantError
 from grader.model.variant import Drawn
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 from grader.variants import by_key
 
 ROSTER = (

@@ -9,7 +9,8 @@ from grader.judging.figures.pictures import illustrated
 from grader.judging.judge import judge_exercise
 from grader.model.submission import StudentFile, Submission
 from grader.model.trace import FaultKind
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 
 CHAPTER = ("velocity_publisher", "odom_subscriber", "two_node_communication")
 SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"

@@ -28,7 +28,8 @@ from grader.model.exercise import Exercise
 from grader.model.report import ExerciseReport, Verdict
 from grader.model.submission import StudentFile, Submission
 from grader.model.trace import FaultKind, Trace
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 
 HERE = Path(__file__).parent / "diagnosis"
 FLOAT64 = "std_msgs/msg/Float64"

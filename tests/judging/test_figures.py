@@ -26,7 +26,8 @@ from grader.judging.judge import judge_exercise
 from grader.model.figure import GraphFigure, Look, Tone
 from grader.model.submission import StudentFile, Submission
 from grader.model.trace import FaultKind, Mark, Request, Response
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 
 EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))

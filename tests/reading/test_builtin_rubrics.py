@@ -12,7 +12,8 @@ from grader.judging.checks import CHECKS
 from grader.model.quantities import NS_PER_S
 from grader.model.scenario import OdometryStream
 from grader.reading import shipped
-from grader.reading.rubric_file import NOTES, builtin_headers, builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_headers, builtin_rubrics
+from grader.reading.rubric_file import NOTES, read_rubric
 from grader.reading.rubric_schema import rubric_schema, schema_text
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"

@@ -8,7 +8,8 @@ from report_samples import report
 
 from grader.model.exercise import Location, Outcome
 from grader.model.report import ReportedFault, Verdict
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 
 #: Criterion -> (likelihood in percent, diagnosis, reason, hint); {a} and {b} are drawn.
 MISTAKES = {

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from grader.model.errors import RubricError
-from grader.reading.rubric_file import NOTES, builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import NOTES, read_rubric
 from grader.selftest.explained import beside, read_explained
 
 EXERCISE = read_rubric(builtin_rubrics()["velocity_publisher"])

@@ -8,7 +8,8 @@ from click.testing import CliRunner
 
 from grader.cli import app
 from grader.model.errors import RubricError
-from grader.reading.rubric_file import builtin_rubrics, read_rubric
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
 from grader.reading.submission import stage_submission
 from grader.selftest.bench import Candidate
 from grader.selftest.running import Options, _sampled, _sources, selftest

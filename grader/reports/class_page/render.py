@@ -10,7 +10,7 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from grader.model.exercise import Outcome
+from grader.model.exercise import Outcome, exercise_name
 from grader.reports import wording
 from grader.reports.class_page import bundle
 from grader.reports.class_page.causes import Cause, causes
@@ -84,7 +84,7 @@ def _template() -> Template:
     templates.globals |= {
         "embedded": Markup,
         "bundle": bundle,
-        "numbered": wording.numbered,
+        "exercise_name": exercise_name,
         "result_link": result_link,
         "page_link": page_link,
         "segments": _segments,

@@ -9,7 +9,7 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from grader.model.exercise import Location, Outcome
+from grader.model.exercise import Location, Outcome, exercise_name
 from grader.model.figure import Excerpt, Figure
 from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind
@@ -53,7 +53,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     templates.filters["shown"] = shown
-    templates.filters["numbered"] = wording.numbered
+    templates.filters["exercise_name"] = exercise_name
     templates.globals |= {
         "wording": wording,
         "outcome_word": _outcome_word,
