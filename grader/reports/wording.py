@@ -167,7 +167,10 @@ def versions(report: Report) -> str:
 def clock(report: Report) -> str:
     """Return which clock the nodes ran on."""
     walls = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
-    return f"virtual, but the wall clock in exercise {', '.join(walls)}" if walls else "virtual"
+    if not walls:
+        return "virtual"
+    first = exercise_name(walls[0]).replace("Exercise", "exercise", 1)
+    return f"virtual, but the wall clock in {', '.join([first, *walls[1:]])}"
 
 
 def isolation(report: Report) -> str:

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 from markupsafe import Markup
 
 from grader.reports.class_page.render import REPORT_PAGE, result_link
 from grader.reports.escape import csv_cell, shown
 from grader.reports.html.bundle import bundle
+from grader.reports.html.environment import page_environment
 from grader.similarity.contents import Handed, Pair, Side, Similar
 
 #: Pairs beyond these are in the table only.
@@ -116,15 +117,9 @@ def _gap(count: int) -> Line:
 
 @cache
 def _template(name: str) -> Template:
-    templates = Environment(
-        loader=PackageLoader("grader.similarity"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    templates = page_environment("grader.similarity")
     own = files(__package__).joinpath("templates/similarity.css").read_text(encoding="utf-8")
-    templates.filters |= {"shown": shown, "percent": _percent}
+    templates.filters |= {"percent": _percent}
     templates.globals |= {
         "style": Markup(f"{bundle().style}\n{own}"),  # noqa: S704  our own
         "lines_of": lines_of,

@@ -11,20 +11,12 @@ from hostile import hostile, record
 from grader.model.limits import Limits
 from grader.model.quantities import KIB, MIB, NS_PER_S
 from grader.model.trace import FaultKind
-from grader.recording.studio import open_studio
 
 pytestmark = pytest.mark.ros
 
 #: Harm begins at the 40th tick, at two seconds.
 BEGIN_NS = 2 * NS_PER_S
 REST = "the rest was not looked at"
-
-
-@pytest.fixture(scope="module")
-def studio():
-    """The strongest sandbox of this machine, with warm workers."""
-    with open_studio("auto") as studio:
-        yield studio
 
 
 @pytest.fixture

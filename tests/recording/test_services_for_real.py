@@ -16,7 +16,6 @@ from grader.reading.submission import stage_submission
 from grader.recording.codec import trace_to_json
 from grader.recording.plan import plan_scenario
 from grader.recording.recorder import Job
-from grader.recording.studio import open_studio
 
 pytestmark = pytest.mark.ros
 
@@ -24,13 +23,6 @@ NODES = Path(__file__).with_name("service_nodes")
 BATTERY, RELAY, TRIGGER = "/battery/get_status", "/relay", "std_srvs/srv/Trigger"
 ANSWERS = tuple({"success": True, "message": f"n{number}"} for number in range(3))
 TEXT = "std_msgs/msg/String"
-
-
-@pytest.fixture(scope="module")
-def studio():
-    """The strongest sandbox of this machine, with warm workers."""
-    with open_studio("auto") as studio:
-        yield studio
 
 
 @pytest.fixture

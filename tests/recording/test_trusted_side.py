@@ -68,13 +68,6 @@ class Listener(Node):
 """
 
 
-@pytest.fixture(scope="module")
-def studio():
-    """The strongest sandbox of this machine, with warm workers."""
-    with open_studio("auto") as studio:
-        yield studio
-
-
 @pytest.fixture
 def run(studio, tmp_path):
     """Record programs together; whatever they do, the grader does not fail."""

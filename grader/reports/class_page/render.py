@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import cache
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 from markupsafe import Markup
 
 from grader.model.exercise import Outcome, exercise_name
@@ -17,7 +17,8 @@ from grader.reports.class_page.causes import Cause, causes
 from grader.reports.class_page.contents import ClassPage, PageLink, ReportData
 from grader.reports.class_page.counts import Distribution, distribution, exercise_counts
 from grader.reports.class_page.payload import payload
-from grader.reports.escape import script_json, shown
+from grader.reports.escape import script_json
+from grader.reports.html.environment import page_environment
 
 #: More causes than this are counted, not shown.
 MOST_CAUSES = 40
@@ -73,14 +74,8 @@ def page_link(link: PageLink) -> str:
 
 @cache
 def _template() -> Template:
-    templates = Environment(
-        loader=PackageLoader("grader.reports.class_page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    templates.filters |= {"shown": shown, "points": _points, "percent": _percent}
+    templates = page_environment("grader.reports.class_page")
+    templates.filters |= {"points": _points, "percent": _percent}
     templates.globals |= {
         "embedded": Markup,
         "bundle": bundle,

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from functools import cache
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from grader.model.exercise import Location, Outcome, exercise_name
@@ -16,6 +16,7 @@ from grader.model.trace import ClockKind
 from grader.reports import wording
 from grader.reports.escape import script_json, shown
 from grader.reports.html.bundle import bundle
+from grader.reports.html.environment import page_environment
 from grader.reports.html.payload import figure_values
 
 _CIRCUMFERENCE = 100
@@ -45,14 +46,7 @@ def render_html(report: Report, *, assets: str | None = None) -> str:
 
 @cache
 def _templates() -> Environment:
-    templates = Environment(
-        loader=PackageLoader("grader.reports.html"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    templates.filters["shown"] = shown
+    templates = page_environment("grader.reports.html")
     templates.filters["exercise_name"] = exercise_name
     templates.globals |= {
         "wording": wording,

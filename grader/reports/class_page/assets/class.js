@@ -158,7 +158,7 @@
 
   // ---- chart
   const figure = document.querySelector("[data-figure=scores]");
-  const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
+  const { FONT } = Charts;
   let chart = null;
   let pointed = -1;
 
@@ -216,11 +216,7 @@
       tooltip: {
         trigger: "axis",
         axisPointer: { type: "shadow" },
-        confine: true,
-        transitionDuration: 0,
-        backgroundColor: "var(--card)",
-        borderColor: "var(--line)",
-        textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
+        ...Charts.TOOLTIP,
         formatter: tip,
       },
       series: [

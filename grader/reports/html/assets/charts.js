@@ -4,6 +4,13 @@ const Charts = (() => {
   const SYMBOLS = { bad: "diamond", warning: "triangle", second: "rect" };
   const [SIDE, PANEL, LONE_PANEL, LANE, HEADER, MOMENTS, AXIS, SLIDER, LABEL] = [52, 150, 210, 48, 34, 20, 40, 26, 15];
   const FONT = { color: "var(--soft)", fontSize: 12, fontFamily: "inherit" };
+  const TOOLTIP = {
+    confine: true,
+    transitionDuration: 0,
+    backgroundColor: "var(--card)",
+    borderColor: "var(--line)",
+    textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
+  };
 
   function number(value) {
     return value === null || value === undefined ? "none" : String(Number(Number(value).toPrecision(6)));
@@ -334,11 +341,7 @@ const Charts = (() => {
         tooltip: {
           trigger: figure.square ? "item" : "axis",
           axisPointer: { axis: "x" },
-          confine: true,
-          transitionDuration: 0,
-          backgroundColor: "var(--card)",
-          borderColor: "var(--line)",
-          textStyle: { color: "var(--ink)", fontSize: 13, fontFamily: "inherit" },
+          ...TOOLTIP,
           formatter: tooltip(figure, known, said),
         },
         series,
@@ -415,5 +418,5 @@ const Charts = (() => {
     return { zoom, pan, step, hide, paint, reset: () => show(0, 100), width: () => element.clientWidth };
   }
 
-  return { draw, number, withUnit, colour, SYMBOLS };
+  return { draw, number, withUnit, colour, SYMBOLS, FONT, TOOLTIP };
 })();

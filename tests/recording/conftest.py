@@ -1,0 +1,12 @@
+"""What tests that record real nodes share."""
+
+import pytest
+
+from grader.recording.studio import open_studio
+
+
+@pytest.fixture(scope="module")
+def studio():
+    """The strongest sandbox of this machine, with warm workers."""
+    with open_studio("auto") as studio:
+        yield studio
