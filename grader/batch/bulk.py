@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.model.errors import ClassError, HarnessError
 from grader.reading.archive_members import FILE, FOLDER, Member, UnusableArchiveError
 from grader.reading.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind
-from grader.reading.member_names import collision, objection, passed_over
+from grader.reading.member_names import collision, objection, passed_over, unnoticed
 from grader.reading.quoting import shown
 from grader.reading.tar_members import is_tar, tar_members, unpacked
 from grader.reading.zip_members import zip_members
@@ -125,15 +125,19 @@ def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
     top.mkdir(parents=True)
     found = Unpacked(top)
     by_part: dict[str, list[tuple[str, Member]]] = {}
+    overlooked: dict[str, str] = {}
     for whole, member in named:
         name = whole.removeprefix(around)
-        part = name.split("/", 1)[0]
+        part, below, _ = name.partition("/")
         if name in ("", ".") or f"{whole}/" == around:
             continue
         if objection(part) or not whole.startswith(around):
             found.strays.append(f"{shown(whole)} ({objection(part) or 'beside the folder of all others'})")
         elif objection(name) or not passed_over(name if member.kind != FOLDER else f"{name}/x"):
             by_part.setdefault(part, []).append((name, member))
+        elif unnoticed(part, is_folder=bool(below) or member.kind == FOLDER):
+            overlooked[part] = unnoticed(part, is_folder=bool(below) or member.kind == FOLDER)
+    found.strays += [f"{shown(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
     left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
         problem, size = _write_part(inside, top, left)

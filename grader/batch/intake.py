@@ -14,7 +14,7 @@ from grader.batch.layouts import AUTO, PATTERNS, Layout, Named, layout_of
 from grader.batch.naming import distinct_names
 from grader.model.errors import ClassError, HarnessError, SubmissionError
 from grader.reading.archives import ARCHIVE_SUFFIXES
-from grader.reading.member_names import objection, passed_over_file, passed_over_folder
+from grader.reading.member_names import objection, passed_over_file, passed_over_folder, unnoticed
 from grader.reading.quoting import shown
 from grader.reading.staging import read_start
 
@@ -94,7 +94,7 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
     called = distinct_names([(source.resolve().name, str(source)) for source in sources])
     for source, own in zip(sources, called, strict=True):
         top, refused = _opened(source, results / "unpacked" / own, strays)
-        children = [child for child in _children(top) if child.resolve() != results.resolve()]
+        children = [child for child in _children(top, strays) if child.resolve() != results.resolve()]
         used = _layout(children, top, layout, pattern)
         here = _submissions(children, own, used, strays)
         for name, problem in refused.items():
@@ -205,15 +205,22 @@ def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
     return ""
 
 
-def _children(folder: Path) -> Iterator[Path]:
-    """Yield what lies in a folder in the order of names, without what systems and tools leave there."""
+def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
+    """Yield what lies in a folder in the order of names, without what systems and tools leave there.
+
+    What is left out but may be somebody's work becomes a stray.
+    """
     try:
         names = sorted(os.listdir(folder), key=os.fsencode)  # noqa: PTH208  names, in the order of their bytes
     except OSError as error:
         raise ClassError(f"{folder}: the folder cannot be read: {error.strerror}") from None
     for name in names:
         path = folder / name
-        if not (passed_over_folder(name) if path.is_dir() else passed_over_file(name) or name.startswith(".")):
+        is_folder = path.is_dir()
+        why = unnoticed(name, is_folder=is_folder)
+        if why:
+            strays.append(f"{shown(str(path), 200)}: {why}, so it is not graded")
+        elif not (passed_over_folder(name) if is_folder else passed_over_file(name)):
             yield path
 
 

@@ -16,11 +16,14 @@ MAX_PATH_BYTES = 2_000
 #: Longest name of one file or folder that Linux can hold.
 MAX_NAME_BYTES = 255
 
-_SKIPPED_FOLDERS = frozenset({"__pycache__", "__MACOSX", "venv", "node_modules"})
+_BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
+_SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
 # What file managers leave in every folder; `._x` is what macOS puts beside every file x in an archive.
 _SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?")
+# Windows drops these, so that two names become one; other systems keep them.
+_ENDS_ODDLY = re.compile(r"[ .]\Z")
 _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
 _OBJECTIONS: dict[str, Callable[[str], object]] = {
@@ -29,6 +32,7 @@ _OBJECTIONS: dict[str, Callable[[str], object]] = {
     "a name with a control character": _CONTROLS.search,
     "a name with an empty part": lambda path: not {"", "."}.isdisjoint(path.split("/")),
     "a name with a backslash": lambda path: "\\" in path,
+    "a name with a part that ends in a blank or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
     "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
     "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
 }
@@ -42,6 +46,18 @@ def passed_over_folder(name: str) -> bool:
 def passed_over_file(name: str) -> bool:
     """Return whether a file of this name was put there by an operating system."""
     return name in _SKIPPED_FILES or name.startswith("._")
+
+
+def unnoticed(name: str, *, is_folder: bool) -> str:
+    """Return why a submission of this name would be passed over, as a phrase.
+
+    Empty if it would not be, or if a system or interpreter has put it there: then nobody looks for it.
+    """
+    if passed_over_file(name) or (is_folder and name in _BY_SYSTEMS):
+        return ""
+    if name.startswith("."):
+        return "its name begins with a dot"
+    return "its name is that of a tool's folder" if is_folder and passed_over_folder(name) else ""
 
 
 def passed_over(path: str) -> bool:

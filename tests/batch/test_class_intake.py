@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import stat
 import sys
 import tarfile
@@ -66,7 +67,30 @@ def test_folders_and_archives_are_submissions(tmp_path):
     assert names(intake) == ["ada", "bob-ross", "cleo"]
     assert [entry.label for entry in intake.entries] == ["ada", "Bob Ross", "cleo"]
     assert intake.layouts == ((str(class_), "folders"),)
-    assert [stray.endswith("notes.txt: neither a folder nor an archive") for stray in intake.strays] == [True]
+    assert [stray.rpartition("/")[2] for stray in intake.strays] == [
+        ".git: its name begins with a dot, so it is not graded",
+        "notes.txt: neither a folder nor an archive",
+    ]
+
+
+HIDDEN = (".ada/a.py", ".bob.zip", "venv/c.py", "dan/d.py", "eve/e.py")
+
+
+def test_what_is_passed_over_for_its_name_is_named(tmp_path):
+    """A student may be called like that; folder or archive, nothing disappears without a word."""
+    intake = found(tmp_path, put(tmp_path / "class", *HIDDEN))
+    assert names(intake) == ["dan", "eve"]
+    assert [stray.rpartition("/")[2].partition(":")[0] for stray in intake.strays] == [".ada", ".bob.zip", "venv"]
+
+
+def test_what_is_passed_over_in_a_download_is_named(tmp_path):
+    """Once for each folder, also when the download was unpacked before; not what a system has put there."""
+    further = (".ada/b.py", "__MACOSX/dan/._d.py", ".DS_Store", "._eve")
+    files = {f"hw/{name}": PY for name in (*HIDDEN, *further)}
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert names(intake) == ["dan", "eve"]
+    assert sorted(re.search("([^/: ]+): its name", stray)[1] for stray in intake.strays) == [".ada", ".bob.zip", "venv"]
+    assert found(tmp_path, tmp_path / "hw.zip") == intake
 
 
 def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path):
