@@ -13,7 +13,8 @@ from grader.model.errors import EnvironmentFault, GraderError
 from grader.model.limits import Limits
 from grader.model.quantities import NS_PER_S
 from grader.observing import ObserveRequest, observe
-from grader.recording.isolation.choose import inspect_tiers
+from grader.recording.byte_code import byte_code
+from grader.recording.isolation.choose import inspect_tiers, sandbox_memory
 from grader.recording.isolation.tiers import is_for_others
 from grader.recording.machine import software, system
 from grader.recording.ros_installation import RosInstallation, find_ros
@@ -46,6 +47,8 @@ def examine(progress: Progress) -> Checkup:
     facts = (*software(ros), *lack, *system())
     if ros is None:
         return Checkup(facts, None, (), "", "", Limits())
+    progress("looking at the byte code")
+    facts += (byte_code(ros.runtime), sandbox_memory(ros))
     progress("trying every sandbox")
     tiers = inspect_tiers(ros)
     used = next((tier.name for tier in tiers if tier.usable), "")

@@ -85,7 +85,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         scenario = _undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
     odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
-    with open_studio(request.isolation) as studio:
+    with open_studio(request.isolation, progress=progress) as studio:
         submission = _stage(request.files, names, studio.folder)
         seed, clock = seed_of(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)

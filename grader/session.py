@@ -101,7 +101,7 @@ def grade(
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    with open_studio(request.isolation, request.workers) as studio:
+    with open_studio(request.isolation, request.workers, progress) as studio:
         progress("reading the submission")
         exercises = read_exercises(request)
         root = studio.folder / "submission"

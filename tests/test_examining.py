@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from grader import examining
 from grader.cli import app
+from grader.model.checkup import Fact
 from grader.model.containment import TierReport
 from grader.model.errors import EnvironmentFault, HarnessError
 from grader.recording import machine
@@ -37,8 +38,10 @@ def stand_in(monkeypatch):
 
 
 def examined(monkeypatch, *tiers):
-    monkeypatch.setattr(examining, "find_ros", lambda: "ROS")
+    monkeypatch.setattr(examining, "find_ros", lambda: SimpleNamespace(runtime=None))
     monkeypatch.setattr(examining, "inspect_tiers", lambda ros: tiers)
+    monkeypatch.setattr(examining, "byte_code", lambda runtime: Fact("byte code", "up to date"))
+    monkeypatch.setattr(examining, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
     return examining.examine(lambda step: None)
 
 

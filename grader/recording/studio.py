@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import compileall
 import os
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import TypeVar
 
 from grader.model.containment import Property
 from grader.model.trace import Trace
+from grader.recording.byte_code import compile_own
 from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.choose import choose_isolation
 from grader.recording.isolation.protocol import Isolation
@@ -26,7 +26,6 @@ MOST_WORKERS = 4
 #: Clocks that may be asked for: `auto` is virtual time, and the wall clock where that does no justice.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
-_PACKAGE = Path(__file__).resolve().parents[1]
 Key = TypeVar("Key", bound=Hashable)
 
 
@@ -87,24 +86,26 @@ def _unfit(trace: Trace, clock: str) -> bool:
 
 
 @contextmanager
-def open_studio(isolation: str, workers: int | None = None) -> Iterator[Studio]:
+def open_studio(
+    isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None
+) -> Iterator[Studio]:
     """Set a studio up, and take it down.
 
     Args:
         isolation: `auto`, `none` or the name of a tier.
         workers: How many scenarios are recorded side by side; None for as many as is of use here.
+        progress: Hears which sandbox has to be tried, and why.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the tier asked for.
     """
     ros = find_ros()
-    choice = choose_isolation(isolation, ros)
+    choice = choose_isolation(isolation, ros, progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
     workers = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     # Neither workers nor students' processes write byte code; what they load is compiled once here, not at every start.
-    for package in (_PACKAGE / "host", _PACKAGE / "recording"):
-        compileall.compile_dir(package, maxlevels=0, quiet=2)
+    compile_own()
     with scratch_folder() as folder:
         folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:

@@ -17,7 +17,7 @@ from grader.model.containment import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Prop
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import choose, memory, remedies, selftest
 from grader.recording.isolation.bubblewrap import Bubblewrap
-from grader.recording.isolation.choose import choose_isolation, inspect_tier, inspect_tiers
+from grader.recording.isolation.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
 from grader.recording.isolation.memory import Memory
 from grader.recording.isolation.plain import Plain
 from grader.recording.isolation.tiers import isolation_from_name
@@ -109,7 +109,7 @@ def test_a_tier_asked_for_by_name_must_keep_its_promises(tested, ros, cache):
     assert choose_isolation("landlock", ros).isolation == "landlock"
     with pytest.raises(EnvironmentFault, match=r"bubblewrap-flat: .*net_egress"):
         choose_isolation("bubblewrap-flat", ros)
-    (cache / "sandbox-landlock.json").unlink()
+    next(cache.glob("sandbox-landlock-*.json")).unlink()
     tested[1]["landlock"] = report("landlock", without("net_egress", "fs_write"), usable=False, why="fs_write open")
     with pytest.raises(EnvironmentFault, match="fs_write"):
         choose_isolation("landlock", ros)
@@ -256,7 +256,7 @@ def test_a_trial_without_a_usable_answer_is_no_pass(ros, tmp_path, answer):
 @pytest.fixture
 def place(ros, cache) -> Memory:
     place = Memory.of("bubblewrap", ros)
-    assert place.file == cache / "sandbox-bubblewrap.json"
+    assert place.file.parent == cache
     return place
 
 
@@ -272,16 +272,47 @@ def test_what_is_kept_is_recalled(place):
 
 
 def test_under_other_circumstances_nothing_is_recalled(place, ros, monkeypatch):
-    """Another boot, ROS, version or bubblewrap has another key."""
+    """Another boot, ROS or version has another key, and what has changed is told."""
+    assert place.lapse() == "none is remembered"
     place.keep(report())
-    keys = {place.key, Memory.of("landlock", ros).key, Memory.of("bubblewrap", replace(ros, rclpy_version="0")).key}
-    for name, value in (("__version__", "0.0.0"),):
-        monkeypatch.setattr(grader, name, value)
-        keys.add(Memory.of("bubblewrap", ros).key)
+    assert place.lapse() == ""
+    assert Memory.of("bubblewrap", replace(ros, rclpy_version="0")).lapse() == "changed since: ROS"
+    monkeypatch.setattr(grader, "__version__", "0.0.0")
+    assert Memory.of("bubblewrap", ros).lapse() == "changed since: grader"
     monkeypatch.setattr(memory, "_content", lambda path: "another boot")
-    keys.add(Memory.of("bubblewrap", ros).key)
-    assert len(keys) == 5
+    assert Memory.of("bubblewrap", ros).lapse().startswith("changed since: boot, ")
     assert Memory.of("bubblewrap", ros).recall() is None
+
+
+def test_two_installations_of_one_user_remember_side_by_side(place, ros):
+    """Used in turn, they would make each other test the sandbox again."""
+    other = Memory.of("bubblewrap", replace(ros, prefix=Path("/opt/other")))
+    place.keep(report())
+    other.keep(report())
+    assert (place.lapse(), other.lapse()) == ("", "")
+
+
+def test_nothing_is_forgotten_for_what_does_not_matter(place, ros, monkeypatch):
+    """Interfaces that containers bring and take, and byte code that the first run of a version writes."""
+    monkeypatch.setattr(memory.socket, "if_nameindex", lambda: [(1, "lo"), (2, "eth0")])
+    kept = Memory.of("bubblewrap", ros)
+    kept.keep(report())
+    monkeypatch.setattr(memory.socket, "if_nameindex", lambda: [(1, "lo"), (2, "eth0"), (7, "veth12ab")])
+    stamped = memory._stamp
+    monkeypatch.setattr(memory, "_stamp", lambda path: "new" if path.name == "__pycache__" else stamped(path))
+    assert Memory.of("bubblewrap", ros).lapse() == ""
+    monkeypatch.setattr(memory.socket, "if_nameindex", lambda: [(1, "lo")])
+    assert Memory.of("bubblewrap", ros).lapse() == "changed since: network"
+
+
+def test_a_run_says_why_it_tries_a_sandbox(tested, ros):
+    """Once; with what is remembered nothing is tried and nothing is said. `grade doctor` knows beforehand."""
+    heard: list[str] = []
+    assert sandbox_memory(ros).value == "a run would repeat it; bubblewrap: none is remembered"
+    choose_isolation("auto", ros, heard.append)
+    choose_isolation("auto", ros, heard.append)
+    assert heard == ["trying the sandbox bubblewrap-root (none is remembered)"]
+    assert sandbox_memory(ros).value == "remembered for bubblewrap-root: runs do not repeat it"
 
 
 def _spoil(place: Memory, text: str) -> None:

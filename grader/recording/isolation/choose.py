@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from grader.model.checkup import Fact
 from grader.model.containment import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import landlock, selftest, tiers
@@ -34,13 +35,18 @@ class Choice:
     containment: tuple[Property, ...] = ()
 
 
-def choose_isolation(wanted: str, ros: RosInstallation) -> Choice:
+def _silent(step: str) -> None:
+    """Take no note of a step."""
+
+
+def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> Choice:
     """Return the isolation to record in.
 
     Args:
         wanted: `auto` for the strongest tier that contains what is required; `none` for no walls; or the name of a
             tier, which must keep what it promises.
         ros: What students' processes will run with.
+        progress: Hears which sandbox is tried, and why what is remembered of it does not do.
 
     Raises:
         EnvironmentFault: The tier asked for does not exist or does not hold here, or none does, with what mends it.
@@ -48,10 +54,10 @@ def choose_isolation(wanted: str, ros: RosInstallation) -> Choice:
     if wanted == NO_WALLS:
         return Choice(isolation_from_name(wanted))
     if wanted != AUTO:
-        return _named(wanted, ros)
+        return _named(wanted, ros, progress)
     tried: list[TierReport] = []
     for name in WALLED:
-        tried.append(inspect_tier(name, ros))
+        tried.append(inspect_tier(name, ros, progress))
         if tried[-1].usable:
             return Choice(isolation_from_name(name), tried[-1].properties)
     raise _refusal(tried)
@@ -64,12 +70,28 @@ def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
     return (*(inspect_tier(name, ros, afresh=True) for name in WALLED), nothing)
 
 
-def inspect_tier(name: str, ros: RosInstallation, *, afresh: bool = False) -> TierReport:
+def sandbox_memory(ros: RosInstallation) -> Fact:
+    """Say whether a run would use a remembered self-test of the sandbox, or why it would repeat it."""
+    lapses = []
+    for name in WALLED:
+        memory = Memory.of(name, ros)
+        found = memory.recall()
+        if found is not None and found.usable:
+            return Fact("sandbox check", f"remembered for {name}: runs do not repeat it")
+        if not tiers.is_for_others(name):
+            lapses.append(f"{name}: {memory.lapse() or 'it does not hold'}")
+    return Fact("sandbox check", f"a run would repeat it; {lapses[0]}")
+
+
+def inspect_tier(
+    name: str, ros: RosInstallation, progress: Callable[[str], None] = _silent, *, afresh: bool = False
+) -> TierReport:
     """Return what one tier is worth here, from the last self-test if nothing that matters has changed since.
 
     Args:
         name: Tier name.
         ros: What students' processes will run with.
+        progress: Hears that it is tried, and why.
         afresh: Whether to test it in any case.
     """
     try:
@@ -80,6 +102,7 @@ def inspect_tier(name: str, ros: RosInstallation, *, afresh: bool = False) -> Ti
     remembered = None if afresh else memory.recall()
     if remembered is not None:
         return remembered
+    progress(f"trying the sandbox {name}{'' if afresh else f' ({memory.lapse()})'}")
     report = selftest.inspect(isolation, ros)
     if report.properties and not _kept(report):
         # A busy machine gets a second chance.
@@ -91,9 +114,9 @@ def inspect_tier(name: str, ros: RosInstallation, *, afresh: bool = False) -> Ti
     return report
 
 
-def _named(wanted: str, ros: RosInstallation) -> Choice:
+def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -> Choice:
     isolation = isolation_from_name(wanted)
-    report = inspect_tier(wanted, ros)
+    report = inspect_tier(wanted, ros, progress)
     if not _kept(report):
         raise EnvironmentFault(f"isolation {wanted}: expected a sandbox that holds, found: {report.why}", report.remedy)
     return Choice(isolation, report.properties)

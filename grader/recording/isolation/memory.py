@@ -10,9 +10,10 @@ import secrets
 import shutil
 import socket
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import grader
 from grader.model.containment import PROPERTIES, TIERS, Property, TierReport
@@ -22,6 +23,8 @@ from grader.recording.ros_installation import RosInstallation
 
 LARGEST = 64 << 10
 FOLDER = "rclpy-grader"
+#: What reading a file that anything may have happened to raises.
+UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,34 +33,56 @@ class Memory:
 
     Attributes:
         file: A file in the user's own folder; None if there is no such folder.
-        key: Everything that a result depends on, as a digest: what was remembered under another key is ignored.
+        key: Everything that a result depends on, by what it is, each as a digest: what was remembered under another
+            key is ignored.
     """
 
     file: Path | None
-    key: str
+    key: Mapping[str, str]
 
     @classmethod
     def of(cls, tier: str, ros: RosInstallation) -> Memory:
         """Return the place for a tier, this machine as it is booted, this user and this ROS."""
-        text = "\n".join((tier, *circumstances(ros)))
+        texts = {"sandbox": tier}
+        for what, text in circumstances(ros):
+            texts[what] = "\n".join((texts.get(what, ""), text))
+        key = {what: _digest(text) for what, text in texts.items()}
         folder = own_folder()
-        key = hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
-        return cls(folder / f"sandbox-{tier}.json" if folder else None, key)
+        # Several installations of one user are used in turn: each has a file of its own.
+        installation = _digest(f"{Path(__file__)} {ros.runtime.executable} {ros.prefix}")[:12]
+        return cls(folder / f"sandbox-{tier}-{installation}.json" if folder else None, key)
 
     def recall(self) -> TierReport | None:
         """Return the self-test remembered, if there is one and the file is this user's alone."""
-        if self.file is None:
-            return None
         try:
-            descriptor = os.open(self.file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
-            with os.fdopen(descriptor, "rb") as file:
-                found = os.fstat(descriptor)
-                if found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) != 0o600 or found.st_size > LARGEST:
-                    return None
-                remembered = json.loads(file.read(LARGEST))
+            remembered = self._read()
             return report_from_json(remembered["report"]) if remembered["key"] == self.key else None
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        except UNUSABLE:
             return None
+
+    def lapse(self) -> str:
+        """Return why no self-test is recalled, as a phrase; empty if one is."""
+        if self.recall() is not None:
+            return ""
+        if self.file is None:
+            return "there is no folder to remember it in"
+        try:
+            before = dict(self._read()["key"])
+        except UNUSABLE:
+            return "none is remembered"
+        changed = [what for what, digest in self.key.items() if before.get(what) != digest]
+        return f"changed since: {', '.join(changed)}" if changed else "what is remembered cannot be used"
+
+    def _read(self) -> Any:
+        """Return what the file holds; raises one of `UNUSABLE` if that is nothing or not this user's alone."""
+        if self.file is None:
+            raise FileNotFoundError
+        descriptor = os.open(self.file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+        with os.fdopen(descriptor, "rb") as file:
+            found = os.fstat(descriptor)
+            if found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) != 0o600 or found.st_size > LARGEST:
+                raise PermissionError
+            return json.loads(file.read(LARGEST))
 
     def keep(self, report: TierReport) -> None:
         """Remember a self-test, if that can be done."""
@@ -67,7 +92,7 @@ class Memory:
         with contextlib.suppress(OSError):
             descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
             with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-                json.dump({"key": self.key, "report": asdict(report)}, file)
+                json.dump({"key": dict(self.key), "report": asdict(report)}, file)
             draft.replace(self.file)
 
 
@@ -99,22 +124,30 @@ def own_folder() -> Path | None:
     return None
 
 
-def circumstances(ros: RosInstallation) -> Iterator[str]:
-    """Yield what a self-test depends on: boot, user, namespaces, privileges, settings, programs, ROS, this grader."""
-    yield _content("/proc/sys/kernel/random/boot_id")
-    yield f"{os.geteuid()} {os.getegid()}"
+def circumstances(ros: RosInstallation) -> Iterator[tuple[str, str]]:
+    """Yield what a self-test depends on, each with what it is; nothing that changes by itself while nothing does."""
+    yield "boot", _content("/proc/sys/kernel/random/boot_id")
+    yield "user", f"{os.geteuid()} {os.getegid()}"
     for name in ("net", "user", "mnt", "pid"):
         with contextlib.suppress(OSError):
-            yield os.readlink(f"/proc/self/ns/{name}")  # noqa: PTH115 -- it points to no path
+            yield "namespaces", os.readlink(f"/proc/self/ns/{name}")  # noqa: PTH115 -- it points to no path
     status = _content("/proc/self/status").splitlines()
-    yield from (line for line in status if line.startswith(("Cap", "Seccomp", "NoNewPrivs")))
-    yield " ".join(name for _, name in socket.if_nameindex())
-    yield from (f"{name} {_content('/proc/sys/' + name.replace('.', '/'))}" for name, _, _ in SETTINGS)
+    yield from (("privileges", line) for line in status if line.startswith(("Cap", "Seccomp", "NoNewPrivs")))
+    # Which ones there are changes with every container that is started here, and changes nothing.
+    yield "network", str(any(name != "lo" for _, name in socket.if_nameindex()))
+    yield from (("settings", f"{name} {_content('/proc/sys/' + name.replace('.', '/'))}") for name, _, _ in SETTINGS)
     for program in ("bwrap", "prlimit", "setpriv"):
-        yield _stamp(Path(shutil.which(program, path=SYSTEM_PROGRAMS) or shutil.which(program) or "/nowhere"))
-    yield f"{ros.prefix} {ros.distro} {ros.rclpy_version} {ros.runtime.executable} {ros.runtime.read_paths}"
-    yield grader.__version__
-    yield from map(_stamp, sorted(Path(__file__).parent.iterdir()))
+        yield program, _stamp(Path(shutil.which(program, path=SYSTEM_PROGRAMS) or shutil.which(program) or "/nowhere"))
+    yield "ROS", f"{ros.prefix} {ros.distro} {ros.rclpy_version}"
+    yield "Python", f"{ros.runtime.executable} {ros.runtime.read_paths}"
+    yield "grader", grader.__version__
+    # Not the folder itself or its byte code, which the first run of a version writes.
+    sources = (path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".xml"))
+    yield from (("grader", _stamp(path)) for path in sorted(sources))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def _content(path: str) -> str:
