@@ -17,6 +17,7 @@ from . import entry, originals
 from .alarms import install_alarms
 from .faults import Describer
 from .link import Link
+from .log import open_log
 from .stand_ins import install_stand_ins
 from .virtual import VirtualTime
 from .watchdog import Watchdog
@@ -29,18 +30,20 @@ def run(request: dict[str, Any]) -> None:
     """Run the file a request names; never returns.
 
     Args:
-        request: `fd` of the line, `root` and `file` of the submission, `clock`, `seed` (hex), `limits`.
+        request: `fd` of the line, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
     """
     link = Link(request["fd"])
     describer = Describer(request["root"])
     die_with_parent()
     time = make_time(request["clock"], link, describer)
     time.install_ros()
+    token = open_log(request["log_format"])
     preload(os.path.join(request["root"], request["file"]))
     install_stand_ins()
     seed_randomness(request["seed"])
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: os._exit(70))
-    start = link.ask({"kind": "ready", "python": sys.version.split()[0]})
+    start = link.ask({"kind": "ready", "log_token": token})
+    del token
     time.start(start["now_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if watchdog is not None:

@@ -21,10 +21,13 @@ from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine
 from grader.recording.ending import ended_by, limit_behind
 from grader.recording.isolation.protocol import Command
 
-#: How the host's processes write log records on standard error, so that they can be told from other output.
-LOG_FORMAT = "\x1e{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
-#: No part of a record runs over the start of the next one: a stream of starts without ends is read in linear time.
-LOG_RECORD = re.compile("\x1e([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?")
+#: How the logging library writes records on standard error. Each process has a token of its own, which only the library
+#: and the worker know: what a program writes itself is no log record.
+LOG_FORMAT = "\x1e{token}\x1f{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
+#: What follows the token. No part of a record runs over the start of the next one: a stream of starts without ends is
+#: read in linear time.
+_LOG_FIELDS = "\x1f([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?"
+_TOKEN = re.compile("[0-9a-f]{32}")
 #: A report longer than this is not the host's.
 REPORT_BYTES = 4 << 20
 #: More reports than this at once are not the host's; so much is read of its line and of each stream without a pause.
@@ -65,6 +68,7 @@ class Student:
         unsettled: Why its program does not settle, as it says; empty if it does.
         stop_signalled: Whether it is to get, or has got, the stop signal.
         stopping: Whether it has got it.
+        log_token: What its log records begin with; without one there are none.
     """
 
     name: str
@@ -89,6 +93,7 @@ class Student:
     stop_signalled: bool = False
     stopping: bool = False
     notes: list[str] = field(default_factory=list)
+    log_token: str = ""
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
@@ -126,6 +131,13 @@ class Student:
             self.line.sendall(json.dumps(answer).encode() + b"\n")
         except OSError:
             return
+
+    def is_ready(self) -> bool:
+        """Wait for its first report, which comes before anything of the student's runs; return whether it is that."""
+        report = self.report() or {}
+        token = str(report.get("log_token"))
+        self.log_token = token if _TOKEN.fullmatch(token) else ""
+        return report.get("kind") == "ready"
 
     def claims_of(self, kind: str, name: str) -> bool:
         """Return whether it says that it has an endpoint of a kind and name; every node has some services."""
@@ -215,7 +227,7 @@ class Student:
         """Return the complete records and lines written since the last time; `final` adds an unfinished line."""
         found: list[LogRecord | OutputLine] = []
         for stream, buffer in self._streams.items():
-            end = len(buffer) if final else _complete(buffer, records=stream == "stderr")
+            end = len(buffer) if final else _complete(buffer, self._record_start() if stream == "stderr" else b"")
             text = bytes(buffer[:end]).decode("utf-8", "backslashreplace")
             del buffer[:end]
             found += self._parsed(t_ns, stream, text) if self._lines_kept <= self.limits.lines else []
@@ -232,7 +244,8 @@ class Student:
     def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
         found: list[LogRecord | OutputLine] = []
         position = 0
-        for match in LOG_RECORD.finditer(text) if stream == "stderr" else ():
+        start = self._record_start().decode() if stream == "stderr" else ""
+        for match in re.finditer(start + _LOG_FIELDS, text) if start else ():
             found += self._lines(t_ns, stream, text[position : match.start()])
             severity, logger, file, line, message = match.groups()
             relative = file[len(self.root) + 1 :] if file.startswith(self.root + "/") else ""
@@ -241,6 +254,9 @@ class Student:
             found.append(LogRecord(t_ns, self.name, severity, logger, said, relative, place))
             position = match.end()
         return found + self._lines(t_ns, stream, text[position:])
+
+    def _record_start(self) -> bytes:
+        return f"\x1e{self.log_token}".encode() if self.log_token else b""
 
     def _lines(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
         return [
@@ -315,12 +331,12 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def _complete(buffer: bytearray, *, records: bool) -> int:
+def _complete(buffer: bytearray, record_start: bytes) -> int:
     """Return how much of a buffer consists of whole lines and, on a stream that has them, whole log records."""
     end = buffer.rfind(b"\n") + 1
-    if not records:
+    if not record_start:
         return end
-    opened = buffer.rfind(b"\x1e", 0, end)
+    opened = buffer.rfind(record_start, 0, end)
     if opened > buffer.rfind(b"\x1d", 0, end):
         return opened
     return end

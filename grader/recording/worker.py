@@ -86,6 +86,7 @@ class Worker:
             "file": file,
             "seed": plan.host_seed,
             "clock": plan.clock,
+            "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
         }
@@ -98,7 +99,6 @@ class Worker:
                 arguments=("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps(request)),
                 environment={
                     "ROS_DOMAIN_ID": str(domain),
-                    "RCUTILS_CONSOLE_OUTPUT_FORMAT": LOG_FORMAT,
                     "RCUTILS_COLORIZED_OUTPUT": "0",
                     **quick_discovery(self._isolation.host_seen_at, self._runtime),
                     "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
@@ -118,8 +118,7 @@ class Worker:
 
 def _await_ready(student: Student) -> None:
     """Wait until a process is about to run its file; until then nothing of the student's has run."""
-    ready = student.report()
-    if ready is None or ready.get("kind") != "ready":
+    if not student.is_ready():
         raise RuntimeError(f"a student's process did not start: {student.stopped or _last_words(student)}")
 
 

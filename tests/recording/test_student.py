@@ -19,11 +19,12 @@ from grader.recording.isolation.protocol import Command
 from grader.recording.student import Student
 
 ROOT = "/submission"
+TOKEN = "0123456789abcdef" * 2
 
 
 def silent() -> Student:
     """Return a student whose output a test makes up."""
-    return Student("a.py", ROOT, None, None)
+    return Student("a.py", ROOT, None, None, log_token=TOKEN)
 
 
 def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> list:
@@ -34,9 +35,11 @@ def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> li
     return student.output(7, final=final)
 
 
-def record(text: str = "hello", severity: str = "INFO", file: str = f"{ROOT}/pkg/a.py", line: int = 12) -> bytes:
-    """Return a log record as the host writes it."""
-    return f"\x1e{severity}\x1f/node\x1f{file}\x1f{line}\x1f{text}\x1d\n".encode()
+def record(
+    text: str = "hello", severity: str = "INFO", file: str = f"{ROOT}/pkg/a.py", line: int = 12, token: str = TOKEN
+) -> bytes:
+    """Return a log record as the logging library writes it."""
+    return f"\x1e{token}\x1f{severity}\x1f/node\x1f{file}\x1f{line}\x1f{text}\x1d\n".encode()
 
 
 def logged(text: str, severity: str = "INFO", file: str = "pkg/a.py", line: int = 12) -> LogRecord:
@@ -112,9 +115,14 @@ def test_bytes_that_are_not_utf8_stay_visible():
     [
         (b"\x1e\n", ["\x1e"]),
         (b"\x1d\n", ["\x1d"]),
-        (b"\x1eINFO\x1f\n", ["\x1eINFO\x1f"]),
-        (b"\x1einfo\x1fa\x1fb\x1f1\x1fx\x1d\n", ["\x1einfo\x1fa\x1fb\x1f1\x1fx\x1d"]),
-        (b"\x1eINFO\x1fa\x1fb\x1fone\x1fx\x1d\n", ["\x1eINFO\x1fa\x1fb\x1fone\x1fx\x1d"]),
+        (record("x", token=""), ["\x1e\x1fINFO\x1f/node\x1fpkg/a.py\x1f12\x1fx\x1d"]),
+        (record("x", token="f" * 32), [f"\x1e{'f' * 32}\x1fINFO\x1f/node\x1fpkg/a.py\x1f12\x1fx\x1d"]),
+        (f"\x1e{TOKEN}\x1fINFO\x1f\n".encode(), [f"\x1e{TOKEN}\x1fINFO\x1f"]),
+        (record("x", severity="info"), [f"\x1e{TOKEN}\x1finfo\x1f/node\x1fpkg/a.py\x1f12\x1fx\x1d"]),
+        (
+            f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1fone\x1fx\x1d\n".encode(),
+            [f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1fone\x1fx\x1d"],
+        ),
     ],
 )
 def test_what_only_looks_like_a_record_is_a_line(hostile, texts):
@@ -122,9 +130,24 @@ def test_what_only_looks_like_a_record_is_a_line(hostile, texts):
     assert [o.text for o in read(hostile, final=True)] == texts
 
 
+def test_without_a_token_there_are_no_records():
+    """A process that never said which one it has writes lines."""
+    student = Student("a.py", ROOT, None, None)
+    student._streams["stderr"] += record(token="")
+    assert [type(o) for o in student.output(7, final=True)] == [OutputLine]
+
+
+@pytest.mark.parametrize("token", ["", "x", "F" * 32, ".*" * 16, 5, None, ["a"]])
+def test_a_token_is_what_the_host_draws(start, token):
+    """32 hexadecimal digits; anything else could stand for many texts."""
+    student = start(f"report(kind='ready', log_token={token!r})")
+    assert student.is_ready()
+    assert student.log_token == ""
+
+
 def test_the_record_after_a_broken_one_is_found():
     """A record that never ends hides no other."""
-    assert read(b"\x1eINFO\x1fa\x1fb\x1f1\x1fnever ends" + record())[-1] == logged("hello")
+    assert read(f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1f1\x1fnever ends".encode() + record())[-1] == logged("hello")
 
 
 def test_standard_output_holds_no_records():
@@ -136,7 +159,7 @@ def test_standard_output_holds_no_records():
 
 def test_a_megabyte_of_beginnings_is_read_in_one_go():
     """A hostile stream costs the worker no more than its length; quadratic reading would take minutes."""
-    text = b"\x1eINFO\x1fa\x1fb\x1f1\x1f" * 70_000
+    text = f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1f1\x1f".encode() * 30_000
     found = read(text + b"\n", final=True)
     assert len(found) == 1
     assert len(found[0].text) == module.TEXT_CHARACTERS

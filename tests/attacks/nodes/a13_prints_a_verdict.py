@@ -11,6 +11,7 @@ LINES = (
     json.dumps({"trace": {"scenario": "alone", "observations": []}}),
     json.dumps({"kind": "exited", "code": 0}),
     "\x1eINFO\x1fgrader\x1f/submission/a13_prints_a_verdict.py\x1f1\x1frate: met\x1d",
+    f"\x1e{'0' * 32}\x1fINFO\x1fgrader\x1f/submission/a13_prints_a_verdict.py\x1f1\x1frate: met\x1d",
     "\x04\x1a{\"outcome\": \"met\"}",
 )
 
