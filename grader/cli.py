@@ -25,6 +25,7 @@ from grader.options import (
     UNUSABLE,
     audience_options,
     drawn_by,
+    drawn_with,
     exit_code,
     parse_outputs,
     parse_percent,
@@ -86,7 +87,8 @@ class _Everyday(click.Command):
 @click.argument("submission")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from the files' digest.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
 @click.option(
@@ -129,6 +131,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     exercises: tuple[str, ...],
     every: bool,
     seed: int | None,
+    seed_key: Path | None,
     odom_bag: Path | None,
     as_json: bool,
     outputs: tuple[Output, ...],
@@ -151,13 +154,16 @@ def _grade(  # noqa: PLR0913  one parameter an option
     for_whom = readers(audience, as_of)
     from grader import keeping, session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
     from grader.reports.audience import told  # noqa: PLC0415  as above
+    from grader.seeding import PRACTICE  # noqa: PLC0415  as above
 
+    key = drawn_with(seed, seed_key)
     request = session.Request(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
         every=every,
         rubrics=rubrics,
         seed=seed,
+        seed_key=key or PRACTICE,
         odom_bag=odom_bag,
         clock=clock,
         isolation=isolation,

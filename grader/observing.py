@@ -16,9 +16,10 @@ from grader.model.trace import Trace
 from grader.reading.shipped import builtin_odometry
 from grader.reading.submission import stage_submission
 from grader.recording.bag import read_odometry
-from grader.recording.plan import plan_scenario, seed_of
+from grader.recording.plan import plan_scenario
 from grader.recording.recorder import Job
 from grader.recording.studio import open_studio, planned_clock
+from grader.seeding import PRACTICE
 from grader.session import Progress
 
 #: When a recording that was named begins to play; so long the nodes see no odometry.
@@ -87,7 +88,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
     with open_studio(request.isolation, progress=progress) as studio:
         submission = _stage(request.files, names, studio.folder)
-        seed, clock = seed_of(submission.digest), planned_clock(request.clock)
+        seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
         trace = studio.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:

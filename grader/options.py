@@ -18,6 +18,7 @@ from grader.reports.formats import FORMATS
 from grader.reports.readers import Readers
 
 if TYPE_CHECKING:
+    from grader.seeding import SeedKey
     from grader.variants import ByKey
 
 ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -52,7 +53,7 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
     """Return what draws a student's variants; None if neither option is given.
 
     Raises:
-        VariantError: The key or the id cannot be used.
+        GraderError: The key or the id cannot be used.
     """
     if not student and key is None:
         return None
@@ -61,6 +62,19 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
     from grader.variants import by_key  # noqa: PLC0415  reading, which --help does not need
 
     return by_key(key, student)
+
+
+def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
+    """Return the key that drawn values follow from; None if none is given, or a seed that needs none.
+
+    Raises:
+        KeyFileError: The key cannot be used.
+    """
+    if seed is not None and path is not None:
+        raise click.BadParameter("--seed and --seed-key exclude each other: a seed needs no key")
+    from grader.seeding import seed_key  # noqa: PLC0415  reading, which --help does not need
+
+    return seed_key(path)
 
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

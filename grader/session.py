@@ -27,10 +27,11 @@ from grader.reading.sources import read_sources
 from grader.reading.submission import stage_collected, stage_submission
 from grader.reading.variants import Draw
 from grader.recording.bag import Odometry, read_odometry
-from grader.recording.plan import plan_scenario, seed_of
+from grader.recording.plan import plan_scenario
 from grader.recording.recorder import Job
 from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
 from grader.reproducing import reproduction
+from grader.seeding import PRACTICE, PRACTICE_NOTE, SeedKey
 
 #: ROS releases that the test suite passes on.
 TRIED_ON = ("jazzy", "kilted")
@@ -46,7 +47,8 @@ class Request:
             only graded by request.
         every: Whether to grade every exercise of which the submission has a file, and no other.
         rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of every drawn value; None derives it from the submission.
+        seed: Seed of every drawn value; None derives it from the submission and the seed key.
+        seed_key: The key for that.
         odom_bag: An /odom recording to play instead of the project's own.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
@@ -62,6 +64,7 @@ class Request:
     every: bool = False
     rubrics: tuple[Path, ...] = ()
     seed: int | None = None
+    seed_key: SeedKey = PRACTICE
     odom_bag: Path | None = None
     clock: str = "auto"
     isolation: str = "auto"
@@ -110,7 +113,7 @@ def grade(
         if request.every:
             exercises, submission = _begun(exercises, submission)
         odometry = read_recording(request, exercises)
-        seed = seed_of(submission.digest) if request.seed is None else request.seed
+        seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
         jobs = plan_jobs(request, exercises, submission, odometry, seed)
         run = Run(
             submission=submission,
@@ -119,7 +122,12 @@ def grade(
             environment=_environment(studio),
             seed=seed,
             duration_s=time.perf_counter() - started,
-            notes=(*submission.notes, *_release_notes(studio.ros.distro), *_isolation_notes(studio)),
+            notes=(
+                *submission.notes,
+                *_seed_notes(request),
+                *_release_notes(studio.ros.distro),
+                *_isolation_notes(studio),
+            ),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
         take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
@@ -199,6 +207,11 @@ def _staged(request: Request, exercises: Sequence[Exercise], root: Path) -> Subm
     if request.collected is not None:
         return stage_collected(request.collected, request.submission, wanted, root)
     return stage_submission(request.submission, wanted, root)
+
+
+def _seed_notes(request: Request) -> tuple[str, ...]:
+    """Say that the drawn values could be known beforehand, if so."""
+    return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
 
 
 def _release_notes(distro: str) -> tuple[str, ...]:

@@ -11,12 +11,11 @@ from pathlib import Path
 from grader.model.errors import VariantError
 from grader.model.exercise import Exercise
 from grader.model.variant import Drawn, Value
+from grader.reading.keys import read_key
 from grader.reading.quoting import shown
 from grader.reading.rubric_file import read_rubric
 from grader.reading.variants import Options
 
-#: Fewest and most bytes of a key; one that could be guessed would tell students each other's values.
-LEAST_BYTES, MOST_BYTES = 16, 4096
 #: Longest id of a student.
 MOST_ID = 200
 _SCHEME = "grader/variant/v1"
@@ -49,8 +48,8 @@ def folded(student: str) -> str:
 
 
 def by_key(path: Path, student: str) -> ByKey:
-    """Return what draws a student's values; raises VariantError for a key or an id that cannot be used."""
-    return ByKey(read_key(path), checked(student))
+    """Return what draws a student's values; raises GraderError for a key or an id that cannot be used."""
+    return ByKey(read_key(path, "course key"), checked(student))
 
 
 def checked(student: str) -> str:
@@ -60,21 +59,6 @@ def checked(student: str) -> str:
         text = f"expected the id of a student, up to {MOST_ID} signs on one line, found `{shown(student)}`"
         raise VariantError(f"--student: {text}")
     return plain
-
-
-def read_key(path: Path) -> bytes:
-    """Return the key in a file, without the blanks around it; raises VariantError for one that cannot be used."""
-    where = shown(str(path), 500)
-    try:
-        with path.open("rb") as file:
-            key = file.read(MOST_BYTES + 1).strip()
-    except OSError as error:
-        raise VariantError(f"{where}: expected a file with the course key: {error.strerror}") from None
-    if not LEAST_BYTES <= len(key) <= MOST_BYTES:
-        found = f"more than {MOST_BYTES}" if len(key) > MOST_BYTES else str(len(key))
-        hint = "make one: head -c 32 /dev/urandom | base64 > course.key"
-        raise VariantError(f"{where}: expected a key of {LEAST_BYTES} to {MOST_BYTES} bytes, found {found}", hint)
-    return key
 
 
 def sheet(path: Path, key: Path, student: str) -> Exercise:

@@ -4,7 +4,6 @@ import pytest
 
 from grader.model.errors import RecordingError, RubricError
 from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.recording.plan import seed_of
 from grader.session import Request, read_exercises, read_recording
 
 
@@ -34,9 +33,3 @@ def test_the_recording_is_read_only_where_it_is_played(tmp_path):
     named = Request("x", exercises=("velocity_publisher",), odom_bag=tmp_path / "none.mcap")
     with pytest.raises(RecordingError):
         read_recording(named, read_exercises(named))
-
-
-def test_the_seed_follows_from_the_digest():
-    """The same files get the same run, others another one; people can type it."""
-    assert seed_of("sha256:aa") == seed_of("sha256:aa") != seed_of("sha256:ab")
-    assert 0 <= seed_of("sha256:aa") < 2**32

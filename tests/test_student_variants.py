@@ -9,8 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from grader.cli import app
-from grader.model.errors import VariantError
-from grader.variants import ByKey, by_key, checked, read_key
+from grader.model.errors import KeyFileError, VariantError
+from grader.reading.keys import read_key
+from grader.variants import ByKey, by_key, checked
 
 KEY = b"a course key for tests, not a secret"
 
@@ -62,7 +63,7 @@ def test_a_key_is_read_without_the_line_break_behind_it(tmp_path):
     """Editors add one."""
     for name, end in (("a", b""), ("b", b"\n"), ("c", b"\r\n")):
         (tmp_path / name).write_bytes(KEY + end)
-    assert {read_key(tmp_path / name) for name in "abc"} == {KEY}
+    assert {read_key(tmp_path / name, "course key") for name in "abc"} == {KEY}
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_a_key_that_cannot_be_used_is_refused(tmp_path, content, found):
     path = tmp_path / "course.key"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(VariantError, match=found) as refusal:
+    with pytest.raises(KeyFileError, match=found) as refusal:
         by_key(path, "ada")
     assert "short" not in refusal.value.message
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from grader.batch.intake import Entry
-from grader.batch.keys import Conditions, unusable_digest
+from grader.batch.keys import unusable_digest
 from grader.batch.standing import State
 from grader.batch.store import Kept, Store
 from grader.model.errors import GraderError, SubmissionError
@@ -17,18 +17,19 @@ CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
 RERUNS = (CHANGED, FAILED, UNDECIDED, ALL)
 
 
-def key_of(entry: Entry, conditions: Conditions, scratch: Path) -> str:
-    """Return the key that a result of a submission has if it is made now; empty if that cannot be known.
+def digest_of(entry: Entry, scratch: Path) -> str:
+    """Return the digest of a submission; empty if that cannot be known.
 
     Args:
         entry: The submission.
-        conditions: What it is graded with.
         scratch: An empty folder, to copy it into.
     """
+    if entry.problem:
+        return unusable_digest(SubmissionError(entry.problem))
     try:
-        return conditions.key(stage_submission(str(entry.path), (), scratch).digest)
+        return stage_submission(str(entry.path), (), scratch).digest
     except SubmissionError as error:
-        return conditions.key(unusable_digest(error))
+        return unusable_digest(error)
     except (GraderError, OSError, MemoryError, RecursionError):
         return ""  # grading it, in a process of its own, will say why
 

@@ -16,11 +16,11 @@ from typing import Any
 
 import grader
 from grader.batch.adjustments import Adjustments, read_adjustments
-from grader.batch.choosing import due_now, key_of
+from grader.batch.choosing import digest_of, due_now
 from grader.batch.classbook import Classbook, ReportData, decisions_for, make_classbook
 from grader.batch.facts import RunOfClass, folders_of, title_of
 from grader.batch.intake import Entry, Intake, take_in
-from grader.batch.keys import Conditions, unusable_digest
+from grader.batch.keys import Conditions
 from grader.batch.local import LocalScheduler
 from grader.batch.matching import Matching, match
 from grader.batch.outputs import CLASS, class_files, exports
@@ -28,17 +28,18 @@ from grader.batch.people import read_roster
 from grader.batch.request import Course
 from grader.batch.running import ClassRun
 from grader.batch.similar import compare_class, link_of_before
-from grader.batch.store import Store, open_store
+from grader.batch.store import SEED_KEY, Store, open_store
 from grader.batch.summary import Graded, summary_json
 from grader.batch.tasks import MakeScheduler
 from grader.batch.variants import own_conditions, refuse_without_key, with_known_students
 from grader.batch.watching import Watcher
 from grader.batch.worker import GRADESCOPE, HANDED_BACK, REPORT
-from grader.model.errors import GraderError, HarnessError, SubmissionError
+from grader.model.errors import GraderError, HarnessError
 from grader.model.exercise import Exercise
 from grader.reading.variants import First
 from grader.recording.leftovers import scratch_folder
 from grader.reproducing import recording_digest
+from grader.seeding import kept_key
 from grader.session import Request, read_exercises, read_recording
 
 
@@ -71,7 +72,10 @@ def grade_class(
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
         with scratch_folder() as scratch:
-            keys = {entry.name: _key(entry, own[entry.name], scratch) for entry in intake.entries}
+            digests = {entry.name: _digest(entry, scratch) for entry in intake.entries}
+        own = _seeded(own, digests, course)
+        # Where a digest is not known, grading it, in a process of its own, will say why.
+        keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
         due = due_now(store, intake.entries, keys, course.rerun)
         before = len(intake.entries) - len(due)
         watcher.begin(len(due), before)
@@ -102,11 +106,17 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
     )
 
 
-def _key(entry: Entry, conditions: Conditions, scratch: Path) -> str:
-    if entry.problem:
-        return conditions.key(unusable_digest(SubmissionError(entry.problem)))
+def _digest(entry: Entry, scratch: Path) -> str:
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
-        return key_of(entry, conditions, Path(folder))
+        return digest_of(entry, Path(folder))
+
+
+def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: Course) -> dict[str, Conditions]:
+    """Return the conditions with the seed of each submission: what grades it is told the seed, never the key."""
+    if course.grading.seed is not None:
+        return dict(own)
+    key = course.seed_key or kept_key(course.results / SEED_KEY)
+    return {name: replace(conditions, seed=key.seed(digests[name])) for name, conditions in own.items()}
 
 
 def _book(

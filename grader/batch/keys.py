@@ -18,7 +18,7 @@ class Conditions:
         grader: Version of the grader.
         rubrics: Exercise id and digest of its rubric, in the order graded.
         recording: Digest of the /odom recording; empty if none is played.
-        seed: The seed that was asked for; None if it follows from the files handed in.
+        seed: The seed of every drawn value; None in what a whole class is graded with, if each submission has its own.
         clock: The clock that was asked for.
         isolation: The sandbox that was asked for.
         every: Whether only exercises count of which a submission has a file.

@@ -39,7 +39,7 @@ def _rows(book: Classbook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]
         yield "recording", conditions.recording
     yield "clock", _clock(conditions.clock, reports)
     yield "isolation", f"asked for: {conditions.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
-    yield "seed", "follows from what each student handed in" if seed is None else f"{seed} for everybody"
+    yield "seed", f"{seed} for everybody" if seed is not None else "follows from the seed key and the files handed in"
     yield "jobs", str(run.jobs)
     yield "cost", _cost(book)
     yield "sources", ", ".join(f"{PurePath(source).name or source} ({layout})" for source, layout in book.layouts)

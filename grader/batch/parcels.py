@@ -61,6 +61,7 @@ class Errand:
         path: What reports call it: a path from where the class is graded.
         collected: What was handed in; see `pack_collected`.
         variants: The values that are this student's own; None if nothing varies.
+        seed: The seed of every drawn value; the key that it was made with does not travel.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Errand:
     path: bytes
     collected: bytes
     variants: Drawn | None = None
+    seed: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from grader.batch.choosing import CHANGED
 from grader.batch.layouts import AUTO
 from grader.batch.outputs import Platforms
+from grader.seeding import SeedKey
 from grader.session import Request
 from grader.similarity.contents import Program
 
@@ -29,6 +30,7 @@ class Course:
         grading: As for one submission; its path says nothing.
         jobs: Submissions at a time; None for one a processor.
         rerun: See `choosing`.
+        seed_key: The key that seeds are made with; None for the one kept with the results.
         standalone: Whether each HTML report can be sent away alone.
         platforms: What else is written for the class.
         given: What everybody was given, to compare the submissions without it; None to compare none.
@@ -43,6 +45,7 @@ class Course:
     grading: Request = _GRADING
     jobs: int | None = None
     rerun: str = CHANGED
+    seed_key: SeedKey | None = None
     standalone: bool = False
     platforms: Platforms = _NO_PLATFORMS
     given: tuple[Program, ...] | None = None

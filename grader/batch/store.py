@@ -18,6 +18,8 @@ from grader.model.errors import ClassError, HarnessError
 from grader.reports.destination import write_whole
 
 RESULT, ATTEMPT = "result.json", "attempt.json"
+#: The key of the class, which only its owner can read; of all that is handed on, nothing holds it.
+SEED_KEY = ".seed.key"
 _FRESH, _OLD = ".new", ".old"
 _PENDING = ".pending.json"
 

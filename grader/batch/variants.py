@@ -11,8 +11,9 @@ from grader.batch.people import Person
 from grader.batch.request import Course
 from grader.model.errors import ClassError, VariantError
 from grader.model.exercise import Exercise
+from grader.reading.keys import read_key
 from grader.session import read_exercises
-from grader.variants import ByKey, checked, drawn, read_key
+from grader.variants import ByKey, checked, drawn
 
 _NOBODY = "whose variant it is to be graded by is not clear: nobody on the roster goes with it for sure"
 _NO_ID = (
@@ -91,7 +92,7 @@ def own_conditions(
     """
     if not vary(exercises) or course.grading.variant_key is None:
         return {entry.name: conditions for entry in entries}
-    key = read_key(course.grading.variant_key)
+    key = read_key(course.grading.variant_key, "course key")
     found: dict[str, Conditions] = {}
     for entry in entries:
         found[entry.name] = conditions

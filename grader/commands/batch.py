@@ -11,7 +11,7 @@ import click
 
 from grader.batch.cluster.extra import require_dask
 from grader.model.containment import TIERS
-from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED
+from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED, drawn_with
 from grader.reports.escape import encoded, shown
 from grader.similarity.extra import require_library
 
@@ -36,7 +36,8 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
 @click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, not from each digest.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
@@ -72,6 +73,7 @@ def command(  # noqa: PLR0913  one parameter an option
     every: bool,
     rubrics: tuple[Path, ...],
     seed: int | None,
+    seed_key: Path | None,
     odom_bag: Path | None,
     clock: str,
     isolation: str,
@@ -130,6 +132,7 @@ def command(  # noqa: PLR0913  one parameter an option
         ),
         jobs=jobs,
         rerun=rerun,
+        seed_key=drawn_with(seed, seed_key),
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
         given=read_given(templates or (shipped_templates(),)) if similarity else None,

@@ -32,13 +32,16 @@ def command() -> None:
     show_default=True,
     help="The sandbox in Gradescope's container, which allows no namespaces but is used for one submission only.",
 )
-def _gradescope(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str) -> int:
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Put this key into the ZIP; drawn values follow from it.")
+def _gradescope(
+    target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str, seed_key: Path | None
+) -> int:
     """Write an autograder ZIP that Gradescope takes as it is."""
     from grader.exporting.bundles import Chosen, gradescope  # noqa: PLC0415  reads rubrics, which --help does not need
 
     if isolation == NO_WALLS:
         click.echo("warning: without a sandbox a student's program can write its own result", err=True)
-    _write(target, gradescope(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation)))
+    _write(target, gradescope(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation), seed_key))
     return ALL_MET
 
 

@@ -9,11 +9,14 @@ from pathlib import Path
 from grader.exporting.parts import integration, pins, wheel, zipped
 from grader.model.errors import GraderError, RubricError
 from grader.reading.builtin_rubrics import builtin_rubrics, require_exercises
+from grader.reading.keys import read_key
 from grader.reading.rubric_file import own_check_files, read_rubric
 from grader.reading.variants import First
 
 #: Files that are run; the others are read.
 _PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
+#: The key that drawn values follow from, where `run_autograder` looks for it.
+SEED_KEY = "seed.key"
 #: Classroom 50 fetches no more than this.
 CLASSROOM50_BYTES = 10 * 1024 * 1024
 _OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
@@ -36,10 +39,17 @@ class Chosen:
     isolation: str = "auto"
 
 
-def gradescope(chosen: Chosen) -> bytes:
-    """Return the autograder zip for Gradescope; raises GraderError if it would not work there."""
-    scripts = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
-    return zipped({**scripts, **_common(chosen)}, programs=_PROGRAMS)
+def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
+    """Return the autograder zip for Gradescope; raises GraderError if it would not work there.
+
+    Args:
+        chosen: What it grades.
+        seed_key: File with the key that drawn values follow from; None for the public practice key.
+    """
+    files = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
+    if seed_key is not None:
+        files[SEED_KEY] = read_key(seed_key, "seed key") + b"\n"
+    return zipped({**files, **_common(chosen)}, programs=_PROGRAMS, private=(SEED_KEY,))
 
 
 def classroom50(chosen: Chosen) -> dict[str, bytes]:

@@ -20,7 +20,7 @@ from grader.reading.shipped import shipped_folder
 PACKAGE = "rclpy-grader"
 #: A zip knows no time before this; the same files give the same bytes.
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
-_PROGRAM, _FILE = 0o100755, 0o100644
+_PROGRAM, _FILE, _PRIVATE = 0o100755, 0o100644, 0o100600
 #: What every environment has of its own, for its own Python.
 _WITH_PYTHON = ("pip", "setuptools", "wheel")
 _NOT_PACKED = ("__pycache__", "rubrics", "integrations")
@@ -81,14 +81,14 @@ def pins() -> str:
     return "".join(f"{name}=={version} ; {since}\n" for name, version in sorted(found.items()))
 
 
-def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = ()) -> bytes:
-    """Return a zip of files by name, in that order; those that are programs can be run."""
+def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = (), private: tuple[str, ...] = ()) -> bytes:
+    """Return a zip of files by name, in that order; programs can be run, private files read by their owner."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
             info = zipfile.ZipInfo(name, _LONG_AGO)
             info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = (_PROGRAM if name in programs else _FILE) << 16
+            info.external_attr = (_PROGRAM if name in programs else _PRIVATE if name in private else _FILE) << 16
             archive.writestr(info, content)
     return stream.getvalue()
 

@@ -6,7 +6,8 @@
       ├─ RecordingError    whoever named the /odom recording
       ├─ EvidenceError     whoever named the evidence
       ├─ ClassError        whoever describes a class: its submissions, roster, late days, places for results
-      ├─ VariantError      whoever names the student whose variant is meant, or the course key
+      ├─ VariantError      whoever names the student whose variant is meant
+      ├─ KeyFileError      whoever names the course key or the seed key
       ├─ EnvironmentFault  whoever set up this machine (ROS, sandbox)
       └─ HarnessError      us or the machine, during a run
 
@@ -49,7 +50,11 @@ class ClassError(GraderError):
 
 
 class VariantError(GraderError):
-    """A student's variant cannot be drawn; whoever named the student or the course key must act."""
+    """A student's variant cannot be drawn; whoever named the student must act."""
+
+
+class KeyFileError(GraderError):
+    """A key cannot be used; whoever named it must act."""
 
 
 class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here

@@ -172,11 +172,6 @@ def derive(seed: int, *purpose: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def seed_of(digest: str) -> int:
-    """Return the seed that belongs to a submission's digest, a number people can type."""
-    return int(hashlib.sha256(digest.encode()).hexdigest()[:8], 16)
-
-
 def _numbers(stream: NumberStream, draw: random.Random) -> PlannedNumbers:
     return PlannedNumbers(
         topic=stream.topic,

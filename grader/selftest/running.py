@@ -18,8 +18,8 @@ from grader.model.exercise import Exercise
 from grader.model.submission import Submission
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_submission
-from grader.recording.plan import seed_of
 from grader.recording.studio import Studio, open_studio
+from grader.seeding import PRACTICE
 from grader.selftest.bench import Bench, Candidate
 from grader.selftest.explained import Explained, Explanation, beside, idle, read_explained
 from grader.selftest.mutating.mutants import mutants_of
@@ -98,7 +98,7 @@ def _bench(  # noqa: PLR0913  each comes from another stage
         request=request,
         exercise=exercise,
         odometry=read_recording(request, [exercise]),
-        seed=seed_of(reference.digest) if options.seed is None else options.seed,
+        seed=PRACTICE.seed(reference.digest) if options.seed is None else options.seed,
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,

@@ -25,6 +25,7 @@ PASSED_ON = (
     *("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE", "GITHUB_EVENT_PATH"),
     *("CLASSROOM", "ASSIGNMENT", "ASSIGNMENT_TYPE", "OWNER", "USERNAME", "SUBMISSION_TAG"),
     *("COMMIT_URL", "RELEASE_URL", "REVIEW_URL"),
+    "GRADER_SEED_KEY",  # the grader keeps it to itself
 )
 #: What is left in the checkout, by its name while grading.
 LEFT = {

@@ -18,8 +18,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 ALL_MET, UNDECIDED = 0, 3
-#: All of the job's environment that the grader gets to see: no token is among it.
-PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE")
+#: All of the job's environment that the grader gets to see: no token is among it, and the seed key goes no further.
+PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE", "GRADER_SEED_KEY")
 #: What a sourced ROS installation is found by.
 OF_ROS = ("ROS_DISTRO", "AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
 #: What an output of GitHub may be made of here: numbers, words, base64, a path of the runner's.

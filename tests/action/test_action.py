@@ -101,7 +101,24 @@ def test_the_grader_gets_none_of_the_job_s_environment(checkout):
     run(checkout, 0)
     _, environment = json.loads((checkout / "called.json").read_text())
     assert CANARY not in environment.values()
-    assert set(environment) <= {"PATH", "HOME", "LANG", "LC_ALL", "GITHUB_WORKSPACE", "XDG_CACHE_HOME", "LC_CTYPE"}
+    assert set(environment) <= {
+        "PATH",
+        "HOME",
+        "LANG",
+        "LC_ALL",
+        "GITHUB_WORKSPACE",
+        "XDG_CACHE_HOME",
+        "LC_CTYPE",
+        "GRADER_SEED_KEY",
+    }
+
+
+def test_the_seed_key_reaches_the_grader_and_nothing_else(checkout):
+    """It is in its environment, and in no argument, output or summary."""
+    job = run(checkout, 0, seed_key="a seed key of enough bytes")
+    words, environment = json.loads((checkout / "called.json").read_text())
+    assert environment["GRADER_SEED_KEY"] == "a seed key of enough bytes"
+    assert "a seed key" not in json.dumps([words, job.outputs, job.summaries, job.log])
 
 
 def test_inputs_become_words_of_a_command(checkout):

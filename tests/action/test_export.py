@@ -14,7 +14,7 @@ from grader.cli import app
 from grader.exporting import parts
 from grader.exporting.bundles import CLASSROOM50_BYTES, Chosen, classroom50, gradescope
 from grader.exporting.parts import pins, wheel
-from grader.model.errors import EnvironmentFault, RubricError
+from grader.model.errors import EnvironmentFault, KeyFileError, RubricError
 
 
 def opened(content):
@@ -40,6 +40,18 @@ def test_classroom50_s_bundle_fits():
     files = classroom50(Chosen())
     assert "autograder.py" in files
     assert sum(map(len, files.values())) < CLASSROOM50_BYTES / 4
+
+
+def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path):
+    """No student sees the zip; without a key it holds none, and one that could be guessed is refused now."""
+    (tmp_path / "key").write_text("a seed key of enough bytes\r\n")
+    archive = opened(gradescope(Chosen(), tmp_path / "key"))
+    assert archive.getinfo("seed.key").external_attr >> 16 & 0o777 == 0o600
+    assert archive.read("seed.key") == b"a seed key of enough bytes\n"
+    assert "seed.key" not in opened(gradescope(Chosen())).namelist()
+    (tmp_path / "key").write_text("short")
+    with pytest.raises(KeyFileError, match="expected a key of 16"):
+        gradescope(Chosen(), tmp_path / "key")
 
 
 def test_rubrics_travel_under_names_of_ours():

@@ -1,14 +1,16 @@
 """A class from end to end, without running anybody's code: what is graded, what is kept, what is written."""
 
 import json
+from dataclasses import replace
 
 import pytest
-from class_samples import FakeScheduler, course, grade, hand_in, scores
+from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
 from grader.batch.classbook import Status
 from grader.batch.standing import State
-from grader.batch.store import Store, open_store
+from grader.batch.store import SEED_KEY, Store, open_store
 from grader.model.errors import ClassError, HarnessError
+from grader.seeding import SeedKey
 
 
 def regraded(tmp_path, **changes):
@@ -45,10 +47,6 @@ def test_what_was_handed_in_anew_is_graded(tmp_path):
 @pytest.mark.parametrize("change", [{"grading": "seed"}, {"grading": "clock"}, {"grading": "exercises"}])
 def test_other_conditions_are_other_results(tmp_path, change):
     """The seed, the clock and the rubrics are part of the key."""
-    from dataclasses import replace
-
-    from class_samples import GRADING
-
     hand_in(tmp_path / "in", ada=10)
     regraded(tmp_path)
     others = {"seed": 5, "clock": "wall", "exercises": ("odom_subscriber",)}
@@ -167,3 +165,54 @@ def test_results_survive_in_every_state(tmp_path):
     store = Store(tmp_path / "out")
     states = [store.kept(name).result.state for name in ("ada", "bob", "cleo", "eve")]
     assert states == [State.GRADED, State.UNDECIDED, State.FAILED, State.REFUSED]
+
+
+def seeds(scheduler):
+    """Return the seed that each submission was graded with."""
+    return {name: task.conditions.seed for name, task in scheduler.tasks.items()}
+
+
+def test_a_class_keeps_a_key_of_its_own(tmp_path):
+    """Everybody gets a seed that nobody can predict, the same again when graded again."""
+    hand_in(tmp_path / "in", ada=10, bob=7)
+    first, again, elsewhere = FakeScheduler(), FakeScheduler(), FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out"), first)
+    grade(course(tmp_path / "in", tmp_path / "out", rerun="all"), again)
+    grade(course(tmp_path / "in", tmp_path / "other"), elsewhere)
+    assert len(set(seeds(first).values())) == 2
+    assert seeds(again) == seeds(first)
+    assert set(seeds(elsewhere).values()).isdisjoint(seeds(first).values())
+    key = tmp_path / "out" / SEED_KEY
+    assert key.stat().st_mode & 0o777 == 0o600
+
+
+def test_the_key_of_a_class_is_in_nothing_else_that_it_leaves(tmp_path):
+    """Results are handed on: pages, tables, reports."""
+    hand_in(tmp_path / "in", ada=10)
+    scheduler = FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out"), scheduler)
+    key = (tmp_path / "out" / SEED_KEY).read_bytes().strip()
+    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file() and path.name != SEED_KEY]
+    assert files
+    assert [path for path in files if key in path.read_bytes()] == []
+    assert key.decode() not in repr(scheduler.tasks)
+
+
+def test_another_key_is_another_result(tmp_path):
+    """One that is named is not kept; a changed one grades everybody again."""
+    hand_in(tmp_path / "in", ada=10)
+    regraded(tmp_path, seed_key=SeedKey(b"one key of 16 bytes"))
+    assert not (tmp_path / "out" / SEED_KEY).exists()
+    assert regraded(tmp_path, seed_key=SeedKey(b"one key of 16 bytes"))[0] == []
+    assert regraded(tmp_path, seed_key=SeedKey(b"two key of 16 bytes"))[0] == ["ada"]
+    assert regraded(tmp_path)[0] == ["ada"]
+    assert regraded(tmp_path)[0] == []
+
+
+def test_a_seed_for_everybody_needs_no_key(tmp_path):
+    """And none is made."""
+    hand_in(tmp_path / "in", ada=10)
+    scheduler = FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out", grading=replace(GRADING, seed=5)), scheduler)
+    assert seeds(scheduler) == {"ada": 5}
+    assert not (tmp_path / "out" / SEED_KEY).exists()

@@ -30,13 +30,8 @@ def class_(tmp_path):
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {between: [5 Hz, 500 Hz], step: 1 Hz}\nscenarios:", 1)
     (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
 
-    class Remembering(FakeScheduler):
-        def run(self, tasks, hear):
-            self.tasks = {task.name: task for task in tasks}
-            return super().run(tasks, hear)
-
     def run(*, key="course.key", roster="roster.csv"):
-        scheduler = Remembering()
+        scheduler = FakeScheduler()
         grading = replace(GRADING, rubrics=(tmp_path / "r.yaml",), variant_key=tmp_path / key if key else None)
         wanted = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / roster if roster else None)
         return grade(replace(wanted, grading=grading), scheduler), scheduler

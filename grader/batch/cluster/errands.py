@@ -113,7 +113,7 @@ def lay_out(terms: Terms, errand: Errand, scratch: Path) -> Task:
         exercises=terms.exercises,
         rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
         odom_bag=Path(bag) if bag else None,
-        conditions=replace(terms.conditions, variants=errand.variants),
+        conditions=replace(terms.conditions, variants=errand.variants, seed=errand.seed),
         # A cluster is kept busy by submissions, one a thread.
         workers=1,
         standalone=terms.standalone,

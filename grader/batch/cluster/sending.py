@@ -37,7 +37,7 @@ _PARTS = frozenset(PARTS)
 def terms_of(task: Task) -> Terms:
     """Return what a class is graded with, of which this is one submission; raises GraderError for a lost file."""
     return Terms(
-        conditions=task.conditions,
+        conditions=replace(task.conditions, seed=None),  # each submission comes with its own
         exercises=task.exercises,
         rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
         checks=tuple(checks_of(task.rubrics)),
@@ -83,6 +83,7 @@ def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
         travelling_name(task.submission),
         pack_collected(collected),
         task.conditions.variants,
+        task.conditions.seed,
     )
 
 
