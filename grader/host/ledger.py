@@ -24,8 +24,6 @@ BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_servi
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, a message that was announced is waited for before it is given up as lost.
 ARRIVAL_S = 1.0
-#: How long, in real time, a new endpoint is waited for to be matched.
-MATCH_S = 5.0
 #: How long, in real time, contexts may take to shut down at a signal.
 SHUTDOWN_S = 1.0
 #: Whether a context is alive, without a look that would let time pass.
@@ -232,22 +230,23 @@ class Ledger:
             for endpoint in self.alive(kind)
         }
 
-    def await_matches(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
+    def await_matches(self, expected: dict[str, dict[str, list[int]]], wait_s: float) -> list[str]:
         """Wait, in real time, until endpoints have the counterparts the grader knows of; return those that have not.
 
         Args:
             expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any.
+            wait_s: How long.
         """
-        deadline = originals.perf_counter() + MATCH_S
+        deadline = originals.perf_counter() + wait_s
         missing = self._unmatched(expected)
         while missing and originals.perf_counter() < deadline:
             originals.sleep(0.0005)
             missing = self._unmatched(expected)
         return missing
 
-    def await_absence(self, services: list[str]) -> None:
+    def await_absence(self, services: list[str], wait_s: float) -> None:
         """Wait, in real time, until clients know that the servers of some services have gone."""
-        deadline = originals.perf_counter() + MATCH_S
+        deadline = originals.perf_counter() + wait_s
         clients = [client for client in self.alive("client") if service_name(client) in services]
         while any(_matches("client", client) for client in clients) and originals.perf_counter() < deadline:
             originals.sleep(0.0005)

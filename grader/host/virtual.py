@@ -128,8 +128,8 @@ class VirtualTime:
         self.resumed_ns = originals.processor_ns()
         self.running = True
         while "match" in answer and self._ledger is not None:
-            missing = self._ledger.await_matches(answer["match"])
-            self._ledger.await_absence(answer.get("gone", []))
+            missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
+            self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
             answer = self._link.ask({"kind": "matched", "missing": missing})
         if answer.get("stop"):
             self._stopping = True

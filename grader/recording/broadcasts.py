@@ -8,13 +8,10 @@ from grader.model.trace import Delivery, Mark
 from grader.recording.claims import announce, compatible, offered, readers_of, takes_ordinary
 from grader.recording.interfaces import built, message_class, plain_fields
 from grader.recording.matching import Matching
-from grader.recording.observer import Observer, wait_until
+from grader.recording.observer import Observer
 from grader.recording.stimuli import Due, number_message, numeric_field
 from grader.recording.student import Student
 from grader.recording.tape import Tape
-
-#: How long, in real time, subscriptions are waited for.
-SETTLE_S = 5.0
 
 
 class Broadcasts:
@@ -47,7 +44,7 @@ class Broadcasts:
         self._matching.streams[due.topic] = stream.type
         self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
         readers = [c for s in self._students for c in readers_of(s, due.topic) if compatible(offered(stream), c)]
-        wait_until(lambda: self._observer.subscribers_matched(due.topic) >= len(readers), SETTLE_S)
+        self._matching.patience.wait(lambda: self._observer.subscribers_matched(due.topic) >= len(readers))
         self._matching.tell_all()
         self._tape.add(Mark(now_ns, "stream_starts", due.topic))
 
@@ -75,7 +72,7 @@ class Broadcasts:
         self._observer.advertise(topic, interface, latched=latched)
         self._matching.streams[topic] = interface
         readers = [c for c in asked if c["type"] == interface and takes_ordinary(c)]
-        wait_until(lambda: self._observer.subscribers_matched(topic) >= len(readers), SETTLE_S)
+        self._matching.patience.wait(lambda: self._observer.subscribers_matched(topic) >= len(readers))
         self._matching.tell_all()
 
     def publish(self, due: Due, now_ns: int) -> None:

@@ -18,7 +18,7 @@ from grader.recording.desk import Desk
 from grader.recording.ending import ending, never_stopped, reported_fault
 from grader.recording.fitness import hopeless, unfit
 from grader.recording.matching import Matching
-from grader.recording.observer import Observer, Taken, wait_until
+from grader.recording.observer import Observer, Taken
 from grader.recording.plan import Plan
 from grader.recording.stimuli import APPEARANCES, BROADCASTS, Due, schedule
 from grader.recording.student import Student
@@ -26,11 +26,6 @@ from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
 
 #: Where the hosts' virtual time starts: 2026-01-01 00:00:00 UTC, as `grader/host/clock.py` has it.
 EPOCH_NS = 1_767_225_600_000_000_000
-#: How long, in real time, an endpoint or a message that was announced is waited for.
-SETTLE_S = 5.0
-#: After so many messages that never came, later ones are waited for only briefly.
-PATIENCE = 3
-IMPATIENT_S = 0.05
 #: Wake-ups of one scenario; more end it.
 STEPS = 400_000
 #: A process that has more to say than this before it waits or ends does not talk like the host, nor does one that says
@@ -74,7 +69,6 @@ class Conductor:
         }
         self._starts_ns = dict(plan.starts_ns)
         self._stop_ns = 0
-        self._losses = 0
         self._steps = 0
 
     def run(self) -> Trace:
@@ -265,8 +259,7 @@ class Conductor:
                 expected[message.topic] -= 1
             return bool(self._tape.full) or all(count <= 0 for count in expected.values())
 
-        if not wait_until(complete, SETTLE_S if self._losses < PATIENCE else IMPATIENT_S):
-            self._losses += 1
+        if not self._matching.patience.wait(complete):
             for topic in sorted(t for t, n in expected.items() if n > 0):
                 self._tape.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
@@ -280,8 +273,7 @@ class Conductor:
             expected.subtract(self._desk.take())
             return all(count <= 0 for count in expected.values())
 
-        if not wait_until(complete, SETTLE_S if self._losses < PATIENCE else IMPATIENT_S):
-            self._losses += 1
+        if not self._matching.patience.wait(complete):
             for channel in sorted(c for c, n in expected.items() if n > 0):
                 self._tape.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
         self._desk.write_down(self._now_ns)

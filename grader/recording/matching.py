@@ -10,12 +10,11 @@ from grader.model.trace import GraphSnapshot
 from grader.recording.claims import announce, compatible, offered, readers_of, serves, takes_ordinary
 from grader.recording.desk import Desk
 from grader.recording.exchanges import PlannedCalls, PlannedMessages
-from grader.recording.observer import Observer, wait_until
+from grader.recording.observer import Observer
+from grader.recording.patience import Patience
 from grader.recording.student import Student
 from grader.recording.tape import NAME_CHARACTERS, Tape
 
-#: How long, in real time, an endpoint that was announced is waited for.
-SETTLE_S = 5.0
 #: Looking at the graph costs much: not so often that it holds up what is looked for.
 GRAPH_PAUSE_S = 0.003
 #: A process that names more than this as unmatched does not talk like the host.
@@ -36,6 +35,7 @@ class Matching:
         streams: The topics that stimuli publish on now, with their types.
         fixed: Those whose type a rubric has fixed.
         said: How many messages each of those has sent.
+        patience: How long whatever was announced is waited for.
     """
 
     def __init__(
@@ -51,6 +51,7 @@ class Matching:
         self._tape = tape
         self._desk = desk
         self._bury = bury
+        self.patience = Patience()
         self._served: set[tuple[str, str]] = set()
         self.streams: dict[str, str] = {}
         self.fixed: dict[str, PlannedMessages] = {}
@@ -60,13 +61,13 @@ class Matching:
         """Wait until every endpoint that the processes say they have is seen, watched and matched."""
         claims = [c for s in self._students if not s.ended for c in s.claims]
         ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        if not wait_until(lambda: self._sees(now_ns, claims), SETTLE_S, pause_s=GRAPH_PAUSE_S):
+        if not self.patience.wait(lambda: self._sees(now_ns, claims), pause_s=GRAPH_PAUSE_S):
             self._tape.note("an endpoint that a node created was not seen in the graph")
         self.look(now_ns)
         unknown = self._observer.watch(self._tape.graph)
         self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in ends if c["kind"] == "publisher"]
-        wait_until(lambda: all(self._watched(c, writers) for c in writers), SETTLE_S)
+        self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
         self._announce_kept()
         self.tell_all()
 
@@ -113,7 +114,7 @@ class Matching:
         if service is None or not any(serves(c, service, calls.type) for c in claims):
             return False
         self._desk.meet(calls)
-        if wait_until(lambda: self._observer.services.met(service), SETTLE_S):
+        if self.patience.wait(lambda: self._observer.services.met(service)):
             return True
         self._tape.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
         return False
@@ -139,13 +140,15 @@ class Matching:
         if expected == student.told or not (expected or gone):
             return
         student.told = expected
-        student.tell({"match": expected, "gone": gone})
+        student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
         answer = student.report()
         if answer is None or answer.get("kind") != "matched":
             self._bury(student)
             return
         student.nudged = True  # a match is an event that a node may have a callback for
         missing = answer.get("missing")
+        if missing:
+            self.patience.lose()
         for name in missing[:WORDS] if isinstance(missing, list) else ():
             self._tape.note(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
 

@@ -26,8 +26,8 @@ from scripted import (
 from grader.host import clock as host_clock
 from grader.model.limits import Limits
 from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
-from grader.recording import broadcasts, fitness, matching, tape
 from grader.recording import conductor as module
+from grader.recording import fitness, patience, tape
 from grader.recording.conductor import Conductor
 from grader.recording.plan import PlannedRecording
 
@@ -35,9 +35,8 @@ from grader.recording.plan import PlannedRecording
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
     """Nothing in these tests is on its way in real time."""
-    for room in (module, matching, broadcasts):
-        monkeypatch.setattr(room, "SETTLE_S", 0.0)
-    monkeypatch.setattr(module, "IMPATIENT_S", 0.0)
+    monkeypatch.setattr(patience, "SETTLE_S", 0.0)
+    monkeypatch.setattr(patience, "BRIEF_S", 0.0)
 
 
 class Run:

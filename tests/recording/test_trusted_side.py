@@ -284,6 +284,30 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run):
     assert len(trace.messages("/cmd_vel")) == 39
 
 
+#: Has its host claim an endpoint more at every tick, which does not exist.
+GHOSTS = """
+import gc
+from _grader_host import ledger
+self.ledger = next(o for o in gc.get_objects() if isinstance(o, ledger.Ledger))
+claims = ledger.Ledger.claims
+ghost = {"type": "std_msgs/msg/String", "reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
+ledger.Ledger.claims = lambda it: [
+    *claims(it),
+    *({**ghost, "kind": "KIND", "name": f"/ghost{n}"} for n in range(self.count)),
+    *[{**ghost, "kind": "publisher", "name": "/cmd_vel", "type": "geometry_msgs/msg/Twist"}] * self.count,
+]
+"""
+
+
+@pytest.mark.parametrize("kind", ["publisher", "client"])
+def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run, kind):
+    """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
+    ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.ledger.changed = True")
+    trace = run(ghosts, duration_ns=4 * NS_PER_S, limits=Limits(wall_ns=60 * NS_PER_S))
+    assert trace.faults() == ()
+    assert len(trace.messages("/cmd_vel")) == 79
+
+
 def workers_of(pid: int) -> list[int]:
     """Return the worker processes below a process, innermost last."""
     found = []
