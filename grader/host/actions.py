@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from .clock import VirtualClock
     from .ledger import Ledger
 
-Counted = Callable[[str, Callable[[], Any]], Any]
+#: Sends something on a channel from a handle, and counts it.
+Counted = Callable[[str, Any, Callable[[], Any]], Any]
 
 #: The methods of a server and of a client that take something: for each the channel, and which of the answers of
 #: `is_ready` says that it is there.
@@ -143,20 +144,24 @@ class ActionEnd:
         ]
 
 
-def install_actions(ledger: Ledger, clock: VirtualClock, counted: Counted) -> None:
-    """Count what servers and clients of actions send and take."""
+def install_actions(
+    ledger: Ledger, clock: VirtualClock, counted: Counted, *, settle: Callable[[], None], leave: Callable[[], None]
+) -> None:
+    """Count what servers and clients of actions send and take; `settle` and `leave` as for `install_traffic`."""
     for kind, cls in (("service", _rclpy.ActionServer), ("client", _rclpy.ActionClient)):
-        _register(kind, cls, ledger)
+        _register(kind, cls, ledger, settle, leave)
         for method in TAKES[kind]:
             setattr(cls, method, _counting_take(getattr(cls, method), method, ledger, clock))
         for method in SENDS[kind]:
             setattr(cls, method, _counting_send(getattr(cls, method), method, ledger, counted))
 
 
-def _register(kind: str, cls: Any, ledger: Ledger) -> None:
+def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None]) -> None:
     make, destroy = cls.__init__, cls.destroy_when_not_in_use
 
     def made(self: Any, node: Any, *arguments: Any) -> None:
+        if ledger.removed:
+            settle()
         make(self, node, *arguments)
         # a server is given its node's clock first
         interface, name = arguments[1:3] if kind == "service" else arguments[:2]
@@ -165,6 +170,7 @@ def _register(kind: str, cls: Any, ledger: Ledger) -> None:
         ledger.add_action(ActionEnd(kind, self, resolved, f"{package}/{room}/{interface.__name__}"))
 
     def destroyed(self: Any) -> None:
+        leave()
         ledger.forget_action(self)
         destroy(self)
 
@@ -189,6 +195,6 @@ def _counting_send(send: Any, method: str, ledger: Ledger, counted: Counted) -> 
         end = ledger.action(self)
         if end is None:
             return send(self, *arguments)
-        return counted(end.channel(method), lambda: send(self, *arguments))
+        return counted(end.channel(method), self, lambda: send(self, *arguments))
 
     return counting

@@ -32,11 +32,6 @@ class VirtualClock:
         self._was_looked_at = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
 
-    @property
-    def waiting(self) -> bool:
-        """Whether time passes now because the program did nothing but wait for it."""
-        return self._yielding
-
     def move_to(self, now_ns: int) -> None:
         """Set the time; it never goes back."""
         if now_ns > self.now_ns:

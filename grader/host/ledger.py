@@ -24,6 +24,8 @@ BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_servi
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, a message that was announced is waited for before it is given up as lost.
 ARRIVAL_S = 1.0
+#: How long, in real time, the end of a counterpart is waited for.
+DEPARTURE_S = 0.5
 #: How long, in real time, contexts may take to shut down at a signal.
 SHUTDOWN_S = 1.0
 #: Whether a context is alive, without a look that would let time pass.
@@ -54,6 +56,13 @@ class Ledger:
             kind: [] for kind in ("publisher", "subscription", "client", "service")
         }
         self.changed = False
+        #: Whether an endpoint or node has gone since the last report. The report comes before anything new is made: the
+        #: grader could take the old endpoint in the graph for the new one.
+        self.removed = False
+        #: What has sent something that its receivers may not have yet; it must not go before they have.
+        self._sending: dict[int, Any] = {}
+        #: Counterparts that nobody knows, by kind and topic, and that did not go when they were waited for.
+        self._strangers: dict[tuple[str, str], int] = {}
         self.lost: Counter[str] = Counter()
         #: How many wait sets wait for a receiver now, by the address of its handle: what comes there is read at once.
         self.awaited: Counter[int] = Counter()
@@ -65,7 +74,7 @@ class Ledger:
 
     def add(self, kind: str, endpoint: Any) -> None:
         """Remember a new endpoint."""
-        self._endpoints[kind].append(weakref.ref(endpoint))
+        self._endpoints[kind].append(weakref.ref(endpoint, self._collected))
         if kind == "subscription":
             if endpoint.topic_name in self._heard_on:
                 self._successors.add(endpoint)
@@ -76,7 +85,35 @@ class Ledger:
         """Expect nothing more at an endpoint that is being destroyed."""
         self._expected.pop(endpoint, None)
         self._kept.pop(endpoint, None)
-        self.changed = True
+        self.remove()
+
+    def remove(self) -> None:
+        """Note that something has left the graph, or is about to."""
+        self.changed = self.removed = True
+
+    def _collected(self, reference: weakref.ref[Any]) -> None:
+        """Note that an endpoint or a node was freed without being destroyed."""
+        del reference
+        self.remove()
+
+    def note_sent(self, channel: str, handle: Any) -> None:
+        """Count one message, and keep its sender alive until the message has arrived."""
+        self.sent[channel] += 1
+        self._sending[id(handle)] = handle
+
+    @property
+    def sending(self) -> bool:
+        """Whether something was sent that its receivers may not have yet."""
+        return bool(self._sending)
+
+    @property
+    def sending_and_removed(self) -> bool:
+        """Whether something has gone, or is kept from going, while what was sent may not have arrived."""
+        return self.removed and bool(self._sending)
+
+    def settled(self) -> None:
+        """Note that everything sent has arrived."""
+        self._sending.clear()
 
     def add_action(self, end: ActionEnd) -> None:
         """Remember the new server or client of an action."""
@@ -87,6 +124,10 @@ class Ledger:
         """Return the server or client of an action that a handle belongs to, if it is still there."""
         return next((end for end in self._actions if end.handle is handle), None)
 
+    def actions(self) -> list[ActionEnd]:
+        """Return the servers and clients of actions that are still there, oldest first."""
+        return list(self._actions)
+
     def forget_action(self, handle: Any) -> None:
         """Expect nothing more at the server or client of an action that is being destroyed."""
         end = self.action(handle)
@@ -94,20 +135,17 @@ class Ledger:
             self._actions.remove(end)
             for receiver in end.receivers.values():
                 self._expected.pop(receiver, None)
-            self.changed = True
+            self.remove()
 
     def alive(self, kind: str) -> list[Any]:
         """Return the endpoints of a kind that still exist, oldest first."""
-        found = []
-        for reference in self._endpoints[kind]:
-            endpoint = reference()
-            if endpoint is not None and _valid(endpoint):
-                found.append(endpoint)
-        return found
+        found = [(r, endpoint) for r in self._endpoints[kind] if (endpoint := r()) is not None and _valid(endpoint)]
+        self._endpoints[kind] = [reference for reference, _ in found]
+        return [endpoint for _, endpoint in found]
 
     def claims(self) -> list[dict[str, Any]]:
         """Return what the grader needs to know of every endpoint, as plain JSON values."""
-        self.changed = False
+        self.changed = self.removed = False
         claims: list[dict[str, Any]] = []
         for kind in ("publisher", "subscription"):
             for endpoint in self.alive(kind):
@@ -148,7 +186,7 @@ class Ledger:
 
     def add_node(self, node: Any) -> None:
         """Remember a new node and its context."""
-        self._nodes.append(weakref.ref(node))
+        self._nodes.append(weakref.ref(node, self._collected))
         self.contexts.append(weakref.ref(node.context))
         self.changed = True
 
@@ -242,7 +280,28 @@ class Ledger:
         while missing and originals.perf_counter() < deadline:
             originals.sleep(0.0005)
             missing = self._unmatched(expected)
+        self._await_departures(expected)
         return missing
+
+    def _await_departures(self, expected: dict[str, dict[str, list[int]]]) -> None:
+        """Wait, in real time, until endpoints have lost the counterparts that have gone."""
+        deadline = originals.perf_counter() + DEPARTURE_S
+        surplus = self._surplus(expected)
+        while surplus and originals.perf_counter() < deadline:
+            originals.sleep(0.0005)
+            surplus = self._surplus(expected)
+        self._strangers.update(surplus)
+
+    def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
+        """Count the counterparts, by kind and topic, that neither the grader knows nor an earlier wait has met."""
+        over: Counter[tuple[str, str]] = Counter()
+        for kind in ("publisher", "subscription"):
+            for endpoint in self.alive(kind):
+                if endpoint.topic_name not in BACKGROUND:
+                    over[kind, endpoint.topic_name] += _matches(kind, endpoint)
+        for kind, name in over:
+            over[kind, name] -= sum(expected.get(kind, {}).get(name, ()))
+        return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
 
     def await_absence(self, services: list[str], wait_s: float) -> None:
         """Wait, in real time, until clients know that the servers of some services have gone."""
@@ -258,7 +317,9 @@ class Ledger:
             for endpoint in self.alive(kind):
                 name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
                 if name in names:
-                    found.setdefault(name, []).append(_matches(kind, endpoint))
+                    found.setdefault(name, []).append(
+                        self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
+                    )
             for end in self._actions if kind == "client" else ():
                 if end.kind == kind and names.keys() & set(end.services()):
                     found.setdefault(end.services()[0], []).append(int(end.handle.is_action_server_available()))
@@ -267,6 +328,13 @@ class Ledger:
                 if any(has < want for has, want in zip(sorted(matches, reverse=True), wanted, strict=False)):
                     missing.append(f"{kind} {name}")
         return missing
+
+    def _clients_of(self, service: str) -> int:
+        """Return how many clients of a service this process knows."""
+        for node in self.nodes():
+            with node.handle:
+                return int(node.handle.get_count_clients(service))
+        return 0
 
     def _receivers(self, channel: str) -> list[Any]:
         actions = [r for end in self._actions for r in end.receivers.values() if r.channel == channel]
@@ -330,7 +398,7 @@ def _matches(kind: str, endpoint: Any) -> int:
             return int(endpoint.handle.get_subscription_count())
         if kind == "subscription":
             return int(endpoint.handle.get_publisher_count())
-        return int(endpoint.handle.service_server_is_available()) if kind == "client" else 1
+        return int(endpoint.handle.service_server_is_available())
 
 
 def _await_ready(receiver: Any, context: Any) -> bool:

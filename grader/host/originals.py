@@ -13,6 +13,8 @@ get_native_id = _thread.get_native_id
 start_new_thread = _thread.start_new_thread
 urandom = os.urandom
 excepthook = threading.excepthook
+exit_now = os._exit
+kill = os.kill
 
 
 def processor_ns() -> int:

@@ -14,10 +14,10 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from . import entry, originals
-from .alarms import install_alarms
 from .faults import Describer
 from .link import Link
 from .log import open_log
+from .outside import install_alarms, install_processes
 from .stand_ins import install_stand_ins
 from .virtual import VirtualTime
 from .watchdog import Watchdog
@@ -41,20 +41,23 @@ def run(request: dict[str, Any]) -> None:
     preload(os.path.join(request["root"], request["file"]))
     install_stand_ins()
     seed_randomness(request["seed"])
-    os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: os._exit(70))
+    os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
     start = link.ask({"kind": "ready", "log_token": token})
     del token
     time.start(start["now_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
-    if watchdog is not None:
+    if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
         install_alarms(watchdog.give_up_on_alarms)
+        install_processes(watchdog.give_up_on_processes)
+        time.give_up_outside = watchdog.give_up_on_waiting
     ending = play(request, describer, link)
     if watchdog is not None:
         watchdog.stop()
+    left = isinstance(time, VirtualTime) and time.end()
     flush()
-    link.send({"kind": "exited", **ending, **time.summary()})
-    os._exit(0)
+    link.send({"kind": "exited", "left": left, **ending, **time.summary()})
+    originals.exit_now(0)
 
 
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:

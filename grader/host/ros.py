@@ -5,7 +5,10 @@ Every spin variant of rclpy blocks in one place, `WaitSet.wait`. It polls here; 
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import os
+import signal
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -26,7 +29,7 @@ from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
-from .actions import install_actions
+from .actions import Counted, install_actions
 from .clock import VirtualClock
 from .ledger import BACKGROUND, REAL_WAIT_SET, Ledger, service_name
 from .scheduler import Scheduler
@@ -216,18 +219,19 @@ def replace_log(wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Non
     _rclpy.rclpy_logging_rcutils_log = wrap(_rclpy.rclpy_logging_rcutils_log)
 
 
-def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], None]) -> None:
+def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], None], leave: Callable[[], None]) -> None:
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
     Args:
         ledger: Where the counts are kept.
         clock: Told when something happened.
         settle: Yields to the grader at the same instant.
+        leave: The same, and what was sent has arrived everywhere when it returns; called before a sender goes.
     """
-    _install_endpoints(ledger)
+    _install_endpoints(ledger, settle, leave)
     in_a_row = 0
 
-    def counted(name: str, send: Callable[[], Any]) -> Any:
+    def counted(name: str, handle: Any, send: Callable[[], Any]) -> Any:
         nonlocal in_a_row
         if name in BACKGROUND:
             return send()
@@ -236,7 +240,7 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
             in_a_row = 0
             settle()
         clock.busy_sending()
-        ledger.sent[name] += 1
+        ledger.note_sent(name, handle)
         try:
             return send()
         except BaseException:
@@ -250,15 +254,17 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     @functools.wraps(publish)
     def counted_publish(self: Any, msg: Any) -> Any:
         topic = self.topic_name
-        return publish(self, msg) if topic in BACKGROUND else counted(f"topic {topic}", lambda: publish(self, msg))
+        if topic in BACKGROUND:
+            return publish(self, msg)
+        return counted(f"topic {topic}", self.handle, lambda: publish(self, msg))
 
     @functools.wraps(call)
     def counted_call(self: Any, request: Any) -> Any:
-        return counted(f"request {self.service_name}", lambda: call(self, request))
+        return counted(f"request {self.service_name}", self.handle, lambda: call(self, request))
 
     @functools.wraps(respond)
     def counted_respond(self: Any, response: Any, header: Any) -> Any:
-        return counted(f"response {service_name(self)}", lambda: respond(self, response, header))
+        return counted(f"response {service_name(self)}", self.handle, lambda: respond(self, response, header))
 
     look = rclpy.client.Client.service_is_ready
 
@@ -273,12 +279,12 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     rclpy.client.Client.call_async = counted_call
     rclpy.service.Service.send_response = counted_respond
     _install_transitions(ledger, counted)
-    install_actions(ledger, clock, counted)
+    install_actions(ledger, clock, counted, settle=settle, leave=leave)
     for name in ("_take_subscription", "_take_client", "_take_service"):
         setattr(rclpy.executors.Executor, name, _counting_take(name, ledger, clock))
 
 
-def _install_transitions(ledger: Ledger, counted: Callable[[str, Callable[[], Any]], Any]) -> None:
+def _install_transitions(ledger: Ledger, counted: Counted) -> None:
     """Count what the state machines of lifecycle nodes publish, which they do below rclpy."""
     machines = _rclpy.LifecycleStateMachine
     make = machines.__init__
@@ -294,15 +300,13 @@ def _install_transitions(ledger: Ledger, counted: Callable[[str, Callable[[], An
         _count_transitions(machines, name, ledger, counted)
 
 
-def _count_transitions(
-    machines: Any, name: str, ledger: Ledger, counted: Callable[[str, Callable[[], Any]], Any]
-) -> None:
+def _count_transitions(machines: Any, name: str, ledger: Ledger, counted: Counted) -> None:
     trigger = getattr(machines, name)
 
     def triggered(self: Any, transition: Any, telling: bool) -> Any:
         if not telling or self not in ledger.transitions:
             return trigger(self, transition, telling)
-        return counted(f"topic {ledger.transitions[self]}", lambda: trigger(self, transition, telling))
+        return counted(f"topic {ledger.transitions[self]}", self, lambda: trigger(self, transition, telling))
 
     setattr(machines, name, triggered)
 
@@ -332,7 +336,7 @@ def _handing_over(subscription: Any, found: tuple[Any, Any]) -> Callable[[], Any
     return execute
 
 
-def _install_endpoints(ledger: Ledger) -> None:
+def _install_endpoints(ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None]) -> None:
     kinds = {
         "publisher": rclpy.publisher.Publisher,
         "subscription": rclpy.subscription.Subscription,
@@ -340,8 +344,11 @@ def _install_endpoints(ledger: Ledger) -> None:
         "service": rclpy.service.Service,
     }
     for kind, cls in kinds.items():
-        _register(ledger, kind, cls)
+        _register(ledger, kind, cls, leave)
+        _report_departures_first(ledger, f"create_{kind}", settle)
     note_nodes(ledger.add_node)
+    _report_departures_first(ledger, "__init__", settle)
+    _install_departures(ledger, leave)
     declare = rclpy.node.Node.declare_parameters
 
     def declared(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -363,7 +370,57 @@ def note_nodes(note: Callable[[Any], None] = lambda _: None) -> None:
     rclpy.node.Node.__init__ = functools.wraps(create)(make_node)
 
 
-def _register(ledger: Ledger, kind: str, cls: Any) -> None:
+def _report_departures_first(ledger: Ledger, method: str, settle: Callable[[], None]) -> None:
+    """Have the grader see what has left the graph before a method of nodes adds to it."""
+    create = getattr(rclpy.node.Node, method)
+
+    @functools.wraps(create)
+    def created(self: Any, *args: Any, **kwargs: Any) -> Any:
+        if ledger.removed:
+            settle()
+        return create(self, *args, **kwargs)
+
+    setattr(rclpy.node.Node, method, created)
+
+
+def _install_departures(ledger: Ledger, leave: Callable[[], None]) -> None:
+    """Let what was sent arrive before a node, a context or the process goes."""
+
+    def leaving(owner: Any, name: str, *, removes: bool = False) -> None:
+        go = getattr(owner, name)
+
+        @functools.wraps(go)
+        def gone(*args: Any, **kwargs: Any) -> Any:
+            leave()
+            if removes:
+                ledger.remove()
+            return go(*args, **kwargs)
+
+        setattr(owner, name, gone)
+
+    leaving(rclpy.node.Node, "destroy_node", removes=True)
+    leaving(rclpy.context.Context, "shutdown")
+    leaving(rclpy.context.Context, "try_shutdown")
+    for owner, name in ((os, "_exit"), (os, "abort"), (os, "kill"), (os, "killpg"), (signal, "raise_signal")):
+        leaving(owner, name)
+
+
+def leave_graph(ledger: Ledger) -> None:
+    """Destroy every node and context that is left, as the interpreter does at its end."""
+    for end in list(ledger.actions()):
+        with contextlib.suppress(Exception):
+            end.handle.destroy_when_not_in_use()
+    for node in ledger.nodes():
+        with contextlib.suppress(Exception):
+            node.destroy_node()
+    for reference in ledger.contexts:
+        context = reference()
+        with contextlib.suppress(Exception):
+            if context is not None:
+                context.try_shutdown()
+
+
+def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None]) -> None:
     make, destroy = cls.__init__, cls.destroy
 
     def registered(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -371,6 +428,7 @@ def _register(ledger: Ledger, kind: str, cls: Any) -> None:
         ledger.add(kind, self)
 
     def destroyed(self: Any) -> None:
+        leave()
         ledger.forget(self)
         destroy(self)
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from . import originals
 from .clock import VirtualClock
+from .outside import any_outside
 from .scheduler import Scheduler, Strand
 
 NS_PER_S = 1_000_000_000
@@ -195,11 +196,19 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
     threading.excepthook = excepthook
 
 
-def install_selectors(scheduler: Scheduler, clock: VirtualClock) -> None:
-    """Make waiting for file descriptors poll them, and block in virtual time."""
+def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callable[[], None]) -> None:
+    """Make waiting for file descriptors poll them, and block in virtual time.
+
+    Args:
+        scheduler: Blocks.
+        clock: Gives deadlines.
+        give_up: Called where somebody outside of the process has to make a descriptor ready.
+    """
     timeouts = Timeouts(clock)
 
-    def virtual(poll: Callable[[], Any], timeout: float | None, empty: Callable[[Any], bool]) -> Any:
+    def virtual(
+        poll: Callable[[], Any], timeout: float | None, empty: Callable[[Any], bool], descriptors: list[int]
+    ) -> Any:
         deadline_ns = timeouts.deadline_ns(timeout)
         while True:
             ready = poll()
@@ -210,6 +219,8 @@ def install_selectors(scheduler: Scheduler, clock: VirtualClock) -> None:
             if timeouts.over(deadline_ns):
                 clock.idle_look()
                 return ready
+            if any_outside(descriptors):
+                give_up()
             scheduler.pause(deadline_ns, polls=True)
 
     for kind in ("SelectSelector", "PollSelector", "EpollSelector"):
@@ -220,7 +231,8 @@ def install_selectors(scheduler: Scheduler, clock: VirtualClock) -> None:
     select_now = select.select
 
     def virtual_select(read: Any, write: Any, error: Any, timeout: float | None = None, /) -> Any:
-        return virtual(lambda: select_now(read, write, error, 0), timeout, lambda ready: not any(ready))
+        descriptors = [d if isinstance(d, int) else d.fileno() for d in (*read, *write, *error)]
+        return virtual(lambda: select_now(read, write, error, 0), timeout, lambda ready: not any(ready), descriptors)
 
     select.select = virtual_select
 
@@ -231,6 +243,11 @@ def _replace_select(selector: Any, virtual: Callable[..., Any]) -> None:
     def virtual_select(self: Any, timeout: float | None = None) -> Any:
         if timeout is not None and timeout < 0:
             timeout = 0
-        return virtual(lambda: select_now(self, 0), timeout, lambda ready: not ready)
+        return virtual(
+            lambda: select_now(self, 0),
+            timeout,
+            lambda ready: not ready,
+            [key.fd for key in (self.get_map() or {}).values()],
+        )
 
     selector.select = virtual_select

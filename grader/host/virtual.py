@@ -45,12 +45,16 @@ class VirtualTime:
         self.resumed_ns = originals.processor_ns()
         self.running = True
         self.has_blocked = False
-        self._used_ns = 0
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, report_fault)
         times.install_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
-        threads.install_selectors(self.scheduler, self.clock)
+        #: Called before the program waits for somebody outside of virtual time.
+        self.give_up_outside: Callable[[], None] = lambda: None
+        threads.install_selectors(self.scheduler, self.clock, self._give_up_outside)
+
+    def _give_up_outside(self) -> None:
+        self.give_up_outside()
 
     def install_ros(self) -> None:
         """Import rclpy and make it virtual."""
@@ -61,7 +65,7 @@ class VirtualTime:
         self._clocks = ros.RosClocks(self.clock)
         ros.install_clocks(self._clocks, self.scheduler, self.clock)
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
-        ros.install_traffic(self._ledger, self.clock, lambda: self._converse(self.clock.now_ns))
+        ros.install_traffic(self._ledger, self.clock, lambda: self._converse(self.clock.now_ns), self.leave)
         ros.install_looks(self.clock)
         times.install_wall_time(self.clock)
         self._notice_output(ros)
@@ -86,26 +90,18 @@ class VirtualTime:
         self.resumed_ns = originals.processor_ns()
 
     def summary(self) -> dict[str, Any]:
-        """Return what every report carries: traffic, endpoints if they changed, processor time."""
-        self._charge()
+        """Return what every report carries: the time, traffic, and endpoints if they changed."""
         self.unreported = False
-        report: dict[str, Any] = {"cpu_ns": self._used_ns, "now_ns": self.clock.now_ns}
+        report: dict[str, Any] = {"now_ns": self.clock.now_ns}
         if self._ledger is not None:
             report["sent"] = dict(self._ledger.sent)
             self._ledger.sent.clear()
             if self._ledger.lost:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
-            if self._ledger.changed:
+            if self._ledger.changed and not self._ledger.sending_and_removed:
                 report["endpoints"] = self._ledger.claims()
         return report
-
-    def _charge(self) -> None:
-        """Add the processor time since the last look to what the program has used, unless it only waited."""
-        now = originals.processor_ns()
-        if not self.clock.waiting:
-            self._used_ns += now - self.resumed_ns
-        self.resumed_ns = now
 
     def _ask_for_time(self, wake_ns: int | None) -> None:
         self.has_blocked = True
@@ -114,34 +110,69 @@ class VirtualTime:
         else:
             self._converse(wake_ns)
 
-    def _converse(self, wake_ns: int | None) -> None:
-        """Report, wait for the answer and do what it says."""
+    def leave(self) -> None:
+        """Let everything that was sent arrive everywhere, because its sender is about to go."""
+        if self._ledger is not None and self._ledger.sending and not self._stopping:
+            self._converse(self.clock.now_ns, leaving=True)
+
+    def end(self) -> bool:
+        """Leave the ROS graph, as the interpreter does at its end; return whether that was done."""
+        if self._ledger is None or self._stopping:
+            return False
+        from . import ros
+
+        self.leave()
+        ros.leave_graph(self._ledger)
+        return True
+
+    def _converse(self, wake_ns: int | None, *, leaving: bool = False) -> None:
+        """Report, wait for the answer and do what it says.
+
+        Args:
+            wake_ns: When the program next wants to run, or None.
+            leaving: Whether what was sent is to arrive everywhere before the answer.
+        """
         if self._stopping:
             return
         if wake_ns is not None and self._may_go_on(wake_ns):
-            self._charge()
             self._move_to(wake_ns)
             return
-        report = {"kind": "idle", "wake_ns": wake_ns, **self.summary()}
+        if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
+            self.leave()  # what was freed in the meantime goes only now
+        report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
         self.running = False
-        answer = self._link.ask(report)
+        answer = self._answered(report)
         self.resumed_ns = originals.processor_ns()
         self.running = True
-        while "match" in answer and self._ledger is not None:
-            missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
-            self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
-            answer = self._link.ask({"kind": "matched", "missing": missing})
+        if leaving and self._ledger is not None:
+            self._ledger.settled()
         if answer.get("stop"):
             self._stopping = True
             self._end_ns = self.clock.now_ns + STOPPING_NS
-            os.kill(os.getpid(), signal.SIGINT)
+            originals.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer["now_ns"])
         self._free_until_ns = answer["free_until_ns"]
         if self._ledger is not None and answer.get("arrivals"):
             self._ledger.expect(answer["arrivals"])
+            self._link.send({"kind": "arrived"})
         if answer.get("interrupt"):
             self._interrupt()
+
+    def _answered(self, report: dict[str, Any]) -> dict[str, Any]:
+        """Send a report and return the answer, after waiting in real time for whatever the grader asks to wait for."""
+        answer = self._link.ask(report)
+        while self._ledger is not None:
+            if "match" in answer:
+                missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
+                self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
+                answer = self._link.ask({"kind": "matched", "missing": missing})
+            elif "expect" in answer:
+                self._ledger.expect(answer["expect"])
+                answer = self._link.ask({"kind": "arrived"})
+            else:
+                break
+        return answer
 
     def _interrupt(self) -> None:
         """Get the stop signal as from Ctrl-C, while time stays with the grader.
@@ -150,7 +181,7 @@ class VirtualTime:
         thread of its own, which is waited for: what the program sees must not depend on who is faster.
         """
         try:
-            os.kill(os.getpid(), signal.SIGINT)
+            originals.kill(os.getpid(), signal.SIGINT)
             originals.sleep(INTERRUPT_S)
         finally:
             if self._ledger is not None:
@@ -168,6 +199,8 @@ class VirtualTime:
         )
 
     def _move_to(self, now_ns: int) -> None:
+        if self._ledger is not None and now_ns > self.clock.now_ns:
+            self._ledger.settled()  # time moves on only when everybody has what was sent
         self.clock.move_to(now_ns)
         if self._clocks is not None:
             self._clocks.move()

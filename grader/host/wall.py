@@ -51,8 +51,8 @@ class WallTime:
 
     def _await_stop(self) -> None:
         self._link.next_answer()
-        os.kill(os.getpid(), signal.SIGINT)
+        originals.kill(os.getpid(), signal.SIGINT)
 
     def summary(self) -> dict[str, Any]:
         """Return what the last report carries."""
-        return {"cpu_ns": originals.processor_ns()}
+        return {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +75,14 @@ class Watchdog:
         """End the process, because it is about to be woken by alarms, which know no virtual time."""
         self._give_up("sets an alarm that rings in real time", "outside")
 
+    def give_up_on_processes(self) -> None:
+        """End the process, because it is about to start another one, which knows no virtual time."""
+        self._give_up("starts another process, which runs in real time", "outside")
+
+    def give_up_on_waiting(self) -> None:
+        """End the process, because it is about to wait for somebody outside of the ROS graph."""
+        self._give_up("waits for something outside the ROS graph", "outside")
+
     def _give_up(self, text: str, unsettled: str) -> None:
         """End the process; `unsettled` says why the real clock may do the program more justice."""
         if self._stopped or not self._time.running:
@@ -84,4 +91,4 @@ class Watchdog:
         fault: dict[str, Any] = self._describer.stack(frame, "hung", text)
         report = {"kind": "exited", "code": None, "fault": fault, "unsettled": unsettled}
         self._link.send({**report, **self._time.summary()})
-        os._exit(70)
+        originals.exit_now(70)

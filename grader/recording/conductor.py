@@ -23,6 +23,7 @@ from grader.recording.plan import Plan
 from grader.recording.stimuli import APPEARANCES, BROADCASTS, Due, schedule
 from grader.recording.student import Student
 from grader.recording.tape import NAME_CHARACTERS, OFFERS, Tape
+from grader.recording.workload import Workload
 
 #: Where the hosts' virtual time starts: 2026-01-01 00:00:00 UTC, as `grader/host/clock.py` has it.
 EPOCH_NS = 1_767_225_600_000_000_000
@@ -73,8 +74,6 @@ class Conductor:
 
     def run(self) -> Trace:
         """Run the plan to its end and return the trace."""
-        for student in self._students:
-            student.ready_ns = student.measured_ns
         self._play(phase="before")
         for student in self._students:
             student.wake_ns = self._starts_ns.get(student.name)
@@ -84,7 +83,7 @@ class Conductor:
         if not any(s.ended for s in self._students):
             self._matching.look(self._now_ns)  # what has ended disappears from the graph at a moment that is nobody's
         self._stop_ns = self._end_ns
-        why_not = unfit(self._students, self._tape.observations, self._now_ns, full=bool(self._tape.full))
+        why_not = unfit(self._students, self._tape.observations, full=bool(self._tape.full))
         if self._plan.shutdown_ns and not (why_not or self._tape.full):
             self._shut_down()
         return Trace(
@@ -153,17 +152,18 @@ class Conductor:
         """Tell one process the time and what is on its way, and handle its report."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
         if self._starts_ns.pop(student.name, 0):
-            student.ready_ns = student.measured_ns
             self._tape.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
         free_ns = EPOCH_NS + self._free_until_ns
         answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
+        workload = student.measured(self._now_ns)
+        workload.begin(self._now_ns)
         student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
         student.stopping = student.stop_signalled
-        self._hear(student)
+        self._hear(student, workload)
         self._dismiss_done()
         self._steps += 1
-        if self._plan.stop_when_unfit and hopeless(self._students, self._end_ns):
+        if self._plan.stop_when_unfit and hopeless(self._students):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
@@ -189,14 +189,17 @@ class Conductor:
         if isinstance(now_ns, int):
             self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
 
-    def _hear(self, student: Student) -> None:
+    def _hear(self, student: Student, workload: Workload) -> None:
         """Wait until a process has nothing left to do at this instant, or has ended."""
         for _ in range(WORDS):
             report = student.report()
             kind = None if report is None else report.get("kind")
-            if report is None or kind not in ("note", "fault", "idle", "exited"):
+            if report is None or kind not in ("arrived", "note", "fault", "idle", "exited"):
                 self._bury(student)
                 return
+            if kind == "arrived":
+                workload.arrived()
+                continue
             self._catch_up(report)
             if kind == "note":
                 student.note(str(report.get("text", "")))
@@ -205,12 +208,17 @@ class Conductor:
             if kind == "fault":
                 self._tape.add(reported_fault(student.name, self._now_ns, report, self._plan.limits))
                 continue
+            workload.end()
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
                 stopped = student.stop_signalled
                 self._end(student, ending(student.name, self._now_ns, report, self._plan, stopped=stopped))
+                if report.get("left"):
+                    self._matching.see_off(self._now_ns)
                 return
+            if report.get("leaving"):
+                self._hand_over()
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
             return
@@ -218,8 +226,6 @@ class Conductor:
 
     def _account(self, student: Student, report: Mapping[str, Any]) -> None:
         """Take what a process has published, let it reach everybody, and match new endpoints."""
-        used_ns = report.get("cpu_ns")
-        student.used_ns = used_ns if isinstance(used_ns, int) else student.used_ns
         for channel, count in counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
@@ -232,7 +238,7 @@ class Conductor:
         if isinstance(endpoints, list) and report["kind"] == "idle":
             if len(endpoints) > CLAIMS:
                 self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
-            student.claims = [c for c in endpoints[:CLAIMS] if is_claim(c)]
+            student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
             self._note_offers(student)
             self._matching.match(self._now_ns)
             for due in self._desk.ready(self._matching.is_served):
@@ -306,6 +312,16 @@ class Conductor:
             if not student.ended and ends:
                 announce(student.arrivals, f"{kind} {service}", count)
 
+    def _hand_over(self) -> None:
+        """Have every process wait until what is on its way to it has arrived, because its sender is about to go."""
+        for student in self._students:
+            if student.arrivals and not student.ended and student.workload is not None:
+                student.tell({"expect": student.arrivals})
+                student.arrivals, student.nudged = {}, True
+                answer = student.report()
+                if answer is None or answer.get("kind") != "arrived":
+                    self._bury(student)
+
     def _write_output(self, student: Student, *, final: bool) -> None:
         self._tape.add(*student.output(self._now_ns, final=final))
 
@@ -314,6 +330,11 @@ class Conductor:
         death = student.death(self._now_ns)
         student.drain()
         self._write_output(student, final=True)
+        for message in self._observer.take_rest():
+            self._record(message)
+        if self._desk.take():
+            self._desk.write_down(self._now_ns)
+        self._matching.lose(student)
         self._end(student, death)
 
     def _end(self, student: Student, *endings: Fault | Mark) -> None:

@@ -72,6 +72,12 @@ class Desk:
         served = self._servers.get(service)
         return served is not None and served.plan.type == interface
 
+    def ends_of(self, kind: str, service: str) -> int:
+        """Return how many servers (`service`) or clients (`client`) of a service the grader has now."""
+        if kind == "service":
+            return int(service in self._servers)
+        return sum(asked == service for asked, _, _ in self._clients)
+
     def calls(self) -> dict[str, str]:
         """Return the services that the grader has clients of, with their types."""
         return self._called

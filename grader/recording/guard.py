@@ -78,7 +78,6 @@ class Guard:
     def _look(self) -> None:
         for student in self._students:
             used = usage(self._families.get(student.process.pid, ()))
-            student.measured_ns = max(student.measured_ns, used.processor_ns)
             student.most_threads = max(student.most_threads, used.threads)
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
             self._hold(student, self._reached(used))

@@ -21,6 +21,10 @@ GRAPH_PAUSE_S = 0.003
 WORDS = 10_000
 
 
+#: Kind, name and type of an endpoint as the graph counts it: it counts servers and clients by their names alone.
+Key = tuple[str, str, str]
+
+
 class Matching:
     """Knows which endpoints there are on both sides.
 
@@ -53,20 +57,21 @@ class Matching:
         self._bury = bury
         self.patience = Patience()
         self._served: set[tuple[str, str]] = set()
+        self._known: set[Key] = set()
+        self._strangers: Counter[Key] = Counter()
         self.streams: dict[str, str] = {}
         self.fixed: dict[str, PlannedMessages] = {}
         self.said: Counter[str] = Counter()
 
     def match(self, now_ns: int) -> None:
-        """Wait until every endpoint that the processes say they have is seen, watched and matched."""
-        claims = [c for s in self._students if not s.ended for c in s.claims]
-        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        if not self.patience.wait(lambda: self._sees(now_ns, claims), pause_s=GRAPH_PAUSE_S):
-            self._tape.note("an endpoint that a node created was not seen in the graph")
+        """Wait until the graph holds what the processes have and nothing that has gone, and all of it is matched."""
+        claims = self._claims()
+        if not self.patience.wait(lambda: self._agrees(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._accept(now_ns, claims)
         self.look(now_ns)
         unknown = self._observer.watch(self._tape.graph)
         self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
-        writers = [c for c in ends if c["kind"] == "publisher"]
+        writers = [c for c in claims if c["kind"] == "publisher"]
         self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
         self._announce_kept()
         self.tell_all()
@@ -80,27 +85,53 @@ class Matching:
                     self._served.add((student.name, topic))
                     announce(student.arrivals, f"topic {topic}", self.said[topic])
 
+    def see_off(self, now_ns: int) -> None:
+        """Wait until a process that has left the graph before it ended is gone for all the others."""
+        if any(not student.ended for student in self._students):
+            self.match(now_ns)
+
+    def lose(self, student: Student) -> None:
+        """Note that a process ended without leaving the graph, where its endpoints stay for a while, as in reality."""
+        self._strangers += Counter(map(_key, student.claims))
+
+    def _claims(self) -> list[dict[str, Any]]:
+        return [c for s in self._students if not s.ended for c in s.claims]
+
     def tell_all(self) -> None:
         """Have every process wait for the counterparts of its endpoints."""
-        claims = [c for s in self._students if not s.ended for c in s.claims]
+        claims = self._claims()
         for student in self._students:
-            if not student.ended and student.claims:
+            if not student.ended and (student.claims or student.told):
                 self._tell_matches(student, claims)
 
-    def _sees(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
-        """Return whether the graph holds what the processes claim."""
+    def _agrees(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
+        """Return whether the graph holds what the processes claim, and no more of it but for known strangers."""
+        wanted = Counter(_key(c) for c in claims if c["kind"] != "parameter")
+        self._known |= wanted.keys()
         graph = self._graph_at(now_ns)
-        seen = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
-        ends = [c for c in claims if c["kind"] in ("publisher", "subscription")]
-        wanted = Counter((c["kind"], c["name"], c["type"]) for c in ends)
+        found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        nodes = {c["name"] for c in claims if c["kind"] == "node"}
-        return (
-            all(seen[key] >= count for key, count in wanted.items())
-            and exchanging <= offered
-            and nodes <= set(graph.nodes)
+        return exchanging <= offered and all(
+            wanted[key] <= found[key] <= wanted[key] + self._strangers[key] for key in self._known
         )
+
+    def _found(self, graph: GraphSnapshot) -> Counter[Key]:
+        """Count in the graph whatever a process has ever claimed."""
+        found = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
+        found.update(("node", name, "") for name in self._observer.students_nodes())
+        for kind, name, _ in self._known:
+            if kind in ("service", "client"):
+                found[kind, name, ""] = self._observer.ends_of(kind, name) - self._desk.ends_of(kind, name)
+        return found
+
+    def _accept(self, now_ns: int, claims: list[dict[str, Any]]) -> None:
+        """Take the graph as it is where waiting did not help: what is missing is noted, what is left over is known."""
+        wanted = Counter(_key(c) for c in claims if c["kind"] != "parameter")
+        found = self._found(self._graph_at(now_ns))
+        if any(found[key] < count for key, count in wanted.items()):
+            self._tape.note("an endpoint that a node created was not seen in the graph")
+        self._strangers = Counter({key: found[key] - wanted[key] for key in self._known if found[key] > wanted[key]})
 
     def _graph_at(self, now_ns: int) -> GraphSnapshot:
         """Return the live graph, with services where a process has said that it has any."""
@@ -126,8 +157,11 @@ class Matching:
             if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])
         ]
         matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
+        if not self._observer.reads(claim["name"]):
+            return True
         # A reader that takes best effort also matches reliable writers: it may see more than its own.
-        return matched >= len(same) or not self._observer.reads(claim["name"])
+        most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
+        return len(same) <= matched and (matched <= most or not claim["reliable"])
 
     def _tell_matches(self, student: Student, claims: list[dict[str, Any]]) -> None:
         """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
@@ -137,9 +171,9 @@ class Matching:
             if count:
                 expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
         gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
-        if expected == student.told or not (expected or gone):
+        if expected == student.told and not (student.renewed and expected):
             return
-        student.told = expected
+        student.told, student.renewed = expected, False
         student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
         answer = student.report()
         if answer is None or answer.get("kind") != "matched":
@@ -164,6 +198,10 @@ class Matching:
             fits = takes_ordinary(claim) if fixed is None else compatible(offered(fixed), claim)
             stimulus = self.streams.get(name) == claim["type"] and fits
             return int(stimulus) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
+        if kind == "service":
+            asking = ("client", name, claim["type"])
+            students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)
+            return students + self._desk.ends_of("client", name)
         if kind != "client":
             return 0
         return int(
@@ -174,3 +212,8 @@ class Matching:
     def look(self, now_ns: int) -> None:
         """Take down the graph where it has changed."""
         self._tape.look(self._graph_at(now_ns), self._observer.participants())
+
+
+def _key(claim: dict[str, Any]) -> Key:
+    exchanges = claim["kind"] in ("service", "client", "node")
+    return claim["kind"], claim["name"], "" if exchanges else claim["type"]

@@ -6,11 +6,13 @@ never waits for an executor: messages are taken when the conductor asks for them
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
@@ -35,6 +37,8 @@ AT_ONCE, AT_ONCE_BYTES = 1000, 4 * MIB
 TOLD, NAME_CHARACTERS = 20, 200
 #: Durations of QoS policies from here on mean for ever.
 INFINITE_NS = 9_000_000_000_000_000_000
+#: How long, in real time, what a process sent before it died is waited for, and how many looks must find nothing.
+REST_S, QUIET_LOOKS, QUIET_PAUSE_S = 0.5, 4, 0.005
 #: What rclpy calls a node whose endpoints are known but whose name is not yet, or not any more.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
@@ -171,6 +175,20 @@ class Observer:
         """Return the subscriptions on a topic and type: for each, whether it asks for reliability."""
         return [reliable for name, kind, reliable in self._readers if (name, kind) == (topic, interface)]
 
+    def publishes(self, topic: str) -> bool:
+        """Return whether a stimulus is published on a topic now."""
+        return topic in self._writers
+
+    def students_nodes(self) -> list[str]:
+        """Return the names of the students' nodes that are in the graph, each as often as it is there."""
+        pairs = self.node.get_node_names_and_namespaces()
+        return [_full_name(*pair) for pair in pairs if pair[0] not in {*self._names, UNKNOWN_NODE}]
+
+    def ends_of(self, kind: str, service: str) -> int:
+        """Return how many servers (`service`) or clients (`client`) of a service there are, with the grader's own."""
+        count = self.node.count_services if kind == "service" else self.node.count_clients
+        return int(count(service))
+
     def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
         """Return how many publishers the subscription for a topic, type and reliability has."""
         reader = self._readers.get((topic, interface, reliable))
@@ -192,6 +210,20 @@ class Observer:
                     room -= len(found[0])
                     taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
         return taken
+
+    def take_rest(self) -> list[Taken]:
+        """Return what is still on its way from a process that has ended without a word."""
+        wait_until(lambda: not unread_bytes(), REST_S, pause_s=0.001)
+        found: list[Taken] = []
+        quiet = 0
+        while quiet < QUIET_LOOKS:
+            time.sleep(QUIET_PAUSE_S)
+            taken = self.take()
+            found += taken
+            quiet = 0 if taken else quiet + 1
+            if len(found) > DEPTH:
+                break
+        return found
 
     def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:
         if len(cdr) > self._limits.message_bytes:
@@ -255,6 +287,16 @@ def _make_node(domain: int) -> Node:
 
 def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], Any]:
     return lambda node: node.create_subscription(message, topic, _nothing, qos, raw=True)
+
+
+def unread_bytes() -> int:
+    """Return how much lies unread in the UDP sockets of this network, as /proc/net/udp says (proc(5))."""
+    unread = 0
+    for name in ("udp", "udp6"):
+        with contextlib.suppress(OSError):
+            rows = Path("/proc/net", name).read_text(encoding="ascii").splitlines()[1:]
+            unread += sum(int(row.split()[4].partition(":")[2], 16) for row in rows)
+    return unread
 
 
 def size_of(message: Any) -> int:

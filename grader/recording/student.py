@@ -20,6 +20,7 @@ from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine
 from grader.recording.ending import ended_by, limit_behind
 from grader.recording.isolation.protocol import Command
+from grader.recording.workload import Workload
 
 #: How the logging library writes records on standard error. Each process has a token of its own, which only the library
 #: and the worker know: what a program writes itself is no log record.
@@ -55,13 +56,12 @@ class Student:
         claims: Its endpoints, as it says.
         arrivals: What it has not yet been told is on its way to it.
         told: The counterparts it has been told to wait for.
+        renewed: Whether its endpoints have changed since then.
         offers: What it has told of services, clients and parameters.
         nudged: Whether it should look again at this instant, because its endpoints were matched.
         ended: Whether it has ended.
         limits: What it may use.
-        used_ns: Processor time it has used, as it says.
-        measured_ns: Processor time it and its children have used since they were started, as the system says.
-        ready_ns: `measured_ns` when its program began.
+        workload: What its steps cost; None until its program starts.
         most_bytes: Most memory that it and its children filled at once.
         most_threads: Most threads that it and its children had at once.
         stopped: Which limit it reached, in words; empty while it reached none.
@@ -80,12 +80,11 @@ class Student:
     claims: list[dict[str, Any]] = field(default_factory=list)
     arrivals: dict[str, int] = field(default_factory=dict)
     told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
+    renewed: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False
     ended: bool = False
-    used_ns: int = 0
-    measured_ns: int = 0
-    ready_ns: int = 0
+    workload: Workload | None = None
     most_bytes: int = 0
     most_threads: int = 0
     stopped: str = ""
@@ -138,6 +137,12 @@ class Student:
         token = str(report.get("log_token"))
         self.log_token = token if _TOKEN.fullmatch(token) else ""
         return report.get("kind") == "ready"
+
+    def measured(self, t_ns: int) -> Workload:
+        """Return what measures its steps, from its program's start on, which is now if it has not started before."""
+        if self.workload is None:
+            self.workload = Workload(self.process.pid, t_ns)
+        return self.workload
 
     def claims_of(self, kind: str, name: str) -> bool:
         """Return whether it says that it has an endpoint of a kind and name; every node has some services."""

@@ -58,14 +58,21 @@ def families(roots: Collection[int]) -> dict[int, set[int]]:
     return found
 
 
+def innermost(root: int) -> int:
+    """Return the process at the end of a chain of wrappers, each of which has one child."""
+    pids = {pid: int(fields[PARENT]) for pid in families([root])[root] if (fields := _stat(pid))}
+    return next((pid for pid in pids if pid not in pids.values()), root)
+
+
 def starved_ns(pids: Iterable[int]) -> int:
     """Return how long the threads of processes were ready to run and had to wait for a processor."""
-    waited = 0
-    for pid in pids:
-        for thread in _names(f"/proc/{pid}/task"):
-            fields = _read(f"/proc/{pid}/task/{thread}/schedstat").split()
-            waited += int(fields[1]) if len(fields) > 1 else 0
-    return waited
+    return sum(thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task"))
+
+
+def thread_starved_ns(pid: int, thread: int | str) -> int:
+    """Return how long a thread was ready to run and waited for a processor; 0 where the kernel does not count it."""
+    fields = _read(f"/proc/{pid}/task/{thread}/schedstat").split()
+    return int(fields[1]) if len(fields) > 1 else 0
 
 
 def _status(pid: int) -> tuple[int, int]:

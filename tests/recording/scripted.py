@@ -8,6 +8,7 @@ from typing import Any
 from grader.model.trace import Endpoint, Fault, FaultKind, GraphSnapshot, OutputLine
 from grader.recording.observer import Taken
 from grader.recording.plan import Plan, PlannedNumbers
+from grader.recording.workload import Delay
 
 MS = 1_000_000
 EPOCH_NS = 1_767_225_600_000_000_000
@@ -46,7 +47,7 @@ def numbers(
 def idle(wake_ms: float | None = None, **fields: Any) -> dict[str, Any]:
     """Return the report of a process that has nothing to do until a time."""
     wake_ns = None if wake_ms is None else EPOCH_NS + round(wake_ms * MS)
-    return {"kind": "idle", "wake_ns": wake_ns, "cpu_ns": 0, **fields}
+    return {"kind": "idle", "wake_ns": wake_ns, **fields}
 
 
 def wait(wake_ms: float | None = None, **fields: Any) -> Program:
@@ -86,6 +87,26 @@ class World:
         return list(claims)
 
 
+class ScriptedWorkload:
+    """Stands in for a measured process: each report says what the step before it cost."""
+
+    def __init__(self, student: ScriptedStudent, start_ns: int) -> None:
+        self._student = student
+        self.delay = Delay(start_ns)
+        self.used_ns, self.waited_ns = 1, 0
+
+    def begin(self, t_ns: int) -> None:
+        """Wake up."""
+        self.delay.wake(t_ns)
+
+    def arrived(self) -> None:
+        """Wait no longer for messages."""
+
+    def end(self) -> None:
+        """Take what the step cost."""
+        self.delay.work(self._student.cost_ns)
+
+
 class ScriptedStudent:
     """Stands in for a student's process: a generator that yields reports and is sent answers.
 
@@ -101,8 +122,8 @@ class ScriptedStudent:
         self.offers: set[tuple[str, str, str]] = set()
         self.nudged = False
         self.ended = False
-        self.used_ns = 0
-        self.measured_ns = self.ready_ns = 0
+        self.renewed = False
+        self.workload: ScriptedWorkload | None = None
         self.unsettled = ""
         self.notes: list[str] = []
         self.stop_signalled = self.stopping = False
@@ -113,6 +134,7 @@ class ScriptedStudent:
         self._matching = False
         self._program = program(self, world)
         self._begun = False
+        self.cost_ns = 0
 
     def write(self, text: str) -> None:
         """Write a line; it is read with the next report."""
@@ -121,6 +143,11 @@ class ScriptedStudent:
     def times_ms(self) -> list[float]:
         """Return the times it was told, in virtual milliseconds."""
         return [(a["now_ns"] - EPOCH_NS) / MS for a in self.heard if "now_ns" in a]
+
+    def measured(self, t_ns: int) -> ScriptedWorkload:
+        """Return what measures its steps."""
+        self.workload = self.workload or ScriptedWorkload(self, t_ns)
+        return self.workload
 
     def claims_of(self, kind: str, name: str) -> bool:
         """Return whether it has an endpoint of a kind and name."""
@@ -142,10 +169,13 @@ class ScriptedStudent:
         try:
             if not self._begun:
                 self._begun = True
-                return next(self._program)
-            return self._program.send(answer)
+                report = next(self._program)
+            else:
+                report = self._program.send(answer)
         except StopIteration:
-            return {"kind": "exited", "code": 0}
+            report = {"kind": "exited", "code": 0}
+        self.cost_ns = (report or {}).get("cost_ns", 0)
+        return report
 
     def reports(self) -> list[dict[str, Any] | None]:
         """Return what has come without waiting, for the wall clock: a report, or nothing for an empty one."""
@@ -202,6 +232,23 @@ class ScriptedObserver:
         """Watch every publisher."""
         self._watched |= {(e.topic, e.type, True) for e in graph.endpoints if e.kind == "publisher"}
         return []
+
+    def students_nodes(self) -> list[str]:
+        """Return the nodes that are claimed."""
+        return [c["name"] for claims in self._world.claims.values() for c in claims if c["kind"] == "node"]
+
+    def ends_of(self, kind: str, service: str) -> int:
+        """Return how many servers or clients of a service are claimed."""
+        claims = [c for claims in self._world.claims.values() for c in claims]
+        return sum((c["kind"], c["name"]) == (kind, service) for c in claims)
+
+    def publishes(self, topic: str) -> bool:
+        """Return whether a stimulus is published on a topic."""
+        return any(name == topic for name, _, _ in self.advertised)
+
+    def take_rest(self) -> list[Taken]:
+        """Return what still flies."""
+        return self.take()
 
     def reads(self, topic: str) -> bool:
         """Return whether a topic is watched."""

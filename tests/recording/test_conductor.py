@@ -419,15 +419,15 @@ def test_service_calls_reach_their_server_and_come_back():
 
 
 def test_processor_time_decides_for_the_other_clock():
-    """More than half of the virtual time that passed is too much."""
-    for used_ms, unfit in ((499, False), (501, True)):
-        run = Run(saying(idle(100, cpu_ns=used_ms * MS), idle(cpu_ns=used_ms * MS)))
+    """A node that has work for 49 ms every 50 ms keeps up; with 61 ms it would be late."""
+    for cost_ms, unfit in ((49, False), (61, True)):
+        run = Run(saying(*(idle(ms, cost_ns=cost_ms * MS) for ms in range(50, 1000, 50)), idle()))
         assert bool(run.trace.clock_reason) is unfit
 
 
 def test_a_hopeless_run_ends_early_where_another_follows():
     """Only where the plan says so; the trace still names the reason."""
-    reports = [idle(ms, cpu_ns=10 * ms * MS) for ms in range(100, 1000, 100)] + [idle(cpu_ns=9000 * MS)]
+    reports = [idle(ms, cost_ns=1000 * MS) for ms in range(100, 1000, 100)] + [idle()]
     for early in (False, True):
         run = Run(saying(*reports), stop_when_unfit=early)
         assert (run.trace.stop_ns < 1000 * MS) is early

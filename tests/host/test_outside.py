@@ -1,4 +1,4 @@
-"""Alarms ring in real time: a program that sets one is none for virtual time."""
+"""Alarms, other processes and the network take real time: a program that waits for them is none for virtual time."""
 
 import importlib.util
 import signal
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ALARMS = Path(__file__).resolve().parents[2] / "grader/host/alarms.py"
+OUTSIDE = Path(__file__).resolve().parents[2] / "grader/host/outside.py"
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def given_up(monkeypatch):
     """A list that grows whenever virtual time is given up; no alarm is really set."""
     monkeypatch.setattr(signal, "setitimer", lambda which, seconds, interval=0.0: (seconds, interval))
     monkeypatch.setattr(signal, "alarm", lambda seconds: seconds)
-    spec = importlib.util.spec_from_file_location("alarms_under_test", ALARMS)
+    spec = importlib.util.spec_from_file_location("outside_under_test", OUTSIDE)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     times = []

@@ -1,0 +1,85 @@
+"""Gives virtual time up for programs that wait for something outside of it: alarms, other processes, the network.
+
+All of these take their own real time, of which a virtual second has only a small part.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import stat
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any
+
+#: Audit events (https://docs.python.org/3/library/audit_events.html) of starting or becoming another process.
+PROCESSES = frozenset({"os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "subprocess.Popen"})
+
+
+def install_alarms(give_up: Callable[[], None]) -> None:
+    """Call `give_up` before a real-time alarm is set; clearing one, or timing the processor, does no harm."""
+    setitimer, alarm = signal.setitimer, signal.alarm
+
+    def guarded_setitimer(which: int, seconds: float, interval: float = 0.0, /) -> Any:
+        if which == signal.ITIMER_REAL and seconds > 0:
+            give_up()
+        return setitimer(which, seconds, interval)
+
+    def guarded_alarm(seconds: int, /) -> int:
+        if seconds > 0:
+            give_up()
+        return alarm(seconds)
+
+    signal.setitimer, signal.alarm = guarded_setitimer, guarded_alarm
+
+
+def install_processes(give_up: Callable[[], None]) -> None:
+    """Call `give_up` before the program starts another process, or becomes one."""
+
+    def hook(event: str, arguments: Any) -> None:
+        if event in PROCESSES:
+            give_up()
+
+    sys.addaudithook(hook)
+
+
+def any_outside(descriptors: Iterable[int]) -> bool:
+    """Return whether anybody but this process can make one of some descriptors ready.
+
+    A pipe is the process's own while both its ends are open here. A local socket without a name is one of a pair, as
+    event loops use them to wake themselves up.
+    """
+    pipes: set[int] = set()
+    for descriptor in descriptors:
+        try:
+            status = os.fstat(descriptor)
+        except OSError:
+            continue
+        if stat.S_ISFIFO(status.st_mode):
+            pipes.add(status.st_ino)
+        elif not (stat.S_ISSOCK(status.st_mode) and _is_one_of_a_pair(descriptor)):
+            return True
+    return bool(pipes) and not pipes <= _own_pipes()
+
+
+def _is_one_of_a_pair(descriptor: int) -> bool:
+    import socket
+
+    try:
+        with socket.socket(fileno=os.dup(descriptor)) as end:
+            return end.family == socket.AF_UNIX and not end.getsockname() and not end.getpeername()
+    except OSError:
+        return False
+
+
+def _own_pipes() -> set[int]:
+    """Return the pipes of which this process has both ends."""
+    found: dict[int, int] = {}
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            status = os.fstat(int(name))
+        except OSError:
+            continue
+        if stat.S_ISFIFO(status.st_mode):
+            found[status.st_ino] = found.get(status.st_ino, 0) + 1
+    return {pipe for pipe, ends in found.items() if ends > 1}

@@ -1,0 +1,290 @@
+"""What nodes publish, answer and ask before they go is in the trace, however they go; on real DDS."""
+
+import textwrap
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hostile import MS, record
+
+from grader.model.quantities import NS_PER_S
+from grader.recording.exchanges import PlannedCalls, PlannedServer
+
+pytestmark = pytest.mark.ros
+
+BEFORE = """
+import gc, os, signal, sys, threading, time
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, DurabilityPolicy
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+def burst(publisher, count, start=0):
+    for number in range(start, start + count):
+        publisher.publish(String(data=str(number)))
+"""
+
+TALKER = "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\n"
+#: How a program goes that has just published ten messages in a row; `node` and `publisher` are its own.
+ENDINGS = {
+    "destroy_node": "node.destroy_node()\nrclpy.shutdown()",
+    "destroy_publisher": "node.destroy_publisher(publisher)\ntime.sleep(0.2)\nos._exit(0)",
+    "publisher_destroy": "publisher.destroy()\nos._exit(0)",
+    "shutdown": "rclpy.shutdown()",
+    "try_shutdown": "rclpy.try_shutdown()",
+    "return": "",
+    "sys_exit": "sys.exit(3)",
+    "exception": "raise RuntimeError('over')",
+    "hard_exit": "os._exit(0)",
+    "killed": "os.kill(os.getpid(), signal.SIGKILL)",
+    "terminated": "os.kill(os.getpid(), signal.SIGTERM)",
+    "aborted": "os.abort()",
+    "interrupted": "signal.raise_signal(signal.SIGINT)",
+    "collected": "del publisher, node\ngc.collect()\ntime.sleep(1)",
+    "exit_in_thread": "threading.Thread(target=lambda: os._exit(0)).start()\ntime.sleep(1)",
+}
+
+
+def numbers(trace, topic="/words"):
+    return [int(message.value["data"]) for message in trace.messages(topic)]
+
+
+@pytest.fixture
+def run(studio, tmp_path):
+    tmp_path.chmod(0o755)
+
+    def run_all(*programs, **fields):
+        whole = [BEFORE + textwrap.dedent(program) for program in programs]
+        trace = record(studio, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
+        assert trace.harness_problem == ""
+        return trace
+
+    return run_all
+
+
+@pytest.mark.parametrize("ending", ENDINGS.values(), ids=ENDINGS)
+def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
+    """Ten messages at one instant, and then the end, one way or another."""
+    main = TALKER + "burst(publisher, 10)\n" + ending
+    trace = run("def main():\n" + textwrap.indent(main, "    ") + "\nmain()\n")
+    assert numbers(trace) == list(range(10))
+
+
+def test_a_context_manager_takes_nothing_with_it(run):
+    trace = run("""
+        from rclpy.context import Context
+        with Context() as context:
+            node = Node('talker', context=context)
+            burst(node.create_publisher(String, '/words', 10), 10)
+        """)
+    assert numbers(trace) == list(range(10))
+
+
+def test_a_publisher_made_anew_for_every_message_loses_none(run):
+    trace = run("""
+        rclpy.init()
+        node = Node('talker')
+        for number in range(20):
+            publisher = node.create_publisher(String, '/words', 10)
+            burst(publisher, 3, 3 * number)
+            node.destroy_publisher(publisher)
+            time.sleep(0.05)
+        """)
+    assert numbers(trace) == list(range(60))
+
+
+def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
+    trace = run("""
+        for number in range(6):
+            rclpy.init()
+            node = Node('talker')
+            burst(node.create_publisher(String, '/words', 10), 3, 3 * number)
+            node.destroy_node()
+            rclpy.shutdown()
+            time.sleep(0.1)
+        """)
+    assert numbers(trace) == list(range(18))
+
+
+LISTENER = """
+rclpy.init()
+class Listener(Node):
+    def __init__(self):
+        super().__init__('listener')
+        self.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10)
+rclpy.spin(Listener())
+"""
+
+
+@pytest.mark.parametrize(
+    "ending", ["node.destroy_node()", "rclpy.shutdown()", "os._exit(0)", "del node, publisher\ngc.collect()"]
+)
+def test_another_node_hears_the_last_words(run, ending):
+    """A node of another process gets what was published just before its sender went."""
+    talker = (
+        "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\ntime.sleep(1)\n"
+    )
+    trace = run(LISTENER, talker + "burst(publisher, 10)\n" + ending)
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
+
+
+def test_nodes_of_one_process_hear_each_others_last_words(run):
+    trace = run("""
+        rclpy.init()
+        talker, listener = Node('talker'), Node('listener')
+        listener.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10)
+        publisher = talker.create_publisher(String, '/words', 10)
+        burst(publisher, 10)
+        talker.destroy_node()
+        rclpy.spin(listener)
+        """)
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
+
+
+def test_a_latched_message_outlives_the_moment_it_was_sent(run):
+    """A subscription that comes while its publisher is there gets it; one that comes after it has gone does not."""
+    late = LISTENER.replace(", 10)\n", ", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))\n")
+    talker = """
+        rclpy.init()
+        node = Node('talker')
+        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_publisher(String, '/words', qos).publish(String(data='7'))
+        time.sleep({})
+        node.destroy_node()
+        """
+    assert [line.text for line in run("time.sleep(1)\n" + late, talker.format(2)).lines()] == ["7"]
+    assert [line.text for line in run("time.sleep(2)\n" + late, talker.format(1)).lines()] == []
+
+
+ASKING = """
+class Asker:
+    def ask(self, client):
+        future = client.call_async(Trigger.Request())
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=5.0)
+        print(future.result().message if future.done() else 'no answer', flush=True)
+asker = Asker()
+"""
+ANEW = {
+    "client": """
+        rclpy.init()
+        asker.node = Node('asker')
+        for number in range(5):
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_client(client)
+            time.sleep(1)
+        """,
+    "node": """
+        rclpy.init()
+        for number in range(5):
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_node()
+            time.sleep(1)
+        """,
+    "context": """
+        for number in range(5):
+            rclpy.init()
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_node()
+            rclpy.shutdown()
+            time.sleep(1)
+        """,
+    "collected": """
+        rclpy.init()
+        def once():
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+        for number in range(5):
+            once()
+            time.sleep(1)
+        """,
+}
+ANSWERS = tuple({"success": True, "message": f"n{number}"} for number in range(8))
+SERVER = """
+rclpy.init()
+class Server(Node):
+    def __init__(self):
+        super().__init__('server')
+        self.count = 0
+        self.create_service(Trigger, '/status', self.answer)
+    def answer(self, request, response):
+        response.success, response.message = True, f'n{self.count}'
+        self.count += 1
+        return response
+rclpy.spin(Server())
+"""
+
+
+@pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
+def test_a_client_made_anew_for_each_question_finds_the_graders_server(run, program):
+    server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
+    trace = run(ASKING + textwrap.dedent(program), servers=(server,), duration_ns=8 * NS_PER_S)
+    assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
+    assert [request.t_ns // NS_PER_S for request in trace.requests("/status", "student")] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
+def test_a_client_made_anew_for_each_question_finds_another_students_server(run, program):
+    trace = run(SERVER, ASKING + textwrap.dedent(program), duration_ns=8 * NS_PER_S)
+    assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
+    assert trace.lines()[-1].t_ns // NS_PER_S == 4
+
+
+LEAVES = {
+    "destroy_service": "node.destroy_service(service)",
+    "destroy_node": "node.destroy_node()",
+    "shutdown": "rclpy.shutdown()",
+    "exit": "os._exit(0)",
+}
+
+
+@pytest.mark.parametrize("ending", LEAVES.values(), ids=LEAVES)
+def test_a_server_that_answers_and_leaves_has_answered(run, ending):
+    """Its response reaches the grader, and another student's client."""
+    program = f"""
+rclpy.init()
+node = Node('server')
+answered = []
+def answer(request, response):
+    response.success, response.message = True, 'n0'
+    answered.append(1)
+    return response
+service = node.create_service(Trigger, '/status', answer)
+while not answered:
+    rclpy.spin_once(node)
+{ending}
+time.sleep(1)
+"""
+    calls = PlannedCalls("/status", "std_srvs/srv/Trigger", 500 * MS, NS_PER_S, 1, ({},))
+    assert len(run(program, calls=(calls,)).responses("/status", "student")) == 1
+    client = "rclpy.init()\nasker.node = Node('asker')\nclient = asker.node.create_client(Trigger, '/status')\n"
+    client += "client.wait_for_service()\nasker.ask(client)\n"
+    assert [line.text for line in run(program, ASKING + client).lines()] == ["n0"]
+
+
+def test_a_client_that_asks_and_leaves_has_asked(run):
+    server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
+    program = """
+        rclpy.init()
+        node = Node('asker')
+        client = node.create_client(Trigger, '/status')
+        client.wait_for_service()
+        client.call_async(Trigger.Request())
+        node.destroy_node()
+        """
+    assert len(run(program, servers=(server,)).requests("/status", "student")) == 1
