@@ -11,7 +11,7 @@ import os
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from grader.model.limits import Limits
 from grader.model.quantities import MIB, size
@@ -29,8 +29,22 @@ WRAPPERS = 16
 MOST_NAMES = 10_000
 #: What the worker itself may fill beyond its size at the start: messages that have come and were not yet taken.
 UNREAD_BYTES = 512 * MIB
-#: Out of real time with this share of it spent waiting for a processor, a run says nothing about the nodes.
-STARVED_SHARE = 0.25
+#: Out of real time with this share of it spent waiting for a processor, a run says nothing about the nodes; unless
+#: they had so much of all processor time themselves: then it was they who kept the processors.
+STARVED_SHARE, OWN_SHARE = 0.25, 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What is left of the real time that a submission may take.
+
+    Attributes:
+        left_ns: Real time.
+        words: Why a recording is ended when it is used up.
+    """
+
+    left_ns: int
+    words: str
 
 
 class Guard:
@@ -39,16 +53,21 @@ class Guard:
     Args:
         students: Whom to watch.
         limits: What each may use.
+        budget: What is left for the submission, if there is such a limit.
     """
 
-    def __init__(self, students: Sequence[Student], limits: Limits) -> None:
+    def __init__(self, students: Sequence[Student], limits: Limits, budget: Budget | None = None) -> None:
         self._students = students
         self._limits = limits
+        self._budget = budget
         self._families: dict[int, set[int]] = {}
-        self._deadline_ns = time.monotonic_ns() + limits.wall_ns
+        self._started_ns = time.monotonic_ns()
         self._own_bytes = usage([os.getpid()]).memory_bytes
+        self._own_ns = time.process_time_ns()
         self._over = threading.Event()
         self._starved = False
+        self._ending = False
+        self._used_ns = self._waited_ns = 0
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
     def __enter__(self) -> Guard:
@@ -66,12 +85,25 @@ class Guard:
         problem = "the machine was too busy: the nodes waited for a processor until their time was over"
         return replace(trace, harness_problem=problem)
 
+    @property
+    def real_ns(self) -> int:
+        """Real time since the start."""
+        return time.monotonic_ns() - self._started_ns
+
+    @property
+    def starved_ns(self) -> int:
+        """Real time that the nodes have lost to others on this machine."""
+        processors = len(os.sched_getaffinity(0))
+        their_own = self._used_ns > OWN_SHARE * processors * self.real_ns
+        return 0 if their_own else min(self._waited_ns, self.real_ns)
+
     def _watch(self) -> None:
         looks = 0
         while not self._over.wait(LOOK_S):
             if looks % SEARCH_EVERY == 0:
                 self._families = families([s.process.pid for s in self._students])
                 self._look_for_names()
+                self._look_for_waiting()
             looks += 1
             self._look()
 
@@ -81,10 +113,30 @@ class Guard:
             student.most_threads = max(student.most_threads, used.threads)
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
             self._hold(student, self._reached(used))
-        if usage([os.getpid()]).memory_bytes > self._own_bytes + UNREAD_BYTES:
+        self._look_at_itself()
+        self._look_at_time()
+
+    def _look_at_itself(self) -> None:
+        """Hold everybody at a limit of the worker's own: nothing but what the nodes send brings it there."""
+        filled_bytes = usage([os.getpid()]).memory_bytes - self._own_bytes
+        if filled_bytes > UNREAD_BYTES:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
-        if time.monotonic_ns() > self._deadline_ns:
-            self._end_time()
+        if time.process_time_ns() - self._own_ns > self._limits.processor_ns:
+            self._hold_all(f"stopped at {self._limits.processor_words()} to take what was sent")
+
+    def _look_at_time(self) -> None:
+        if self._ending:
+            return
+        real_ns = self.real_ns
+        if self._budget is not None and real_ns > self._budget.left_ns:
+            self._end_time(self._budget.words)
+        elif real_ns > self._limits.wall_ns:
+            self._end_time(f"stopped after {self._limits.wall_words()}")
+
+    def _look_for_waiting(self) -> None:
+        pids = [pid for family in self._families.values() for pid in family]
+        self._used_ns = max(self._used_ns, usage(pids).processor_ns)
+        self._waited_ns = max(self._waited_ns, starved_ns(pids))
 
     def _look_for_names(self) -> None:
         for student in self._students:
@@ -104,13 +156,14 @@ class Guard:
             return f"stopped at {limits.processes_words()}"
         return ""
 
-    def _end_time(self) -> None:
+    def _end_time(self, why: str) -> None:
+        self._look_for_waiting()
         if any(not s.ended and not s.stopped for s in self._students):
-            pids = [pid for family in self._families.values() for pid in family]
-            self._starved = starved_ns(pids) > STARVED_SHARE * self._limits.wall_ns
-        self._hold_all(f"stopped after {self._limits.wall_words()}")
+            self._starved = self.starved_ns > STARVED_SHARE * self.real_ns
+        self._hold_all(why)
 
     def _hold_all(self, why: str) -> None:
+        self._ending = True
         for student in self._students:
             self._hold(student, why)
 

@@ -1,7 +1,8 @@
 """The supervisor's side of recording: keeps workers, hands them plans, takes traces back.
 
 A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and
-the plan it had is tried once more; a second failure becomes a trace with a problem of ours, which is never judged.
+the plan it had is tried once more, unless it took all the time it had. A second failure becomes a trace with a problem
+of ours, which is never judged; but where workers have ended at their limits twice, the nodes have brought them there.
 """
 
 from __future__ import annotations
@@ -10,30 +11,55 @@ import contextlib
 import json
 import os
 import queue
+import signal
 import socket
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.model.errors import HarnessError
 from grader.model.limits import Limits
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, Trace
+from grader.model.quantities import MIB, NS_PER_S, size
+from grader.model.trace import ClockKind, Fault, FaultKind, Trace
+from grader.recording.budget import RealTimeBudget
 from grader.recording.codec import trace_from_json
 from grader.recording.ending import is_unexplained
 from grader.recording.isolation.environment import worker_environment
 from grader.recording.isolation.protocol import Isolation, PythonRuntime, runtime_to_json
 from grader.recording.plan import Plan, plan_to_json
+from grader.recording.usage import families, usage
 
-#: A worker that has not answered after twice the real time of a scenario and this many seconds is taken for lost.
+#: A worker that has not answered after the real time of a scenario and this many seconds is taken for lost: its guard
+#: would have ended it long before. On the wall clock it may have begun a second try shortly before the end.
 MARGIN_S = 60.0
+#: What an ended worker gets to be gone.
+END_S = 5.0
+#: A worker that fills more is ended, which its guard should have prevented: it does not run while the middleware takes
+#: apart what a node has sent. How often that is looked at.
+FULL_BYTES, LOOK_S = 768 * MIB, 0.1
 #: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
+MODULE = b"grader.recording.worker"
+
+
+class WorkerLostError(HarnessError):
+    """A worker ended, or did not answer.
+
+    Args:
+        message: What happened.
+        limit: The limit of its own that it ended at, in words; empty if none explains it.
+        late: Whether it has taken all the time it had.
+    """
+
+    def __init__(self, message: str, *, limit: str = "", late: bool = False) -> None:
+        super().__init__(message)
+        self.limit = limit
+        self.late = late
 
 
 class WorkerProcess:
@@ -44,13 +70,19 @@ class WorkerProcess:
         runtime: Interpreter and ROS.
         domains: Gives the number of a ROS domain that nobody else uses.
         scratch: A folder for what ROS writes beside its work.
+
+    Attributes:
+        worn: Whether it should do no more, as it says.
     """
 
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
         self._domains = domains
+        self.worn = False
+        self._executable = os.fsencode(runtime.executable)
+        self._pid = 0
         self._line, theirs = socket.socketpair()
         request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": runtime_to_json(runtime)}
-        argv = [str(runtime.executable), "-s", "-u", "-m", "grader.recording.worker", json.dumps(request)]
+        argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
         command = isolation.worker_command(argv, _environment(runtime, scratch), (theirs.fileno(),))
         self._process = subprocess.Popen(
             command.argv,
@@ -66,33 +98,87 @@ class WorkerProcess:
             os.close(descriptor)
         theirs.close()
 
-    def run(self, plan: Plan) -> Trace:
-        """Run one plan; raises HarnessError if the worker fails."""
-        request = json.dumps({"plan": plan_to_json(plan), "domain": next(self._domains)}) + "\n"
+    def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
+        """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it is no more."""
+        own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
+        request = json.dumps({"plan": plan_to_json(plan), **own}) + "\n"
+        expected = f"worker: expected a trace of {plan.scenario}, found none"
         try:
             self._line.sendall(request.encode())
-            answer = json.loads(self._answer(plan.limits))
+            tries = 1 + (plan.clock == ClockKind.WALL.value)
+            seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
+            answer = json.loads(self._answer(plan.limits, time.monotonic() + seconds))
+        except TimeoutError as error:
+            raise WorkerLostError(f"{expected} (it did not answer in time)", late=True) from error
+        except MemoryError as error:
+            what = f"{size(FULL_BYTES)} of memory"
+            raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
+        except EOFError as error:
+            end = self._end()
+            limit = plan.limits.processor_words() if end == "SIGXCPU" else ""
+            raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
         except (OSError, ValueError, RecursionError) as error:
-            raise HarnessError(f"worker: expected a trace of {plan.scenario}, found none ({error})") from error
+            raise HarnessError(f"{expected} ({error})") from error
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
             said = problem.strip().splitlines()
             raise HarnessError(f"worker: {said[-1] if said else 'expected a trace, found none'}"[:600])
+        self.worn = answer.get("worn") is True
+        real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
+        if isinstance(real_ns, int) and isinstance(starved_ns, int):
+            budget.charge(real_ns, starved_ns)
         return trace_from_json(answer["trace"])
 
-    def _answer(self, limits: Limits) -> bytes:
-        deadline = time.monotonic() + 2 * limits.wall_ns / NS_PER_S + MARGIN_S
+    def _end(self) -> str:
+        """Return how the worker ended: the name of a signal, or its code."""
+        try:
+            code = self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            return "nothing that can be seen"
+        number = -code if code < 0 else code - 128  # bubblewrap passes a signal on as a shell does
+        return signal.Signals(number).name if number in {*signal.Signals} else f"code {code}"
+
+    def _answer(self, limits: Limits, deadline: float) -> bytes:
+        """Return what the worker says.
+
+        Raises:
+            TimeoutError: It says nothing until the deadline.
+            MemoryError: It has filled too much memory.
+            EOFError: It has ended.
+            OSError: It says too much, or the line is broken.
+        """
         most = max(ANSWER_BYTES, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
         received = bytearray()
         while not received.endswith(b"\n"):
-            self._line.settimeout(max(0.001, deadline - time.monotonic()))
-            found = self._line.recv(1 << 20)
+            self._line.settimeout(LOOK_S)
+            try:
+                found = self._line.recv(1 << 20)
+            except TimeoutError:
+                if time.monotonic() > deadline:
+                    raise
+                self._look()
+                continue
             if not found:
-                raise OSError("it ended")
+                raise EOFError
             received += found
             if len(received) > most:
                 raise OSError("it answered without end")
         return bytes(received)
+
+    def _look(self) -> None:
+        """Raise MemoryError if the worker itself, not what it has started, has filled too much memory."""
+        self._pid = self._pid or self._find()
+        if self._pid and usage([self._pid]).memory_bytes > FULL_BYTES:
+            raise MemoryError
+
+    def _find(self) -> int:
+        """Return the worker's number here, below whatever the isolation put around it; 0 before it has begun."""
+        for pid in sorted(families([self._process.pid])[self._process.pid]):
+            with contextlib.suppress(OSError):
+                words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+                if words[0] == self._executable and MODULE in words:
+                    return pid
+        return 0
 
     def close(self) -> None:
         """Hang up; the worker and whatever it started end at once."""
@@ -108,6 +194,7 @@ class Job:
 
     title: str
     plan: Plan
+    budget: RealTimeBudget = field(default_factory=RealTimeBudget, compare=False)
 
 
 class Recorder:
@@ -166,26 +253,47 @@ class Recorder:
         """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
         progress(job.title)
         trace = self._recorded(job)
-        return self._recorded(job) if any(map(is_unexplained, trace.faults())) else trace
+        return self._recorded(job) if job.budget.left_ns and any(map(is_unexplained, trace.faults())) else trace
 
     def _recorded(self, job: Job) -> Trace:
         problem = ""
+        limits: list[str] = []
         for _ in range(TRIES):
+            if not job.budget.left_ns:
+                return job.budget.unrecorded(job.plan)
             worker = self._idle.get()
             usable = None
             try:
                 worker = worker or self._start()
-                trace = worker.run(job.plan)
-                usable = worker
+                trace = worker.run(job.plan, job.budget)
+                if worker.worn:
+                    self._discard(worker)
+                else:
+                    usable = worker
                 return trace
             except HarnessError as error:
                 problem = error.message
                 self._discard(worker)
+                if isinstance(error, WorkerLostError):
+                    limits += [error.limit] if error.limit else []
+                    if error.late:
+                        break
                 if self._closed:
                     break
             finally:
                 self._idle.put(usable)
         clock = ClockKind(job.plan.clock)
+        if len(limits) == TRIES:
+            faults = tuple(
+                Fault(
+                    0,
+                    name,
+                    FaultKind.KILLED,
+                    f"stopped: what the nodes sent took the grader's own process to {limits[-1]}",
+                )
+                for name, _ in job.plan.processes
+            )
+            return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
         return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
 
     def _start(self) -> WorkerProcess:

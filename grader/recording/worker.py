@@ -1,13 +1,16 @@
 """The trusted worker: runs plans one after another in a network of its own, and answers each with a trace.
 
 Usage: python -m grader.recording.worker JSON, with an object of `isolation`, `runtime` and `line` (a descriptor).
-A plan is a JSON line on the descriptor, the answer a JSON line with `trace` or `problem`.
+A plan is a JSON line on the descriptor with `plan`, `domain` and `budget`; the answer a JSON line with `problem`, or
+with `trace`, `real_ns`, `starved_ns` and `worn`: whether this worker should do no more.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
+import resource
 import socket
 import sys
 import time
@@ -17,14 +20,17 @@ from pathlib import Path
 from typing import Any
 
 from grader.model.errors import HarnessError
-from grader.model.trace import Trace
+from grader.model.limits import Limits
+from grader.model.quantities import GIB, MIB, NS_PER_S
+from grader.model.trace import FaultKind, Mark, Trace
 from grader.recording.codec import trace_to_json
-from grader.recording.guard import Guard
+from grader.recording.guard import Budget, Guard
 from grader.recording.isolation.environment import quick_discovery
 from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess, runtime_from_json
 from grader.recording.isolation.tiers import isolation_from_name
 from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
+from grader.recording.usage import usage
 
 #: A run on the wall clock whose reference slipped is repeated so often before the scenario is undecided.
 WALL_TRIES = 3
@@ -33,6 +39,11 @@ START_CPU_S = 10.0
 WAKE_UP_CPU_S = 5.0
 #: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
 BLOCKED_S = 5.0
+#: Where the guard comes too late, the system ends the worker: at this much mapped, and so much processor time beyond
+#: the guard's limit. A worker maps 0.6 GiB.
+ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
+#: A worker that has filled more than this after a scenario does no more; ordinary scenarios leave 30 to 50 MiB.
+WORN_BYTES = 128 * MIB
 
 
 class Worker:
@@ -46,19 +57,29 @@ class Worker:
     def __init__(self, isolation: Isolation, runtime: PythonRuntime) -> None:
         self._isolation = isolation
         self._runtime = runtime
+        self._real_ns = self._starved_ns = 0
 
-    def run(self, plan: Plan, domain: int) -> dict[str, Any]:
-        """Run one plan and return its trace as JSON values."""
-        tries = WALL_TRIES if plan.clock == "wall" else 1
-        deadline_ns = time.monotonic_ns() + plan.limits.wall_ns
-        trace = self._record(plan, domain)
-        for _ in range(tries - 1):
-            if not trace.harness_problem or time.monotonic_ns() > deadline_ns:
+    def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
+        """Run one plan and return the answer.
+
+        Args:
+            plan: The scenario.
+            domain: The ROS domain to use.
+            left_ns: Real time that is left for the submission.
+            budget_words: What to say where that is used up.
+        """
+        self._real_ns = self._starved_ns = 0
+        limit_processor_time(plan.limits)
+        started_ns = time.monotonic_ns()
+        for _ in range(WALL_TRIES if plan.clock == "wall" else 1):
+            spent_ns = time.monotonic_ns() - started_ns
+            trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
+            if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
-            trace = self._record(plan, domain)
-        return trace_to_json(trace)
+        cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
+        return {"trace": trace_to_json(trace), **cost, "worn": is_worn(trace)}
 
-    def _record(self, plan: Plan, domain: int) -> Trace:
+    def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         students: list[Student] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
@@ -71,11 +92,16 @@ class Worker:
 
             observer = Observer(domain, plan.limits)
             stack.callback(observer.close)
-            guard = stack.enter_context(Guard(students, plan.limits))
+            guard = stack.enter_context(Guard(students, plan.limits, budget))
+            stack.callback(self._account, guard)
             for student in students:
                 _await_ready(student)
             conductor = WallConductor if plan.clock == "wall" else Conductor
             return guard.reviewed(conductor(plan, students, observer).run())
+
+    def _account(self, guard: Guard) -> None:
+        self._real_ns += guard.real_ns
+        self._starved_ns += guard.starved_ns
 
     def _start(self, plan: Plan, name: str, file: str, domain: int) -> Student:
         ours, theirs = socket.socketpair()
@@ -116,6 +142,30 @@ class Worker:
             theirs.close()
 
 
+def limit_memory() -> None:
+    """Have the system limit what this process may map; students' processes have a limit of their own."""
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (_lower(ADDRESS_SPACE_BYTES, most), most))
+
+
+def limit_processor_time(limits: Limits) -> None:
+    """Have the system limit the processor time of this process from now on."""
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    seconds = math.ceil(time.process_time_ns() / NS_PER_S) + limits.processor_s + SPARE_CPU_S
+    resource.setrlimit(resource.RLIMIT_CPU, (_lower(seconds, most), most))
+
+
+def _lower(value: int, most: int) -> int:
+    return value if most == resource.RLIM_INFINITY else min(value, most)
+
+
+def is_worn(trace: Trace) -> bool:
+    """Return whether a worker should do no more after a scenario: something odd has happened, or it has grown."""
+    odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes
+    full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)
+    return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
+
+
 def _await_ready(student: Student) -> None:
     """Wait until a process is about to run its file; until then nothing of the student's has run."""
     if not student.is_ready():
@@ -142,12 +192,14 @@ def main() -> None:
     """Serve plans until the supervisor hangs up."""
     request = json.loads(sys.argv[1])
     line = socket.socket(fileno=request["line"])
-    worker = Worker(isolation_from_name(request["isolation"]), runtime_from_json(request["runtime"]))
     commands, answers = line.makefile("r"), line.makefile("w")
+    limit_memory()
+    worker = Worker(isolation_from_name(request["isolation"]), runtime_from_json(request["runtime"]))
     for command in commands:
         data = json.loads(command)
         try:
-            answer: dict[str, Any] = {"trace": worker.run(plan_from_json(data["plan"]), data["domain"])}
+            plan = plan_from_json(data["plan"])
+            answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])
         except HarnessError as error:
             answer = {"problem": error.message}
         except Exception:

@@ -12,7 +12,7 @@ from grader.model.limits import Limits
 from grader.model.quantities import MIB, NS_PER_S
 from grader.model.trace import ClockKind, Trace
 from grader.recording import guard as module
-from grader.recording.guard import Guard
+from grader.recording.guard import Budget, Guard
 from grader.recording.usage import Usage
 
 TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
@@ -89,13 +89,36 @@ def test_messages_that_fill_the_worker_end_the_nodes(machine):
     assert {s.stopped for s in students} == {"stopped at 512 MiB of messages that were under way at once"}
 
 
-@pytest.mark.parametrize(("waited_share", "undecided"), [(0.1, False), (0.9, True)])
-def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waited_share, undecided):
-    """Out of time because there was no processor to be had: a problem of the machine's, never a mark."""
-    wall_ns = NS_PER_S // 20
-    monkeypatch.setattr(module, "starved_ns", lambda pids: int(waited_share * wall_ns))
-    guard = watch(Watched(), wall_ns=wall_ns)
+@pytest.mark.parametrize(
+    ("waited_ns", "used_ns", "undecided"),
+    [(0, 0, False), (3600 * NS_PER_S, 0, True), (3600 * NS_PER_S, 100 * NS_PER_S, False)],
+    ids=["waited for nobody", "waited for others", "had the processors themselves"],
+)
+def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waited_ns, used_ns, undecided):
+    """Out of time because others had the processors: a problem of the machine's, never a mark."""
+    student = Watched()
+    machine[student.process.pid] = Usage(processor_ns=used_ns)
+    monkeypatch.setattr(module, "starved_ns", lambda pids: waited_ns)
+    guard = watch(student, wall_ns=NS_PER_S // 20)
+    assert student.stopped == "stopped after 0.05 s of real time"
     assert bool(guard.reviewed(TRACE).harness_problem) is undecided
+
+
+def test_a_budget_that_is_used_up_ends_the_nodes(machine):
+    """Before their own real time is over, and with the words of the budget."""
+    student = Watched()
+    with Guard([student], Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
+        student.held.wait(30)
+    assert (student.stopped, guard.reviewed(TRACE)) == ("stopped: enough", TRACE)
+
+
+def test_the_workers_own_processor_time_is_limited(machine, monkeypatch):
+    """It goes to what the nodes send."""
+    student = Watched()
+    with Guard([student], Limits(processor_ns=NS_PER_S)):
+        monkeypatch.setattr(module.time, "process_time_ns", lambda: 10_000 * NS_PER_S)
+        student.held.wait(30)
+    assert student.stopped == "stopped at 1 s of processor time to take what was sent"
 
 
 def test_the_guard_ends_with_its_block(machine):

@@ -16,6 +16,7 @@ from grader.model.errors import EnvironmentFault
 from grader.model.limits import Limits
 from grader.model.trace import ClockKind
 from grader.recording import recorder as module
+from grader.recording.budget import RealTimeBudget
 from grader.recording.isolation.protocol import Command, PythonRuntime
 from grader.recording.plan import Plan
 from grader.recording.recorder import Job, Recorder
@@ -52,6 +53,16 @@ for command in line.makefile("r"):
         plans += 1
         found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, []]] if text else []
         said = json.dumps({"trace": found}).encode()
+    elif behaviour == "is worn":
+        said = json.dumps({"trace": trace(asked["plan"], f"worker {number}"), "worn": True}).encode()
+    elif behaviour == "costs":
+        cost = {"real_ns": 100, "starved_ns": 90 if asked["plan"]["scenario"] == "starved" else 0}
+        said = json.dumps({"trace": trace(asked["plan"], asked["budget"]), **cost}).encode()
+    elif behaviour == "reaches its processor time":
+        os.kill(os.getpid(), signal.SIGXCPU)
+    elif behaviour == "grows":
+        grown = b"x" * (200 << 20)
+        signal.pause()
     elif behaviour == "dies":
         os._exit(1)
     elif behaviour == "dies in its sentence":
@@ -373,3 +384,79 @@ def test_a_signal_that_no_limit_explains_has_to_come_twice(make, told, kept, tim
     assert "".join(fault.text for fault in found.faults()).startswith(kept)
     assert bool(found.faults()) is bool(kept)
     assert found.notes == (f"plan {times - 1}",)
+
+
+def test_a_worn_worker_does_no_more(make):
+    """The next scenario gets a fresh one."""
+    recorder, stage = make("is worn", "is worn", "answers")
+    found = [note(recorder.record(jobs("alone"), nothing)[0]) for _ in range(4)]
+    assert [text.partition(",")[0] for text in found] == ["worker 0", "worker 1", "worker 2", "worker 2"]
+    assert len(stage.pids()) == 3
+
+
+LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100 MiB of memory"}
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Workers may fill little, and are those of the stage."""
+    monkeypatch.setattr(module, "MODULE", b"-c")
+    monkeypatch.setattr(module, "FULL_BYTES", 100 << 20)
+
+
+@pytest.mark.parametrize("behaviour", LIMITS)
+def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(make, small, behaviour):
+    """They do it again and again: a fault of theirs, and no third try."""
+    recorder, stage = make(behaviour, behaviour, "answers")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    words = f"stopped: what the nodes sent took the grader's own process to {LIMITS[behaviour]}"
+    assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
+    assert (trace.harness_problem, trace.stop_ns, len(stage.pids())) == ("", 5, 2)
+
+
+@pytest.mark.parametrize("behaviour", LIMITS)
+def test_one_worker_at_a_limit_decides_nothing(make, small, behaviour):
+    """The plan is tried again."""
+    recorder, _ = make(behaviour, "answers")
+    assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 1")
+
+
+@pytest.mark.parametrize("first", [*LIMITS, "dies"])
+def test_different_ends_of_workers_decide_nothing(make, small, first):
+    """A limit and a failure without one, in any order."""
+    recorder, _ = make(first, "dies", "answers")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
+    assert trace.faults() == ()
+
+
+def test_a_worker_that_took_all_its_time_is_not_tried_again(make, monkeypatch):
+    """A second try would take as long."""
+    monkeypatch.setattr(module, "MARGIN_S", 0.2)
+    recorder, stage = make("hangs", "answers")
+    short = replace(plan(), limits=Limits(wall_ns=1))
+    (trace,) = recorder.record([Job("alone", short)], nothing)
+    assert trace.harness_problem == "worker: expected a trace of alone, found none (it did not answer in time)"
+    assert len(stage.pids()) == 1
+
+
+def test_without_time_nothing_is_recorded(make):
+    """It is told as a fault of every process, the same in every run; no worker is even asked."""
+    recorder, stage = make("answers")
+    job = replace(jobs("alone")[0], budget=RealTimeBudget(0))
+    (trace,) = recorder.record([job], nothing)
+    words = "stopped: the recordings of this submission took more than 0 s of real time"
+    assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
+    assert (trace.harness_problem, trace.stop_ns, stage.pids()) == ("", 5, [])
+
+
+@pytest.mark.parametrize(("scenario", "undecided"), [("starved", True), ("alone", False)])
+def test_time_that_others_took_is_nobodys_fault(make, monkeypatch, scenario, undecided):
+    """Workers say how long nodes waited for a processor; where that is much, what is not recorded is not judged."""
+    recorder, _ = make("costs")
+    budget = RealTimeBudget(3600)
+    (first,) = recorder.record([replace(jobs(scenario)[0], budget=budget)], nothing)
+    assert note(first) == "stopped: the recordings of this submission took more than 3600 s of real time"
+    monkeypatch.setattr(RealTimeBudget, "left_ns", 0)
+    (trace,) = recorder.record([replace(jobs("next")[0], budget=budget)], nothing)
+    assert (bool(trace.harness_problem), bool(trace.faults())) == (undecided, not undecided)

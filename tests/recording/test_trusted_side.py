@@ -20,6 +20,7 @@ from grader.model.quantities import NS_PER_S
 from grader.model.trace import FaultKind
 from grader.recording.plan import PlannedNumbers
 from grader.recording.studio import open_studio
+from grader.recording.usage import usage
 
 pytestmark = pytest.mark.ros
 
@@ -36,12 +37,18 @@ def line():
         except OSError:
             pass
 """
-#: What a program needs to speak RTPS in the name of any writer: one DATA submessage to every reader on the machine.
+#: What a program needs to speak RTPS in the name of any writer: a submessage to every reader on the machine, which
+#: is DATA, or a GAP over so many sequence numbers.
 FORGE = """
 import struct
 def forge(gid, number, payload, writer=None, flags=5):
-    data = struct.pack("<HH4s4siI", 0, 16, bytes(4), writer or bytes(gid[12:16]), 0, number) + payload
-    packet = b"RTPS\\x02\\x03\\x01\\x0f" + bytes(gid[:12]) + struct.pack("<BBH", 0x15, flags, len(data)) + data
+    head = struct.pack("<HH4s4siI", 0, 16, bytes(4), writer or bytes(gid[12:16]), 0, number)
+    send_forged(gid, 0x15, flags, head + payload)
+def forge_gap(gid, number, length):
+    numbers = struct.pack("<iIiII", *divmod(number, 1 << 32), *divmod(number + length, 1 << 32), 0)
+    send_forged(gid, 0x08, 1, bytes(4) + bytes(gid[12:16]) + numbers)
+def send_forged(gid, kind, flags, data):
+    packet = b"RTPS\\x02\\x03\\x01\\x0f" + bytes(gid[:12]) + struct.pack("<BBH", kind, flags, len(data)) + data
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     base = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
     for port in range(base, base + 40):
@@ -282,6 +289,41 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run):
     )
     assert {m.cdr for m in trace.messages("/big")} == {b""}
     assert len(trace.messages("/cmd_vel")) == 39
+
+
+#: One packet of 52 bytes, after a while, in the name of the program's own publisher.
+GAP = """
+if self.count == 20:
+    (info,) = self.get_publishers_info_by_topic("/cmd_vel")
+    forge_gap(info.endpoint_gid, 22, 30_000_000)
+"""
+
+
+def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run):
+    """The middleware would note each of them: the worker is ended, and what brings two of them there is the node."""
+    most_bytes = 0
+    done = threading.Event()
+
+    def look() -> None:
+        nonlocal most_bytes
+        while not done.wait(0.02):
+            most_bytes = max(
+                most_bytes, *(usage([pid]).memory_bytes for pid in (os.getpid(), *workers_of(os.getpid())))
+            )
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    try:
+        trace = run(hostile(before=FORGE, later=GAP), hostile().replace("/cmd_vel", "/other"))
+    finally:
+        done.set()
+        watcher.join()
+    assert {(fault.process, fault.kind, fault.text) for fault in trace.faults()} == {
+        (name, FaultKind.KILLED, "stopped: what the nodes sent took the grader's own process to 768 MiB of memory")
+        for name in ("a.py", "b.py")
+    }
+    assert most_bytes < 1 << 30, "30 million sequence numbers take 2.4 GiB"
+    assert len(run(hostile()).messages("/cmd_vel")) == 199, "the next scenario has a fresh worker"
 
 
 #: Has its host claim an endpoint more at every tick, which does not exist.
