@@ -30,6 +30,7 @@ from grader.options import (
     parse_outputs,
     parse_percent,
     readers,
+    time_budget_option,
 )
 from grader.progress import shown_progress
 from grader.reports.delivery import Output, deliver, early_delivery, prepared
@@ -120,6 +121,7 @@ class _Everyday(click.Command):
     default="auto",
     help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
+@time_budget_option
 @click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
@@ -139,6 +141,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     min_score: Fraction | None,
     clock: str,
     isolation: str,
+    time_budget_s: float,
     student: str,
     variant_key: Path | None,
     audience: str | None,
@@ -167,6 +170,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
         odom_bag=odom_bag,
         clock=clock,
         isolation=isolation,
+        time_budget_s=time_budget_s,
         student=student.strip(),
         variant_key=variant_key,
         draw=drawn_by(student, variant_key),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from grader.model.feedback import Audience
+from grader.model.limits import TIME_BUDGET_S
 from grader.model.report import Report
 from grader.reports.delivery import Output
 from grader.reports.formats import FORMATS
@@ -26,6 +27,18 @@ ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+#: How long all recordings of one submission may take together, in seconds.
+time_budget_option = click.option(
+    "--time-budget",
+    "time_budget_s",
+    type=click.FloatRange(min=1),
+    default=TIME_BUDGET_S,
+    show_default=True,
+    metavar="SECONDS",
+    help="Real time that the recordings of one submission may take together; what is left then is not met.",
+)
 
 
 def audience_options(command: _Command) -> _Command:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from grader.model.exercise import Exercise
+from grader.model.limits import TIME_BUDGET_S
 from grader.model.report import Reproduction
 from grader.recording.bag import Odometry
 
@@ -51,6 +52,8 @@ def command_words(request: Request, seed: int) -> tuple[str, ...]:
         words += ["--clock", request.clock]
     if request.isolation != "auto":
         words += ["--isolation", request.isolation]
+    if request.time_budget_s != TIME_BUDGET_S:
+        words += ["--time-budget", f"{request.time_budget_s:g}"]
     return tuple(words)
 
 

@@ -14,6 +14,7 @@ from grader.early import EarlyReports
 from grader.judging.whole import judge_run
 from grader.model.errors import SubmissionError
 from grader.model.exercise import Exercise, exercise_name
+from grader.model.limits import TIME_BUDGET_S
 from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
@@ -52,6 +53,7 @@ class Request:
         odom_bag: An /odom recording to play instead of the project's own.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
+        time_budget_s: Real time that all recordings may take together.
         workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
         collected: What was read of the submission before, perhaps elsewhere; None to read it now.
         student: Id of the student whose variants are graded; empty where nothing varies.
@@ -68,6 +70,7 @@ class Request:
     odom_bag: Path | None = None
     clock: str = "auto"
     isolation: str = "auto"
+    time_budget_s: float = TIME_BUDGET_S
     workers: int | None = None
     collected: Collected | None = None
     student: str = ""
@@ -131,7 +134,7 @@ def grade(
             reproduce=reproduction(request, exercises, odometry, seed),
         )
         take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
-        traces = studio.record(jobs, request.clock, progress, take)
+        traces = studio.record(jobs, request.clock, progress, take, budget_s=request.time_budget_s)
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if hear is not None:
             hear(run, exercises)

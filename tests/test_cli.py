@@ -71,6 +71,7 @@ def test_every_option_reaches_the_session(run_session):
     """What is asked for is what is graded; a repeated exercise is graded once."""
     options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--odom-bag", "bag"]
     options += ["--rubric", "r1.yaml", "--rubric", "r2.yaml", "--clock", "wall", "--isolation", "none", "--no-progress"]
+    options += ["--time-budget", "20"]
     result = grade(*options, "ada")
     assert result.exit_code == 0, result.output
     assert run_session.requests == [
@@ -82,6 +83,7 @@ def test_every_option_reaches_the_session(run_session):
             odom_bag=Path("bag"),
             clock="wall",
             isolation="none",
+            time_budget_s=20,
         )
     ]
 

@@ -27,6 +27,7 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
         odom_bag=Path("bag"),
         clock="wall",
         isolation="none",
+        time_budget_s=20.5,
     )
     heard = []
 

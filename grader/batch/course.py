@@ -102,6 +102,7 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
         seed=grading.seed,
         clock=grading.clock,
         isolation=grading.isolation,
+        time_budget_s=grading.time_budget_s,
         every=grading.every,
     )
 

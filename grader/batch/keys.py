@@ -7,6 +7,7 @@ import json
 from dataclasses import asdict, dataclass
 
 from grader.model.errors import GraderError
+from grader.model.limits import TIME_BUDGET_S
 from grader.model.variant import Drawn
 
 
@@ -21,6 +22,7 @@ class Conditions:
         seed: The seed of every drawn value; None in what a whole class is graded with, if each submission has its own.
         clock: The clock that was asked for.
         isolation: The sandbox that was asked for.
+        time_budget_s: Real time that all recordings of a submission may take together.
         every: Whether only exercises count of which a submission has a file.
         variants: The values that are this student's own; None if nothing varies.
     """
@@ -33,6 +35,7 @@ class Conditions:
     isolation: str
     every: bool = False
     variants: Drawn | None = None
+    time_budget_s: float = TIME_BUDGET_S
 
     def key(self, submission: str) -> str:
         """Return the key of the result of a submission, by its digest."""

@@ -19,7 +19,6 @@ from grader.batch.tasks import MakeScheduler, Task
 from grader.batch.watching import Watcher
 from grader.model.errors import HarnessError, SubmissionError
 from grader.model.exercise import Exercise
-from grader.model.quantities import NS_PER_S
 from grader.recording.recorder import MARGIN_S, TRIES
 from grader.reports.html.bundle import shared_assets
 
@@ -27,13 +26,11 @@ from grader.reports.html.bundle import shared_assets
 LEAST_FREE_BYTES = 4 << 20
 #: Seconds that an attempt may take beyond what its recordings may.
 _BEYOND_S = 300.0
-_CLOCKS = 2  # a scenario may be recorded in virtual time, and once more on the wall clock
 
 
-def deadline_s(exercises: Sequence[Exercise]) -> float:
+def deadline_s(budget_s: float) -> float:
     """Return the real time after which grading one submission is given up: every limit inside has passed by then."""
-    each = [2 * s.limits.wall_ns / NS_PER_S + MARGIN_S for e in exercises for s in e.scenarios]
-    return _CLOCKS * TRIES * sum(each) + _BEYOND_S
+    return budget_s + TRIES * MARGIN_S + _BEYOND_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +120,7 @@ class ClassRun:
             variant_key=grading.variant_key,
             workers=workers,
             standalone=self.course.standalone,
-            deadline_s=deadline_s(self.exercises),
+            deadline_s=deadline_s(self.course.grading.time_budget_s),
         )
 
     def _refused(self, entry: Entry) -> Standing:

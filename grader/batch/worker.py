@@ -81,6 +81,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
         odom_bag=task.odom_bag,
         clock=conditions.clock,
         isolation=conditions.isolation,
+        time_budget_s=conditions.time_budget_s,
         workers=task.workers,
         collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
         student=own.student if own is not None else "",

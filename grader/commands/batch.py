@@ -11,7 +11,7 @@ import click
 
 from grader.batch.cluster.extra import require_dask
 from grader.model.containment import TIERS
-from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED, drawn_with
+from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED, drawn_with, time_budget_option
 from grader.reports.escape import encoded, shown
 from grader.similarity.extra import require_library
 
@@ -41,6 +41,7 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
+@time_budget_option
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
@@ -77,6 +78,7 @@ def command(  # noqa: PLR0913  one parameter an option
     odom_bag: Path | None,
     clock: str,
     isolation: str,
+    time_budget_s: float,
     variant_key: Path | None,
     standalone: bool,
     canvas: str | None,
@@ -128,6 +130,7 @@ def command(  # noqa: PLR0913  one parameter an option
             odom_bag=odom_bag,
             clock=clock,
             isolation=isolation,
+            time_budget_s=time_budget_s,
             variant_key=variant_key,
         ),
         jobs=jobs,

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from grader.model.quantities import GIB, KIB, MIB, NS_PER_S, duration, size
 
+#: Real time, in seconds, that all recordings of one submission may take together unless told otherwise; those of an
+#: ordinary submission take 3 to 10 s.
+TIME_BUDGET_S = 300.0
+
 #: What a process may map beyond what it may fill: libraries, thread stacks and pools that stay empty.
 ADDRESS_SPACE_BEYOND = 3 * GIB // 2
 

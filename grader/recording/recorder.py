@@ -190,7 +190,7 @@ class WorkerProcess:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A plan with the name its progress is told by."""
+    """A plan with the name its progress is told by, and the real time it shares with others; without end by default."""
 
     title: str
     plan: Plan

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from grader.model.containment import Property
 from grader.model.trace import Trace
+from grader.recording.budget import FOREVER_S, RealTimeBudget
 from grader.recording.byte_code import compile_own
 from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.choose import choose_isolation
@@ -53,6 +54,8 @@ class Studio:
         clock: str,
         progress: Callable[[str], None],
         finished: Callable[[Key, Trace], None] | None = None,
+        *,
+        budget_s: float = FOREVER_S,
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces.
 
@@ -64,15 +67,17 @@ class Studio:
             clock: `virtual`, `wall` or `auto`.
             progress: Hears which job begins.
             finished: Hears each trace as soon as nothing will replace it, while others are still being recorded.
+            budget_s: Real time that all of them may take together.
         """
-        first = [replace(job, plan=replace(job.plan, stop_when_unfit=clock == AUTO)) for job in jobs.values()]
+        budget = RealTimeBudget(budget_s)
+        first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in jobs.values()]
         traces: dict[Key, Trace] = {}
         for key, trace in zip(jobs, self.recorder.each(first, progress), strict=True):
             traces[key] = trace
             if finished is not None and not _unfit(trace, clock):
                 finished(key, trace)
         for key in [key for key, trace in traces.items() if _unfit(trace, clock)]:
-            again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL))
+            again = Job(f"{jobs[key].title}, on the wall clock", replace(jobs[key].plan, clock=WALL), budget)
             repeated = self.recorder.record([again], progress)[0]
             traces[key] = replace(repeated, clock_reason=traces[key].clock_reason)
             if finished is not None:

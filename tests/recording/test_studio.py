@@ -79,3 +79,23 @@ def test_the_first_look_may_end_early_only_if_there_is_a_second():
     recorded(Listening(), AUTO, "a")
     recorded(Listening(), VIRTUAL, "a")
     assert plans == [True, False]
+
+
+def test_all_recordings_of_a_submission_share_one_budget():
+    """Also what is recorded again; the next submission has its own."""
+    budgets = []
+
+    class Listening(Recorder):
+        def each(self, jobs, progress):
+            budgets.extend(job.budget for job in jobs)
+            yield from super().each(jobs, progress)
+
+    studio = Studio(*(None,) * (len(Studio.__slots__) - 2), Listening("a"), Path("nowhere"))
+    for budget_s in (20, 30):
+        studio.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
+    first, second = budgets[:3], budgets[3:]
+    assert [len(set(map(id, part))) for part in (first, second)] == [1, 1]
+    assert [part[0].words.partition("more than ")[2] for part in (first, second)] == [
+        "20 s of real time",
+        "30 s of real time",
+    ]
