@@ -83,7 +83,7 @@ class Conductor:
         if not any(s.ended for s in self._students):
             self._matching.look(self._now_ns)  # what has ended disappears from the graph at a moment that is nobody's
         self._stop_ns = self._end_ns
-        why_not = unfit(self._students, self._tape.observations, full=bool(self._tape.full))
+        why_not = self._why_not()
         if self._plan.shutdown_ns and not (why_not or self._tape.full):
             self._shut_down()
         return Trace(
@@ -94,6 +94,10 @@ class Conductor:
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
         )
+
+    def _why_not(self) -> str:
+        """Say why virtual time does these nodes no justice, if so."""
+        return unfit(self._students, self._tape.observations, full=bool(self._tape.full))
 
     def _run_on(self) -> None:
         """Step through time until the end, or until nothing more can happen."""
@@ -163,7 +167,7 @@ class Conductor:
         self._hear(student, workload)
         self._dismiss_done()
         self._steps += 1
-        if self._plan.stop_when_unfit and hopeless(self._students):
+        if self._plan.stop_when_unfit and hopeless(self._students) and self._why_not():
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
