@@ -54,7 +54,7 @@ def run(request: dict[str, Any]) -> None:
     ending = play(request, describer, link)
     if watchdog is not None:
         watchdog.stop()
-    left = isinstance(time, VirtualTime) and time.end()
+    left = time.end()
     flush()
     link.send({"kind": "exited", "left": left, **ending, **time.summary()})
     originals.exit_now(0)

@@ -348,7 +348,7 @@ def _install_endpoints(ledger: Ledger, settle: Callable[[], None], leave: Callab
         _report_departures_first(ledger, f"create_{kind}", settle)
     note_nodes(ledger.add_node)
     _report_departures_first(ledger, "__init__", settle)
-    _install_departures(ledger, leave)
+    install_departures(leave, ledger.remove)
     declare = rclpy.node.Node.declare_parameters
 
     def declared(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -383,22 +383,21 @@ def _report_departures_first(ledger: Ledger, method: str, settle: Callable[[], N
     setattr(rclpy.node.Node, method, created)
 
 
-def _install_departures(ledger: Ledger, leave: Callable[[], None]) -> None:
-    """Let what was sent arrive before a node, a context or the process goes."""
+def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
+    """Call `leave` before a node, a context or the process goes, and `remove` before a node does."""
 
-    def leaving(owner: Any, name: str, *, removes: bool = False) -> None:
+    def leaving(owner: Any, name: str, then: Callable[[], None] = lambda: None) -> None:
         go = getattr(owner, name)
 
         @functools.wraps(go)
         def gone(*args: Any, **kwargs: Any) -> Any:
             leave()
-            if removes:
-                ledger.remove()
+            then()
             return go(*args, **kwargs)
 
         setattr(owner, name, gone)
 
-    leaving(rclpy.node.Node, "destroy_node", removes=True)
+    leaving(rclpy.node.Node, "destroy_node", remove)
     leaving(rclpy.context.Context, "shutdown")
     leaving(rclpy.context.Context, "try_shutdown")
     for owner, name in ((os, "_exit"), (os, "abort"), (os, "kill"), (os, "killpg"), (signal, "raise_signal")):

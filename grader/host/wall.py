@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import signal
+import weakref
 from typing import Any
 
 import rclpy.publisher
+from rclpy.duration import Duration
 
 from . import originals, ros
 from .ledger import BACKGROUND
@@ -15,6 +18,8 @@ from .link import Link
 
 #: How long, in real time, a new publisher waits for its first subscription before its first message.
 MATCH_S = 2.0
+#: How long, in real time, what a publisher has sent may take to arrive before the publisher goes.
+ACKNOWLEDGED = Duration(seconds=0.5)
 
 
 class WallTime:
@@ -26,23 +31,42 @@ class WallTime:
 
     def __init__(self, link: Link) -> None:
         self._link = link
+        self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
 
     def install_ros(self) -> None:
         """Let every publisher find a subscription before its first message; in a running system it would have one."""
-        publish = rclpy.publisher.Publisher.publish
-        matched = set()
+        publish, destroy = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.destroy
+        matched = self._publishing
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
-            if id(self) not in matched and self.topic_name not in BACKGROUND:
+            if self not in matched and self.topic_name not in BACKGROUND:
                 deadline = originals.perf_counter() + MATCH_S
                 while self.get_subscription_count() == 0 and originals.perf_counter() < deadline:
                     originals.sleep(0.001)
-                matched.add(id(self))
+                matched.add(self)
             return publish(self, msg)
 
+        @functools.wraps(destroy)
+        def destroy_when_heard(publisher: Any) -> None:
+            self._leave()
+            destroy(publisher)
+
         rclpy.publisher.Publisher.publish = publish_when_matched
+        rclpy.publisher.Publisher.destroy = destroy_when_heard
         ros.note_nodes()
+        ros.install_departures(self._leave)
+
+    def _leave(self) -> None:
+        """Let what was published arrive before its publisher goes, which would take it along otherwise."""
+        for publisher in list(self._publishing):
+            with contextlib.suppress(Exception):  # it has been destroyed, or its context has been shut down
+                publisher.wait_for_all_acked(ACKNOWLEDGED)
+
+    def end(self) -> bool:
+        """Let what was published arrive; the process leaves the graph with its end."""
+        self._leave()
+        return False
 
     def start(self, now_ns: int) -> None:
         """Begin; the time is whatever it is, and the grader's next word is to stop."""

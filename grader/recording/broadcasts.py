@@ -43,8 +43,7 @@ class Broadcasts:
         self._matching.fixed[due.topic] = stream
         self._matching.streams[due.topic] = stream.type
         self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
-        readers = [c for s in self._students for c in readers_of(s, due.topic) if compatible(offered(stream), c)]
-        self._matching.patience.wait(lambda: self._observer.subscribers_matched(due.topic) >= len(readers))
+        self._matching.patience.wait(lambda: self._matching.is_heard(due.topic))
         self._matching.tell_all()
         self._tape.add(Mark(now_ns, "stream_starts", due.topic))
 
@@ -71,8 +70,7 @@ class Broadcasts:
         latched = any(c["latched"] for c in asked if c["type"] == interface)
         self._observer.advertise(topic, interface, latched=latched)
         self._matching.streams[topic] = interface
-        readers = [c for c in asked if c["type"] == interface and takes_ordinary(c)]
-        self._matching.patience.wait(lambda: self._observer.subscribers_matched(topic) >= len(readers))
+        self._matching.patience.wait(lambda: self._matching.is_heard(topic))
         self._matching.tell_all()
 
     def publish(self, due: Due, now_ns: int) -> None:

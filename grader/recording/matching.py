@@ -73,6 +73,7 @@ class Matching:
         self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in claims if c["kind"] == "publisher"]
         self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
+        self.patience.wait(lambda: all(map(self.is_heard, self.streams)))
         self._announce_kept()
         self.tell_all()
 
@@ -84,6 +85,22 @@ class Matching:
                 if asks and self.said[topic] and (student.name, topic) not in self._served:
                     self._served.add((student.name, topic))
                     announce(student.arrivals, f"topic {topic}", self.said[topic])
+
+    def is_heard(self, topic: str) -> bool:
+        """Return whether the publisher of a stimulus has found every subscription that takes what it offers."""
+        stream, interface = self.fixed.get(topic), self.streams[topic]
+        best_effort = stream is not None and stream.best_effort
+        own = sum(not (reliable and best_effort) for reliable in self._observer.watching(topic, interface))
+        asking = [c for s in self._students if not s.ended for c in readers_of(s, topic)]
+        # numbers are latched only where the first subscription asks for it
+        readers = sum(self._takes(c, topic) for c in asking if stream is not None or not c["latched"])
+        return self._observer.subscribers_matched(topic) >= readers + own
+
+    def _takes(self, reader: dict[str, Any], topic: str) -> bool:
+        """Return whether a subscription takes what a stimulus offers on a topic."""
+        fixed = self.fixed.get(topic)
+        fits = takes_ordinary(reader) if fixed is None else compatible(offered(fixed), reader)
+        return bool(self.streams.get(topic) == reader["type"] and fits)
 
     def see_off(self, now_ns: int) -> None:
         """Wait until a process that has left the graph before it ended is gone for all the others."""
@@ -194,10 +211,7 @@ class Matching:
                 1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
             )
         if kind == "subscription":
-            fixed = self.fixed.get(name)
-            fits = takes_ordinary(claim) if fixed is None else compatible(offered(fixed), claim)
-            stimulus = self.streams.get(name) == claim["type"] and fits
-            return int(stimulus) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
+            return self._takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
         if kind == "service":
             asking = ("client", name, claim["type"])
             students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)

@@ -9,7 +9,7 @@ pytest.importorskip("rclpy")
 from hostile import MS, record
 
 from grader.model.quantities import NS_PER_S
-from grader.recording.exchanges import PlannedCalls, PlannedServer
+from grader.recording.exchanges import PlannedCalls, PlannedGoal, PlannedMessages, PlannedServer
 
 pytestmark = pytest.mark.ros
 
@@ -288,3 +288,90 @@ def test_a_client_that_asks_and_leaves_has_asked(run):
         node.destroy_node()
         """
     assert len(run(program, servers=(server,)).requests("/status", "student")) == 1
+
+
+def test_the_wall_clock_loses_nothing_either(run):
+    """What reliable publishers have sent arrives before they go."""
+    for ending in ("node.destroy_node()\nrclpy.shutdown()", "", "os._exit(0)"):
+        trace = run(TALKER + "burst(publisher, 10)\n" + ending, clock="wall")
+        assert numbers(trace) == list(range(10))
+
+
+@pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])
+def test_what_is_published_at_ctrl_c_counts(run, options):
+    """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""
+    trace = run(
+        f"""
+        import rclpy.signals
+        rclpy.init({options})
+        node = Node('talker')
+        publisher = node.create_publisher(String, '/words', 10)
+        node.create_timer(1.0, lambda: publisher.publish(String(data='1')))
+        try:
+            rclpy.spin(node)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            if rclpy.ok():
+                publisher.publish(String(data='0'))
+            node.destroy_node()
+            rclpy.try_shutdown()
+        """,
+        shutdown_ns=2 * NS_PER_S,
+    )
+    assert numbers(trace) == ([1, 1, 0] if options else [1, 1])
+    assert trace.faults() == ()
+
+
+ACTION = """
+from rclpy.action import ActionServer
+from test_msgs.action import Fibonacci
+rclpy.init()
+node = Node('server')
+done = []
+def execute(goal):
+    for number in range(3):
+        feedback = Fibonacci.Feedback()
+        feedback.sequence = [number]
+        goal.publish_feedback(feedback)
+    goal.succeed()
+    done.append(1)
+    return Fibonacci.Result(sequence=[0, 1, 1])
+server = ActionServer(node, Fibonacci, '/count', execute)
+while not done:
+    rclpy.spin_once(node)
+for _ in range(5):
+    rclpy.spin_once(node, timeout_sec=0.1)
+"""
+
+
+@pytest.mark.parametrize("ending", ["server.destroy()", "node.destroy_node()", ""])
+def test_an_action_server_that_leaves_has_told_everything(run, ending):
+    """Feedback and the result reach the grader's client."""
+    pytest.importorskip("test_msgs")
+    goal = PlannedGoal("/count", "test_msgs/action/Fibonacci", NS_PER_S, 0, {"order": 3}, (7,) * 16)
+    trace = run(ACTION + ending, goals=(goal,))
+    assert len(trace.messages("/count/_action/feedback")) == 3
+    assert len(trace.responses("/count/_action/get_result", "student")) == 1
+
+
+def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
+    """In a callback, at any moment: its publisher knows it before time goes on."""
+    numbers = PlannedMessages(
+        "/words", "std_msgs/msg/String", 0, 0, 100 * MS, 1, False, False, tuple({"data": f"{n}"} for n in range(30))
+    )
+    trace = run(
+        """
+        rclpy.init()
+        node = Node('listener')
+        made = []
+        def renew():
+            if made:
+                node.destroy_subscription(made.pop())
+            made.append(node.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10))
+        node.create_timer(0.251, renew)
+        rclpy.spin(node)
+        """,
+        messages=(numbers,),
+    )
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
