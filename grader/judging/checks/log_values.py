@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from grader.judging.attribution import Sought, crowd, followed, standing
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.conversions import Heard, wrong_conversion
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records
 from grader.judging.paths import number_at
+from grader.judging.positions.numbers import Printed
 from grader.judging.printed import Output, in_window, numbers_in, shows_about, times
 from grader.judging.silence import (
     explain_no_subscription,
@@ -31,6 +34,8 @@ _LATE_NS = NS_PER_S
 #: A number tells something if its last digit is at most this share of the largest value.
 _FINE = 0.1
 
+_Logged = Callable[[Sequence[Output], Sequence[Sought]], frozenset[int]]
+
 
 @dataclass(frozen=True, slots=True)
 class _Received:
@@ -46,7 +51,8 @@ class LogsValues:
     """A process logs what it receives: for each message all of its converted numbers, in one record or in several.
 
     Numbers count to the precision printed, with their sign; a conversion may use a constant such as 3.14159. A number
-    whose last digit is more than a tenth of the largest value tells nothing. A log may come up to a second late, if
+    whose last digit is more than a tenth of the largest value tells nothing, and neither does one that stands among so
+    many others that chance explains it. A log may come up to a second late, if
     none is left out. Numbers that are printed instead are half of it.
 
     Attributes:
@@ -72,6 +78,10 @@ class LogsValues:
         received = self._received(trace)
         if not received:
             return self._nothing(trace)
+        return self._judged(trace, received)
+
+    def _judged(self, trace: Trace, received: Sequence[_Received]) -> Finding:
+        fault = first_fault(trace, self.process)
         records = student_records(trace, self.process)
         unlogged = self._unlogged(received, records)
         evidence = self._evidence(received, unlogged)
@@ -80,11 +90,29 @@ class LogsValues:
         lines = printed_lines(trace, self.process)
         if self._enough(received, self._unlogged(received, sorted([*records, *lines], key=lambda o: o.t_ns))):
             return partly(f"{self._said(received, ())} printed, not all of them logged", evidence, hint=LOGGER_HINT)
+        absent = self._unlogged(received, records, standing)
+        hidden = self._enough(received, absent)
         if fault is not None:
-            lost = f"{len(unlogged)} of {len(received)} messages of {self.topic} were not logged"
+            lost = f"{len(unlogged if hidden else absent)} of {len(received)} messages of {self.topic} were not logged"
             return not_met(f"{fault_sentence(fault)}; {lost}", evidence, hint=fault_hint(fault), fault=fault)
+        if hidden:
+            return self._hidden(received, unlogged, records, evidence)
         outputs = records if any(numbers_in(r.text) for r in records) else lines
-        return self._explain(received, unlogged, outputs, evidence)
+        return self._explain(received, absent, outputs, self._evidence(received, absent))
+
+    def _hidden(
+        self,
+        received: Sequence[_Received],
+        unlogged: Sequence[_Received],
+        records: Sequence[Output],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        first = unlogged[0]
+        among = crowd(records, self._sought([first], [first.stop_ns])[0])
+        reason = f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not told "
+        reason += f"from other numbers, the first is {number(first.value)} at {moment(first.t_ns)}: {among}"
+        hint = f"log the number that came on {self.topic}, and none that it might have been"
+        return not_met(reason, evidence, hint=hint)
 
     def _received(self, trace: Trace) -> list[_Received]:
         jitter_ns = JITTER_NS[trace.clock]
@@ -103,17 +131,31 @@ class LogsValues:
     def _enough(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> bool:
         return len(received) - len(unlogged) >= self.share * len(received) - 1e-9
 
-    def _unlogged(self, received: Sequence[_Received], outputs: Sequence[Output]) -> list[_Received]:
-        coarsest = {f: _FINE * abs(f) * max(abs(r.value) for r in received) for f in self.unit_factors}
-        punctual = [r for r in received if not self._shown(r, r.stop_ns, outputs, coarsest)]
+    def _unlogged(
+        self, received: Sequence[_Received], outputs: Sequence[Output], logged: _Logged = followed
+    ) -> list[_Received]:
+        punctual = self._unshown(received, [r.stop_ns for r in received], outputs, logged)
         written = sum(len(numbers_in(o.text)) for o in outputs if o.t_ns >= received[0].t_ns)
-        if written < self.share * len(received) * len(self.unit_factors):
+        if not punctual or written < self.share * len(received) * len(self.unit_factors):
             return punctual
-        return [r for r in punctual if not self._shown(r, r.t_ns + _LATE_NS, outputs, coarsest)]
+        late = self._unshown(received, [r.t_ns + _LATE_NS for r in received], outputs, logged)
+        return [r for r in punctual if r in late]
 
-    def _shown(self, one: _Received, stop_ns: int, outputs: Sequence[Output], coarsest: dict[float, float]) -> bool:
-        found = [n for o in in_window(outputs, one.t_ns, stop_ns) for n in numbers_in(o.text)]
-        return all(any(shows_about(n, f * one.value, coarsest=c) for n in found) for f, c in coarsest.items())
+    def _unshown(
+        self, received: Sequence[_Received], stops_ns: Sequence[int], outputs: Sequence[Output], logged: _Logged
+    ) -> list[_Received]:
+        found = logged(outputs, self._sought(received, stops_ns))
+        many = len(self.unit_factors)
+        return [r for k, r in enumerate(received) if not found >= set(range(k * many, (k + 1) * many))]
+
+    def _sought(self, received: Sequence[_Received], stops_ns: Sequence[int]) -> list[Sought]:
+        """Return what is to be logged: for each message one value a factor."""
+        largest = max(abs(r.value) for r in received)
+        return [
+            Sought(r.t_ns, stop_ns, f * r.value, abs(f) * largest, partial(_shows, f * r.value, abs(f) * largest))
+            for r, stop_ns in zip(received, stops_ns, strict=True)
+            for f in self.unit_factors
+        ]
 
     def _evidence(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, Any]:
         return {
@@ -178,3 +220,7 @@ class LogsValues:
     def _mostly(self, heard: Sequence[Heard], factor: float, coarsest: float) -> bool:
         hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
         return hits > 0.8 * len(heard)
+
+
+def _shows(value: float, largest: float, printed: Printed) -> bool:
+    return shows_about(printed, value, coarsest=_FINE * largest)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from grader.judging.attribution import Sought, crowd, followed, standing
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records
-from grader.judging.positions.numbers import Printed, clean, printed_numbers, with_decimal_points
+from grader.judging.positions.numbers import Printed
 from grader.judging.randomness import pattern_of
 from grader.judging.silence import (
     explain_no_message,
@@ -24,7 +26,7 @@ from grader.judging.wording import counted, fault_sentence, moment, number, numb
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds
-from grader.model.trace import Endpoint, LogRecord, OutputLine, Trace
+from grader.model.trace import Endpoint, Trace
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5
@@ -120,7 +122,8 @@ class RandomInRange:
 class LogsReceived:
     """A process logs the numbers that are published to it, each at least once while it lasts or up to a second later.
 
-    Numbers count to the precision printed. Values that are printed instead of logged are half of it.
+    Numbers count to the precision printed. One that stands among so many others that chance explains it shows nothing:
+    a place in the text must follow the values. Values that are printed instead of logged are half of it.
 
     Attributes:
         process: File name of the student process.
@@ -139,19 +142,38 @@ class LogsReceived:
             return explain_no_subscription(trace, self.topic)
         if not values or (subscriptions and not any(carries_number(e.type) for e in subscriptions)):
             return self._no_values(trace, subscriptions)
+        return self._judged(trace, values, subscriptions)
+
+    def _judged(self, trace: Trace, values: Sequence[Held], subscriptions: Sequence[Endpoint]) -> Finding:
+        fault = first_fault(trace, self.process)
         records = student_records(trace, self.process)
-        unlogged = self._missing(values, records, trace)
+        sought = self._sought(values, trace)
+        unlogged = _missing(values, followed(records, sought), trace)
         evidence: dict[str, Any] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
         if not unlogged:
             reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
-        if not self._missing(values, [*records, *printed_lines(trace, self.process)], trace):
+        if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
             reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
             return partly(reason, evidence, hint=_PRINT_HINT)
+        absent = _missing(values, standing(records, sought), trace)
+        evidence["missing"] = [v.value for v in absent or unlogged]
         if fault is not None:
-            reason = f"{fault_sentence(fault)}; {len(unlogged)} of {len(values)} values of {self.topic} were not logged"
-            return not_met(reason, evidence, hint=fault_hint(fault), fault=fault)
-        return self._unlogged(subscriptions, values, unlogged, evidence)
+            lost = f"{len(absent or unlogged)} of {len(values)} values of {self.topic} were not logged"
+            return not_met(f"{fault_sentence(fault)}; {lost}", evidence, hint=fault_hint(fault), fault=fault)
+        if absent:
+            return self._unlogged(subscriptions, values, absent, evidence)
+        among = crowd(records, sought[values.index(unlogged[0])])
+        return self._hidden(values, unlogged, among, evidence)
+
+    def _hidden(
+        self, values: Sequence[Held], unlogged: Sequence[Held], among: str, evidence: dict[str, Any]
+    ) -> Finding:
+        first = unlogged[0]
+        reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are not told from other "
+        reason += f"numbers, the first is {number(first.value)} at {moment(first.start_ns)}: {among}"
+        hint = f"log the number that came on {self.topic}, and none that it might have been"
+        return not_met(reason, evidence, hint=hint)
 
     def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
         types = [e.type for e in subscriptions]
@@ -163,19 +185,13 @@ class LogsReceived:
             raise HarnessError(f"{self.topic}: no number was published on it")
         return not_met(f"{fault_sentence(fault)}; nothing was logged after it", hint=fault_hint(fault), fault=fault)
 
-    def _missing(self, values: Sequence[Held], outputs: Iterable[LogRecord | OutputLine], trace: Trace) -> list[Held]:
-        outputs = tuple(outputs)
-        read = {text: _numbers_in(text) for text in {o.text for o in outputs}}
-        shown = [(o.t_ns, read[o.text]) for o in outputs]
-        missing = []
-        for value in values:
-            stop_ns = value.stop_ns + (_LATE_NS if value.stop_ns < trace.stop_ns else 1)
-            logged = any(
-                value.start_ns <= t_ns < stop_ns and any(n.shows(value.value) for n in found) for t_ns, found in shown
-            )
-            if not logged and trace.stop_ns - value.start_ns >= _SHORTEST_NS:
-                missing.append(value)
-        return missing
+    def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
+        scale = max(abs(v.value) for v in values)
+        stops = [v.stop_ns + (_LATE_NS if v.stop_ns < trace.stop_ns else 1) for v in values]
+        return [
+            Sought(v.start_ns, stop_ns, v.value, scale, partial(_shows, v.value))
+            for v, stop_ns in zip(values, stops, strict=True)
+        ]
 
     def _unlogged(
         self,
@@ -198,7 +214,10 @@ class LogsReceived:
         return not_met(reason, evidence, hint=hint)
 
 
-def _numbers_in(text: str) -> tuple[Printed, ...]:
-    body = clean(text)
-    other = with_decimal_points(body)
-    return printed_numbers(body) + (printed_numbers(other) if other else ())
+def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
+    """Return the values that are not logged, but for one that came so late that it need not be."""
+    return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
+
+
+def _shows(value: float, printed: Printed) -> bool:
+    return printed.shows(value)
