@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from grader.model.trace import LogRecord, OutputLine, Trace
+from grader.judging.silence import AT_ONCE_NS, first_fault
+from grader.model.trace import FaultKind, LogRecord, OutputLine, Trace
 
 #: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
@@ -51,13 +52,30 @@ def _printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     lines = [o for o in lines if o.stream != "stderr" or not any(" ".join(o.text.split()) in f for f in faults)]
     outs = [o for o in lines if o.stream != "stderr"]
     errs = _without_interpreter_noise([o for o in lines if o.stream == "stderr"])
-    kept = {id(o) for o in [*outs, *errs]}
+    kept = {id(o) for o in [*_without_prompt(trace, process, outs), *errs]}
     return tuple(o for o in lines if id(o) in kept)
+
+
+def is_no_node(trace: Trace, process: str) -> bool:
+    """Return whether a process had no node in the graph; one that logged and ended at once may have had one unseen."""
+    seen = {node for graph in trace.graphs() for node in graph.nodes}
+    others = {f"/{r.logger.replace('.', '/')}" for r in trace.records() if r.process != process}
+    if not trace.graphs() or seen - others:
+        return False
+    fault = first_fault(trace, process)
+    return not (fault is not None and fault.t_ns < AT_ONCE_NS and student_records(trace, process))
 
 
 def written(trace: Trace, process: str) -> tuple[LogRecord | OutputLine, ...]:
     """Return the records of a process, then the lines that it printed."""
     return (*student_records(trace, process), *printed_lines(trace, process))
+
+
+def _without_prompt(trace: Trace, process: str, lines: list[OutputLine]) -> list[OutputLine]:
+    """Return the lines without the prompt of an `input()` at which the process ended: there is no keyboard."""
+    ends = [f for f in trace.faults(process) if f.kind is FaultKind.EXCEPTION and f.text.startswith("EOFError")]
+    prompt = next((o for o in reversed(lines) if ends and o.t_ns <= ends[0].t_ns), None)
+    return [o for o in lines if o is not prompt]
 
 
 def _without_interpreter_noise(lines: Iterable[OutputLine]) -> list[OutputLine]:

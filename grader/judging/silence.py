@@ -23,7 +23,7 @@ _URGENCY = {
 _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end of main()"
 _RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
 #: An exit up to here is one of a node that never waited for anything.
-_AT_ONCE_NS = NS_PER_S
+AT_ONCE_NS = NS_PER_S
 
 
 def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
@@ -43,7 +43,7 @@ def fault_hint(fault: Fault) -> str:
     """Return what to do about a fault where that is plain; empty otherwise."""
     if fault.kind is not FaultKind.EXITED or not fault.text.rstrip(".").endswith("code 0"):
         return ""
-    return _SPIN_HINT if fault.t_ns < _AT_ONCE_NS else _RUN_ON_HINT
+    return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
 
 
 def student_endpoints(trace: Trace, kind: str | None = None) -> tuple[Endpoint, ...]:

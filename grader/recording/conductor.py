@@ -82,6 +82,7 @@ class Conductor:
         self._run_on()
         if not any(s.ended for s in self._students):
             self._matching.look(self._now_ns)  # what has ended disappears from the graph at a moment that is nobody's
+        self._tape.look_back(self._now_ns)
         self._stop_ns = self._end_ns
         why_not = self._why_not()
         if self._plan.shutdown_ns and not (why_not or self._tape.full):

@@ -113,6 +113,11 @@ class Tape:
             self.observations.append(graph)
         return not self.full
 
+    def look_back(self, t_ns: int) -> None:
+        """Take down that nothing was ever in the graph, if so: a trace without any snapshot says nothing about it."""
+        if not any(isinstance(o, GraphSnapshot) for o in self.observations):
+            self.observations.append(GraphSnapshot(t_ns, (), ()))
+
     def stop(self, t_ns: int, why: str) -> None:
         """End the recording at a limit, with a mark; the first limit counts."""
         if not self.full:

@@ -79,6 +79,7 @@ class WallConductor:
                 student.tell({"now_ns": 0, "free_until_ns": 0})
         self._run_on(0)
         self._look_at_graph(self._end_ns)
+        self._tape.look_back(self._end_ns)
         self._stop_ns = self._end_ns
         if self._plan.shutdown_ns and not self._tape.full:
             self._shut_down()

@@ -75,14 +75,17 @@ HONEST = {
     "timer 0.5 s, nearly a period behind": timed(right, 0.5, phase=0.4, lag=0.45),
     "timer 1 s": timed(right, 1.0),
     "timer 1 s, in step and behind": timed(right, 1.0, phase=0.5, lag=0.001),
-    "old and new at one instant": each(lambda v: 0.0 if v > 25 else 100.0).add(*each(right).trace().messages()),
+    "old and new at one instant": timed(right, 0.2, 0.5, 0.001).add(*each(right).trace().messages()),
+    "a state of its own at the first instant": scripted()
+    .number(0.5, "/fan_speed", 100.0)
+    .add(*each(right).trace().messages()),
     "says off before any temperature": each(right).number(0.1, "/fan_speed", 0.0),
 }
 
 
 @pytest.mark.parametrize("rec", HONEST.values(), ids=HONEST)
 def test_every_honest_way_of_answering_is_met(rec: Recording) -> None:
-    """Each temperature, on change, on timers up to a second, and what comes last at one instant."""
+    """Each temperature, on change, on timers up to a second, and a timer that still has the old one at that instant."""
     for finding in both(rec):
         assert finding.credit == 1, finding.reason
 
@@ -107,6 +110,34 @@ def test_every_wrong_rule_loses_the_side_it_gets_wrong(name: str, way: Callable[
     """Whatever the way of answering."""
     rule, expected = WRONG[name]
     assert earned(way(rule)) == expected
+
+
+def low_and_high(at_change_only: bool, last: float) -> Recording:
+    """Publishes 0 and 100 at each temperature, or at each new one, whatever it is."""
+    rec = scripted()
+    for k in range(80):
+        if k % 10 == 0 or not at_change_only:
+            rec.number(0.5 + 0.2 * k, "/fan_speed", 100.0 - last).number(0.5 + 0.2 * k, "/fan_speed", last)
+    return rec
+
+
+@pytest.mark.parametrize("last", [0.0, 100.0])
+@pytest.mark.parametrize("at_change_only", [True, False])
+def test_two_answers_at_one_instant_are_wrong_on_both_sides(at_change_only: bool, last: float) -> None:
+    """The last one is not right by luck; the reason names both."""
+    for finding in both(low_and_high(at_change_only, last)):
+        assert finding.credit == 0
+        assert "0 and 100 are published at one instant" in finding.reason
+        assert finding.hint == "publish one answer to each number on /temperature"
+
+
+def test_answers_that_alternate_are_wrong_on_both_sides() -> None:
+    """However close they come to each new temperature."""
+    rec = scripted()
+    for k in range(8):
+        for n in range(4):
+            rec.number(0.5 + 2 * k + 0.05 * n, "/fan_speed", 100.0 * (n % 2))
+    assert earned(rec) == (0, 0)
 
 
 def test_the_first_violation_is_named_with_its_temperature() -> None:

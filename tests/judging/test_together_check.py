@@ -241,3 +241,19 @@ def test_on_the_wall_clock_an_answer_may_be_seen_before_its_input():
     assert CHECK.judge(replace(each(delay=-0.02).trace(), clock=ClockKind.WALL)).credit == 1
     assert CHECK.judge(each(delay=-0.02).trace()).credit == 0
     assert CHECK.judge(replace(each(delay=-0.08).trace(), clock=ClockKind.WALL)).credit == 0
+
+
+@pytest.mark.parametrize("last", [0.0, 100.0])
+def test_two_answers_at_one_instant_are_contradictory(last: float) -> None:
+    """The last one is not right by luck."""
+    rec = each(lambda _v: 100.0 - last).add(*each(lambda _v: last).trace().messages("/fan_speed"))
+    finding = CHECK.judge(rec.trace())
+    assert finding.credit == 0
+    assert "0 and 100 at one instant" in finding.reason
+    assert finding.hint == "publish one answer to each number on /temperature"
+
+
+def test_a_timer_may_still_have_the_old_answer_at_the_instant_of_a_new_one() -> None:
+    """It belongs to the temperature before."""
+    rec = timed(period=0.2, phase=0.4).add(*each().trace().messages("/fan_speed"))
+    assert CHECK.judge(rec.trace()).credit == 1

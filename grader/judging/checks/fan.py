@@ -40,7 +40,8 @@ class _Violation:
 class ThresholdResponse:
     """A controller alone answers held inputs: one value above a threshold, another at or below it.
 
-    It may answer each input, publish on change only, or publish on a timer of up to a second.
+    It may answer each input, publish on change only, or publish on a timer of up to a second. After a new input the old
+    answer may still come for a while, but not once the new one is there, and no other.
 
     Attributes:
         input: Topic that the numbers are published on.
@@ -67,15 +68,16 @@ class ThresholdResponse:
         mine = [h for h in inputs if self._on_side(h.value)]
         if not mine:
             return self._nothing_asked(trace)
-        answers = last_of_instant(published_numbers(trace, self.output))
+        every = published_numbers(trace, self.output)
+        answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
             return self._once(not_met(f"{self.output}: {quote(type_)} carries no number", {"type": type_}))
         grace_ns = _grace(answers)
-        violations = [v for v in (self._violation(h, answers, trace, grace_ns) for h in mine) if v is not None]
+        violations = [v for v in (self._violation(h, every, trace, grace_ns) for h in mine) if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
-            return self._violated(trace, violations, inputs, answers, evidence)
+            return self._violated(trace, violations, inputs, every, evidence)
         side = "above" if self.side == "above" else "at or below"
         reason = (
             f"{self.output}: {number(self._expected(mine[0].value))} for each of {counted(len(mine), 'value')} {side} "
@@ -106,12 +108,23 @@ class ThresholdResponse:
             return None  # the observation ended before an answer was due
         before = [a for a in answers if a.t_ns < asked.start_ns]
         if during:
-            last = during[-1]
-            return None if self._right(last.value, asked.value) else _Violation(last.t_ns, asked, last.value)
-        if not before or _repeats(answers) or any(f.t_ns <= asked.start_ns for f in trace.faults()):
+            bad = self._unsettled(asked, during, before)
+            return None if bad is None else _Violation(bad.t_ns, asked, bad.value)
+        if not before or _repeats(last_of_instant(answers)) or any(f.t_ns <= asked.start_ns for f in trace.faults()):
             return _Violation(asked.start_ns, asked, None)
         carried = before[-1].value
         return None if self._right(carried, asked.value) else _Violation(asked.start_ns, asked, carried)
+
+    def _unsettled(self, asked: Held, during: Sequence[Reading], before: Sequence[Reading]) -> Reading | None:
+        """Return the first answer that is neither the old one, as long as no new one has come, nor right for good."""
+        old = (before or during)[-1 if before else 0].value
+        came = False
+        for answer in during:
+            if self._right(answer.value, asked.value):
+                came = True
+            elif came or not within(answer.value, old, _EXACT):
+                return answer
+        return None if came else during[-1]
 
     def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, Any]:
         rows = []
@@ -126,10 +139,11 @@ class ThresholdResponse:
         trace: Trace,
         violations: Sequence[_Violation],
         inputs: Sequence[Held],
-        answers: Sequence[Reading],
+        every: Sequence[Reading],
         evidence: dict[str, Any],
     ) -> Finding:
         first = violations[0]
+        answers = last_of_instant(every)
         unit = unit_of(self.input)
         wanted = number(self._expected(first.held.value))
         found = "no answer" if first.got is None else number(first.got)
@@ -138,6 +152,11 @@ class ThresholdResponse:
         fault = first_fault(trace)
         if fault is not None and first.got is None:
             return not_met(f"{reason}; {fault_sentence(fault)}", evidence, hint=fault_hint(fault), fault=fault)
+        both = {a.value for a in every if a.t_ns == first.t_ns and first.got is not None}
+        if len(both) > 1:
+            said = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
+            hint = f"publish one answer to each number on {self.input}"
+            return not_met(reason + said, evidence, hint=hint)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             said = f"; the answers are right for what was published {span(lag)} before"

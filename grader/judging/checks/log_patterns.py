@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from grader.judging.checks.logs import LOGGER_HINT
+from grader.judging.checks.logs import LOGGER_HINT, no_node
 from grader.judging.findings import met, not_met, partly
-from grader.judging.output import printed_lines, student_records
+from grader.judging.output import is_no_node, printed_lines, student_records
 from grader.judging.printed import Output
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, listed, moment, number, quote
@@ -63,11 +63,17 @@ class LogsMatching:
         mine = [r for r in records if self._of_level(r) and self._matches(r)]
         flaw = self._flaw(mine)
         evidence = self._evidence(mine)
+        if mine and is_no_node(trace, self.process):
+            return no_node(trace, self.process, evidence)
         if not flaw:
             first = f", the first at {moment(mine[0].t_ns)}: {quote(mine[0].text, 80)}" if mine else ""
             return met(f"{self.process}: {counted(len(mine), 'record')}{first}", evidence)
         lines = [o for o in printed_lines(trace, self.process) if self._matches(o)]
-        if lines and not self._flaw(sorted([*mine, *lines], key=lambda o: o.t_ns)):
+        if (
+            lines
+            and not is_no_node(trace, self.process)
+            and not self._flaw(sorted([*mine, *lines], key=lambda o: o.t_ns))
+        ):
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, {counted(len(mine), 'record')} logged"
             return partly(f"{reason}; expected {self.expected}", evidence, hint=LOGGER_HINT)
         reason = f"{self.process}: {flaw}; expected {self.expected}"

@@ -76,7 +76,8 @@ class AnswersTogether:
         answers = last_of_instant(published_numbers(trace, self.output))
         evidence = self._evidence(inputs, answers)
         return (
-            self._wrong_answer(trace, inputs, answers, evidence)
+            self._contradictory(trace, inputs, evidence)
+            or self._wrong_answer(trace, inputs, answers, evidence)
             or self._stopped_sensor(trace, inputs, evidence)
             or self._stopped_controller(trace, inputs, answers, evidence)
             or self._one_sided(inputs, answers, evidence)
@@ -102,6 +103,23 @@ class AnswersTogether:
         if apart is not None and first_fault(trace) is None:
             return apart
         return explain_no_message(trace, topic)
+
+    def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
+        """Return that different answers come at one instant where no input of the moment explains both."""
+        times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
+        for one, following in pairwise(published_numbers(trace, self.output)):
+            recent = _recent(inputs, times, one.t_ns, jitter_ns)
+            # at the instant of the very first input a timer may still have spoken before it
+            if one.t_ns != following.t_ns or one.value == following.value or not recent or one.t_ns == times[0]:
+                continue
+            if any(within(one.value, self._expected(r.value), _EXACT) for r in recent):
+                continue
+            both = " and ".join(map(number, sorted((one.value, following.value))))
+            said = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
+            said += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
+            hint = f"publish one answer to each number on {self.input}"
+            return not_met(said, evidence | {"first_wrong_s": seconds(one.t_ns)}, hint=hint)
+        return None
 
     def _wrong_answer(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
