@@ -1,40 +1,71 @@
-"""Runs a student's file as its author would: as a script, as a module of its package, or through its main function."""
+"""Runs a student's file as a ROS user would: as a script, or as a module of its package."""
 
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import os
-import runpy
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from types import ModuleType
 from typing import Any
 
-Say = Callable[[str], None]
+from .packages import MAIN, MODULE, NAMELESS, SCRIPT, Layout, calls, layout_of, never_true, package_folders, start_of
+from .shadows import Shadows
+
+#: Takes a code and what belongs to it: `started`, and what the report has to mention.
+Say = Callable[[dict[str, Any]], None]
 
 
-def run_file(root: str, file: str, say: Say) -> None:
+def path_of(root: str, file: str) -> list[str]:
+    """Return the folders that come first on the path: the script's own, or those that hold packages."""
+    layout = layout_of(root, file)
+    if not layout.module:
+        return [os.path.dirname(os.path.join(root, file))]
+    return list(dict.fromkeys(f for f in (layout.base, *package_folders(root)) if f))
+
+
+def shadows_of(root: str, file: str) -> Shadows:
+    """Return which modules of a submission hide others from one of its files."""
+    return Shadows(path_of(root, file))
+
+
+def run_file(root: str, file: str, say: Say, install_ros: Callable[[], None]) -> None:
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
         root: The submission's folder.
         file: The file, relative to it.
-        say: Takes a sentence that the report has to mention.
+        say: Hears how the file is started, before anything of it runs, and what the report has to mention.
+        install_ros: Called when the program has imported rclpy, if a module of the submission hides another.
     """
     path = os.path.join(root, file)
     tree = _parse(path)  # a syntax error is raised before anything has run
-    package, folder = _package(path, root)
-    warn_of_shadows(os.path.dirname(path), say)
-    for directory in dict.fromkeys((os.path.dirname(path), folder)):
-        sys.path.append(directory)
+    layout = layout_of(root, file)
+    start = start_of(root, file, layout, tree)
+    shadows = shadows_of(root, file)
+    how = {"way": start.way, "module": start.module, "function": start.function}
+    say({"code": "started", **how, "hidden": shadows.files})
+    if shadows.files:
+        shadows.fall(install_ros)
+    sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(root, file))) if f]
+    if layout.module:
+        _find_neighbours(tree, path, say)
     sys.argv = [path]
-    sys.modules.pop("__main__", None)
-    module = os.path.splitext(os.path.basename(path))[0]
-    if _imports_relatively(tree):
-        namespace = runpy.run_module(f"{package}.{module}", run_name="__main__", alter_sys=True)
-    else:
-        namespace = _run_as_main(path)
-    run_what_nothing_called(namespace, tree, file, say)
+    if start.way in (SCRIPT, MODULE):
+        run_what_nothing_called(_run_as_main(path, start.module, layout), tree, say)
+        return
+    main = sys.modules["__main__"] = ModuleType("__main__")  # the console script that calls the module
+    main.__file__ = path
+    _make_nameless(path, layout)
+    called: Any = importlib.import_module(start.module)
+    for name in start.function.split("."):
+        called = getattr(called, name)
+    result = called()
+    if start.way != MAIN:
+        sys.exit(result)
 
 
 def _parse(path: str) -> ast.Module:
@@ -46,95 +77,97 @@ def _parse(path: str) -> ast.Module:
     return ast.parse(text, path)
 
 
-def _run_as_main(path: str) -> dict[str, Any]:
-    """Run a file as `__main__` and keep its module alive, as the interpreter does."""
-    spec = importlib.util.spec_from_loader("__main__", loader=None)
-    if spec is None:
-        raise ImportError(path)
-    module = importlib.util.module_from_spec(spec)
+def _run_as_main(path: str, name: str, layout: Layout) -> dict[str, Any]:
+    """Run a file as `__main__` and keep its module alive, as the interpreter does.
+
+    Args:
+        path: The file.
+        name: Its dotted name, if it is run as a module of its package.
+        layout: Where it lies.
+    """
+    module = ModuleType("__main__")
     module.__file__ = path
+    module.__loader__ = SourceFileLoader("__main__", path)
     module.__spec__ = None
+    module.__dict__["__builtins__"] = sys.modules["builtins"]
+    module.__dict__["__cached__"] = None
     sys.modules["__main__"] = module
+    package = name.rpartition(".")[0]
+    if name:
+        _make_nameless(path, layout)
+        if package:
+            importlib.import_module(package)
+        module.__package__ = package
+        module.__spec__ = ModuleSpec(name, module.__loader__, origin=path)
     with open(path, "rb") as source:
         code = compile(source.read(), path, "exec", dont_inherit=True)
     exec(code, module.__dict__)  # noqa: S102 - running the student's file is what the host is for
     return module.__dict__
 
 
-def _package(path: str, root: str) -> tuple[str, str]:
-    """Return the dotted package a file lies in, and the folder that must be on the path for it."""
-    folder = os.path.dirname(path)
-    names = [os.path.basename(folder)]
-    folder = os.path.dirname(folder)
-    while folder.startswith(root) and os.path.exists(os.path.join(folder, "__init__.py")):
-        names.insert(0, os.path.basename(folder))
+def _make_nameless(path: str, layout: Layout) -> None:
+    """Make the package whose own folder is all that was handed in: no folder on the path holds it."""
+    parts = layout.module.split(".")
+    if layout.base or parts[0] != NAMELESS:
+        return
+    folder = path
+    for _ in parts[1:]:
         folder = os.path.dirname(folder)
-    return ".".join(names), folder
+    init = os.path.join(folder, "__init__.py")
+    spec = importlib.util.spec_from_file_location(NAMELESS, init, submodule_search_locations=[folder])
+    if spec is not None and spec.loader is not None:
+        package = sys.modules[NAMELESS] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(package)
 
 
-def _imports_relatively(tree: ast.Module) -> bool:
-    return any(isinstance(node, ast.ImportFrom) and node.level > 0 for node in ast.walk(tree))
+def _find_neighbours(tree: ast.Module, path: str, say: Say) -> None:
+    """Let a file in a package import what lies beside it by its plain name, which `ros2 run` would not find."""
+    folder = os.path.dirname(path)
+    if folder in sys.path:
+        return
+    for name in sorted(_plain_imports(tree)):
+        beside = os.path.isfile(os.path.join(folder, f"{name}.py"))
+        if beside and name not in sys.modules and PathFinder.find_spec(name) is None:
+            say({"code": "neighbour_imported", "module": name})
+    sys.path.append(folder)
 
 
-def warn_of_shadows(folder: str, say: Say) -> None:
-    """Mention modules of the student's that hide a module that Python or ROS needs."""
-    for name in sorted(os.listdir(folder)):
-        module, extension = os.path.splitext(name)
-        if extension == ".py" and (module in sys.stdlib_module_names or module in ROS_MODULES):
-            shadows = f"{name} has the name of a module that Python or ROS needs"
-            say(f"{shadows}: `python3` would import it instead; rename it")
+def _plain_imports(tree: ast.Module) -> set[str]:
+    names = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+    names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.level == 0 and n.module}
+    return {name.partition(".")[0] for name in names}
 
 
-def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, file: str, say: Say) -> None:
+def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, say: Say) -> None:
     """Start what a file defines but never starts: its `main`, or its only node class."""
-    from . import ros
-
-    if ros.MADE_NODES:
+    ros = sys.modules.get(f"{__package__}.ros")
+    if ros is None or ros.MADE_NODES:
         return
     main = namespace.get("main")
-    if callable(main) and not _calls_at_top_level(tree, "main"):
-        say(
-            f"{file}: nothing calls main(), so `python3 {file}` would do nothing; "
-            "add: if __name__ == '__main__': main()"
-        )
+    if callable(main) and not _calls_at_top_level(tree.body, "main"):
+        say({"code": "main_not_called"})
         main()
         return
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
-        say(
-            f"{file}: nothing starts {nodes[0].__name__}, so `python3 {file}` would do nothing; "
-            "add a main() that calls rclpy.init(), makes the node and spins it"
-        )
+        say({"code": "class_not_started", "class": nodes[0].__name__})
         spin(nodes[0])
 
 
-def _calls_at_top_level(tree: ast.Module, name: str) -> bool:
+def _calls_at_top_level(statements: Sequence[ast.stmt], name: str) -> bool:
     """Return whether a statement that runs when the file is run as a script calls a name."""
-    return any(
-        isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == name
-        for statement in tree.body
-        if not isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef))
-        and not _never_true(statement)
-        for node in ast.walk(statement)
-    )
-
-
-def _never_true(statement: ast.stmt) -> bool:
-    """Return whether a statement is a guard on `__name__` that does not hold, such as a misspelt one."""
-    if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
-        return False
-    names = {node.id for node in ast.walk(statement.test) if isinstance(node, ast.Name)}
-    texts = {node.value for node in ast.walk(statement.test) if isinstance(node, ast.Constant)}
-    return "__name__" in texts or ("__name__" in names and "__main__" not in texts)
+    return calls([statement for statement in statements if not never_true(statement)], name)
 
 
 def _node_classes(namespace: dict[str, Any]) -> list[Any]:
-    from rclpy.node import Node
-
+    node = getattr(sys.modules.get("rclpy.node"), "Node", None)
     return [
         value
         for value in namespace.values()
-        if isinstance(value, type) and issubclass(value, Node) and value.__module__ == "__main__"
+        if isinstance(value, type)
+        and node is not None
+        and issubclass(value, node)
+        and value.__module__ == namespace["__name__"]
     ]
 
 
@@ -145,25 +178,3 @@ def spin(node_class: Any) -> None:
     if not rclpy.ok():
         rclpy.init()
     rclpy.spin(node_class())
-
-
-#: Modules of ROS that a student's file name may hide.
-ROS_MODULES = frozenset(
-    {
-        "rclpy",
-        "std_msgs",
-        "geometry_msgs",
-        "nav_msgs",
-        "sensor_msgs",
-        "std_srvs",
-        "example_interfaces",
-        "numpy",
-        "yaml",
-        "rcl_interfaces",
-        "builtin_interfaces",
-        "rosidl_parser",
-        "rosgraph_msgs",
-        "em",
-        "lark",
-    }
-)

@@ -35,33 +35,35 @@ class Describer:
         if isinstance(error, SyntaxError) and self._inside(error.filename or ""):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
-        return {"kind": "exception", "text": self.one_line(error), **self._place(frames)}
+        kind = _name_of(type(error))
+        said = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
+        return {"code": "exception", "type": kind, "message": _behind(kind, said), **self._place(frames)}
 
     def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
         """Return a file that cannot be compiled as a fault."""
-        version = ".".join(map(str, sys.version_info[:2]))
-        text = f"{type(error).__name__}: {error.msg} (read by Python {version})"
         file = os.path.realpath(error.filename or "")
         return {
-            "kind": "syntax_error",
-            "text": text,
+            "code": "syntax_error",
+            "type": type(error).__name__,
+            "message": str(error.msg)[:TEXT_CHARACTERS],
+            "python": list(sys.version_info[:2]),
             "file": self._relative(file),
             "line": error.lineno or 0,
             "frames": [],
         }
 
-    def stack(self, frame: FrameType | None, kind: str, text: str) -> dict[str, Any]:
+    def stack(self, frame: FrameType | None, code: str) -> dict[str, Any]:
         """Return where a thread stands as a fault."""
         frames = []
         while frame is not None:
             frames.append((frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name))
             frame = frame.f_back
-        return {"kind": kind, "text": text, **self._place(frames[::-1])}
+        return {"code": code, **self._place(frames[::-1])}
 
     def _place(self, frames: list[tuple[str, int, str]]) -> dict[str, Any]:
         own = [(self._relative(file), line, name) for file, line, name in frames if self._inside(file)]
         file, line, _ = own[-1] if own else ("", 0, "")
-        return {"file": file, "line": line, "frames": [f"{f}:{n} in {name}" for f, n, name in own][-20:]}
+        return {"file": file, "line": line, "frames": own[-20:]}
 
     def _inside(self, file: str) -> bool:
         return os.path.realpath(file).startswith(self._root)
@@ -91,6 +93,18 @@ class Describer:
             if folder in text:
                 text = re.sub(rf"{re.escape(folder)}(?:/[^{_NO_PATH}]*)?", lambda f: os.path.basename(f[0]), text)
         return text
+
+
+def _name_of(kind: type[BaseException]) -> str:
+    """Return the name of an exception's class as tracebacks write it."""
+    module = getattr(kind, "__module__", None)
+    known = not isinstance(module, str) or module in ("__main__", "builtins")
+    return kind.__qualname__ if known else f"{module}.{kind.__qualname__}"
+
+
+def _behind(kind: str, line: str) -> str:
+    """Return what an exception says, without the name of its class in front."""
+    return "" if line == kind else line.removeprefix(f"{kind}: ")
 
 
 def _machine_folders() -> list[str]:

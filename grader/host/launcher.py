@@ -28,5 +28,5 @@ def load_package() -> Any:
 
 if __name__ == "__main__":
     request = json.loads(sys.argv[1])
-    sys.path[:0] = request.get("python_paths", [])
+    sys.path[:1] = request.get("python_paths", [])  # in place of this file's own folder
     load_package().run(request)

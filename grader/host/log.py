@@ -9,24 +9,33 @@ from . import originals
 _VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 
 
-def open_log(log_format: str) -> str:
-    """Have the logging library begin each record with a token, and return the token.
-
-    The library reads its environment once, here. The variable is gone before the student's program begins: neither this
-    process nor its children can read it.
+class Log:
+    """The logging library of this process, whose records begin with a token.
 
     Args:
         log_format: How records are written; `{token}` stands for the token.
-    """
-    import rclpy.logging
-    from rclpy.impl.implementation_singleton import rclpy_implementation
 
-    token = originals.urandom(16).hex()
-    os.putenv(_VARIABLE, log_format.replace("{token}", token))
-    try:
-        rclpy.logging.initialize()
-    finally:
-        os.unsetenv(_VARIABLE)
-    # Logging goes on after it is shut down, but would read the environment anew.
-    rclpy_implementation.rclpy_logging_shutdown = lambda: None
-    return token
+    Attributes:
+        token: Drawn anew for each process; empty once the library has it.
+    """
+
+    def __init__(self, log_format: str) -> None:
+        self.token = originals.urandom(16).hex()
+        self._format = log_format
+
+    def open(self) -> None:
+        """Have the library read the format, once.
+
+        The variable is gone again afterwards: neither the student's program nor its children can read it.
+        """
+        import rclpy.logging
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+
+        os.putenv(_VARIABLE, self._format.replace("{token}", self.token))
+        try:
+            rclpy.logging.initialize()
+        finally:
+            os.unsetenv(_VARIABLE)
+            self.token = ""
+        # Logging goes on after it is shut down, but would read the environment anew.
+        rclpy_implementation.rclpy_logging_shutdown = lambda: None

@@ -11,12 +11,13 @@ import random
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from . import entry, originals
 from .faults import Describer
 from .link import Link
-from .log import open_log
+from .log import Log
 from .outside import install_alarms, install_processes
 from .stand_ins import install_stand_ins
 from .virtual import VirtualTime
@@ -36,14 +37,21 @@ def run(request: dict[str, Any]) -> None:
     describer = Describer(request["root"])
     die_with_parent()
     time = make_time(request["clock"], link, describer)
-    time.install_ros()
-    token = open_log(request["log_format"])
-    preload(os.path.join(request["root"], request["file"]))
+    log = Log(request["log_format"])
+    ready = {"kind": "ready", "log_token": log.token}
+
+    def install_ros() -> None:
+        time.install_ros()
+        log.open()
+
+    if not entry.shadows_of(request["root"], request["file"]).files:  # otherwise when the program imports it
+        install_ros()
+        preload(os.path.join(request["root"], request["file"]))
     install_stand_ins()
     seed_randomness(request["seed"])
     os.register_at_fork(after_in_child=link.cut if request["clock"] == "wall" else lambda: originals.exit_now(70))
-    start = link.ask({"kind": "ready", "log_token": token})
-    del token
+    start = link.ask(ready)
+    ready.clear()
     time.start(start["now_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
@@ -51,7 +59,7 @@ def run(request: dict[str, Any]) -> None:
         install_alarms(watchdog.give_up_on_alarms)
         install_processes(watchdog.give_up_on_processes)
         time.give_up_outside = watchdog.give_up_on_waiting
-    ending = play(request, describer, link)
+    ending = play(request, describer, link, install_ros)
     if watchdog is not None:
         watchdog.stop()
     left = time.end()
@@ -64,7 +72,7 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
     """Return the clock that a scenario is to run on."""
 
     def report_fault(error: BaseException) -> None:
-        link.send({"kind": "fault", **describer.exception(error)})
+        link.send({"kind": "fault", "fault": describer.exception(error)})
 
     if clock == "virtual":
         return VirtualTime(link, report_fault)
@@ -85,11 +93,11 @@ def die_with_parent() -> None:
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, linux/prctl.h
 
 
-def play(request: dict[str, Any], describer: Describer, link: Link) -> dict[str, Any]:
+def play(request: dict[str, Any], describer: Describer, link: Link, install_ros: Callable[[], None]) -> dict[str, Any]:
     """Run the file and the end of the interpreter, and return how it ended: `code` and perhaps `fault`."""
     ending: dict[str, Any] = {"code": 0}
     try:
-        entry.run_file(request["root"], request["file"], lambda text: link.send({"kind": "note", "text": text}))
+        entry.run_file(request["root"], request["file"], lambda said: link.send({"kind": "note", **said}), install_ros)
     except SystemExit as leaving:
         ending["code"] = exit_code(leaving)
     except KeyboardInterrupt:

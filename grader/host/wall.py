@@ -9,17 +9,13 @@ import signal
 import weakref
 from typing import Any
 
-import rclpy.publisher
-from rclpy.duration import Duration
-
-from . import originals, ros
-from .ledger import BACKGROUND
+from . import originals
 from .link import Link
 
 #: How long, in real time, a new publisher waits for its first subscription before its first message.
 MATCH_S = 2.0
 #: How long, in real time, what a publisher has sent may take to arrive before the publisher goes.
-ACKNOWLEDGED = Duration(seconds=0.5)
+ACKNOWLEDGED_S = 0.5
 
 
 class WallTime:
@@ -32,11 +28,19 @@ class WallTime:
     def __init__(self, link: Link) -> None:
         self._link = link
         self._publishing: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._patience: Any = None
 
     def install_ros(self) -> None:
         """Let every publisher find a subscription before its first message; in a running system it would have one."""
+        import rclpy.publisher
+        from rclpy.duration import Duration
+
+        from . import ros
+        from .ledger import BACKGROUND
+
         publish, destroy = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.destroy
         matched = self._publishing
+        self._patience = Duration(seconds=ACKNOWLEDGED_S)
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
@@ -61,7 +65,7 @@ class WallTime:
         """Let what was published arrive before its publisher goes, which would take it along otherwise."""
         for publisher in list(self._publishing):
             with contextlib.suppress(Exception):  # it has been destroyed, or its context has been shut down
-                publisher.wait_for_all_acked(ACKNOWLEDGED)
+                publisher.wait_for_all_acked(self._patience)
 
     def end(self) -> bool:
         """Let what was published arrive; the process leaves the graph with its end."""

@@ -55,12 +55,12 @@ class Watchdog:
             limit_s = self._wake_up_cpu_s if self._time.has_blocked else self._start_cpu_s
             if used - self._time.resumed_ns > limit_s * NS_PER_S:
                 unsettled = "threads" if self._time.scheduler.has_others() else ""
-                self._give_up(f"did not return within {limit_s:g} s of processor time", unsettled)
+                self._give_up("wake_up_limit" if self._time.has_blocked else "start_limit", unsettled)
             idle = used - used_before < INTERVAL_S * NS_PER_S / 20 and self._sleeps()
             blocked_s = blocked_s + INTERVAL_S if idle else 0.0
             used_before = used
             if blocked_s > self._blocked_s:
-                self._give_up(f"waited {self._blocked_s:g} s for something outside the ROS graph", "outside")
+                self._give_up("blocked", "outside")
 
     def _sleeps(self) -> bool:
         """Return whether the thread that should run is asleep in the system, rather than waiting for a processor."""
@@ -73,22 +73,22 @@ class Watchdog:
 
     def give_up_on_alarms(self) -> None:
         """End the process, because it is about to be woken by alarms, which know no virtual time."""
-        self._give_up("sets an alarm that rings in real time", "outside")
+        self._give_up("alarm", "outside")
 
     def give_up_on_processes(self) -> None:
         """End the process, because it is about to start another one, which knows no virtual time."""
-        self._give_up("starts another process, which runs in real time", "outside")
+        self._give_up("process", "outside")
 
     def give_up_on_waiting(self) -> None:
         """End the process, because it is about to wait for somebody outside of the ROS graph."""
-        self._give_up("waits for something outside the ROS graph", "outside")
+        self._give_up("waiting", "outside")
 
-    def _give_up(self, text: str, unsettled: str) -> None:
-        """End the process; `unsettled` says why the real clock may do the program more justice."""
+    def _give_up(self, code: str, unsettled: str) -> None:
+        """End the process; `code` says why, `unsettled` why the real clock may do the program more justice."""
         if self._stopped or not self._time.running:
             return
         frame = sys._current_frames().get(self._time.scheduler.running_thread() or -1)
-        fault: dict[str, Any] = self._describer.stack(frame, "hung", text)
+        fault: dict[str, Any] = self._describer.stack(frame, code)
         report = {"kind": "exited", "code": None, "fault": fault, "unsettled": unsettled}
         self._link.send({**report, **self._time.summary()})
         originals.exit_now(70)

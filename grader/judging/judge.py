@@ -12,7 +12,7 @@ from grader.judging.verdicts import Bench
 from grader.model.exercise import Exercise
 from grader.model.report import ExerciseReport, ReportedFault, Verdict
 from grader.model.submission import Submission
-from grader.model.trace import ClockKind, Fault, GraphSnapshot, Trace
+from grader.model.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
 from grader.model.variant import variant_notes
 
 
@@ -52,6 +52,7 @@ def judge_exercise(
         feedback={c.id: c.feedback for c in exercise.criteria},
         situations={c.id: c.scenario for c in exercise.criteria},
         variant=exercise.variant,
+        starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
     )
 
 
@@ -68,8 +69,14 @@ def _explained(
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    notes = tuple(dict.fromkeys(note for _, t in recorded for note in t.notes))
+    said = (note for _, t in recorded for note in (*started(t), *t.notes))
+    notes = tuple(dict.fromkeys(said))
     return notes if sources is None else placed(notes, submission, sources)
+
+
+def started(trace: Trace) -> tuple[str, ...]:
+    """Return which files were started in another way than `python3 FILE`, and in which."""
+    return tuple(f"{s.file}: run {s.words}" for s in trace.starts if s.way is not StartWay.SCRIPT)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:

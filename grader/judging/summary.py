@@ -8,6 +8,7 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from grader.judging.judge import started
 from grader.model.quantities import NS_PER_S, seconds
 from grader.model.summary import Pace, Summary, TopicSummary
 from grader.model.trace import Message, Offer, Trace
@@ -34,7 +35,8 @@ def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary
         records=trace.records(),
         lines=trace.lines(),
         faults=trace.faults(),
-        notes=trace.notes,
+        notes=(*started(trace), *trace.notes),
+        starts=trace.starts,
         graph=max(graphs, key=lambda g: len(g.endpoints), default=None),
         isolation=isolation,
     )

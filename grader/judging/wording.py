@@ -79,7 +79,17 @@ def fault_sentence(fault: Fault) -> str:
         tail = tail.removeprefix("exited") if tail.startswith("exited") else f" ({tail})" if tail else ""
         return f"{fault.process} exited after {span(fault.t_ns)}{tail}"
     place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
-    return f"{place}: {quote(fault.text)}"
+    return f"{place}: {_own_words(fault)}"
+
+
+def _own_words(fault: Fault) -> str:
+    """Return what a fault says, an exception's message in quotation marks where it could be taken for ours."""
+    text = quote(fault.text)
+    kind, colon, message = text.partition(": ")
+    if fault.kind is not FaultKind.EXCEPTION or ";" not in text:
+        return text
+    plain = message.replace('"', "'")
+    return f'{kind}: "{plain}"' if colon else text
 
 
 def _last_part(name: str) -> str:

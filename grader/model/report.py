@@ -11,7 +11,7 @@ from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
 from grader.model.feedback import Feedback
 from grader.model.figure import Excerpt, Figure
-from grader.model.trace import ClockKind, GraphSnapshot
+from grader.model.trace import ClockKind, GraphSnapshot, Start
 from grader.model.variant import Variant
 
 SCHEMA = "grader/report/v1"
@@ -78,6 +78,7 @@ class ExerciseReport:
         feedback: Criterion id -> how much of its result a student is shown; no report shows this.
         situations: Criterion id -> scenario that it is judged on; no report shows this.
         variant: The values that were this student's own; None if there are none.
+        starts: How each file was started; empty in reports on kept evidence of earlier versions.
     """
 
     id: str
@@ -96,6 +97,7 @@ class ExerciseReport:
     feedback: Mapping[str, Feedback] = field(default_factory=dict)
     situations: Mapping[str, str] = field(default_factory=dict)
     variant: Variant | None = None
+    starts: tuple[Start, ...] = ()
 
     @property
     def score(self) -> Fraction:

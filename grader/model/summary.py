@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from grader.model.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine
+from grader.model.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +68,7 @@ class Summary:
         notes: Sentences a reader must know.
         graph: The richest snapshot of the graph, if there is any.
         isolation: The sandbox tier.
+        starts: How each file was started.
     """
 
     processes: tuple[str, ...]
@@ -83,3 +84,4 @@ class Summary:
     notes: tuple[str, ...]
     graph: GraphSnapshot | None
     isolation: str
+    starts: tuple[Start, ...] = ()

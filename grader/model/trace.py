@@ -29,6 +29,44 @@ class FaultKind(str, Enum):
     KILLED = "killed"  # a signal or a limit ended it
 
 
+class StartWay(str, Enum):
+    """How a student's file was started."""
+
+    SCRIPT = "script"  # as `python3 FILE`
+    MODULE = "module"  # as `python3 -m MODULE`, with its package
+    MAIN = "main"  # the module was imported and its main() called, as `ros2 run` does
+    ENTRY_POINT = "entry_point"  # as `ros2 run` does what setup.py names
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How one process was started.
+
+    Attributes:
+        process: File name of the student process.
+        file: The file that ran, relative to the submission.
+        way: How.
+        target: `MODULE` or `MODULE:FUNCTION`; empty for a script.
+        hidden: Files and folders of the submission that are imported in place of a module of Python's or of ROS.
+    """
+
+    process: str
+    file: str
+    way: StartWay
+    target: str = ""
+    hidden: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """How, in a phrase that follows `run`."""
+        return {
+            StartWay.SCRIPT: f"as `python3 {self.file}`",
+            StartWay.MODULE: f"as `python3 -m {self.target}`",
+            StartWay.MAIN: f"as `ros2 run` would: {self.target}()",
+            StartWay.ENTRY_POINT: f"as `ros2 run` does: the entry point {self.target}",
+        }[self.way]
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One message that a student's node published.
@@ -266,6 +304,7 @@ class Trace:
         observations: In order.
         notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
         harness_problem: What failed on our side or the machine's, and forbids judging; empty if nothing did.
+        starts: How each process was started; empty in traces of earlier versions.
     """
 
     scenario: str
@@ -275,6 +314,7 @@ class Trace:
     clock_reason: str = ""
     notes: tuple[str, ...] = ()
     harness_problem: str = ""
+    starts: tuple[Start, ...] = ()
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

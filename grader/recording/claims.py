@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from grader.recording.exchanges import PlannedMessages
@@ -10,20 +11,35 @@ from grader.recording.student import Student
 
 #: Nobody sends more messages than this between two reports.
 COUNT = 1_000_000
+#: Names and types as ROS has them; nothing else that a process calls a name is ever shown.
+_NAME = re.compile(r"/[A-Za-z0-9_/]{0,299}")
+_TYPE = re.compile(r"[A-Za-z0-9_]+(?:/[A-Za-z0-9_]+){1,2}")
+_PARAMETER = re.compile(r"/[A-Za-z0-9_/]{0,150}:[^\s]{1,150}")
+
+
+def is_name(name: Any) -> bool:
+    """Return whether a value is the whole name of a topic, a service or a node."""
+    return isinstance(name, str) and _NAME.fullmatch(name) is not None
 
 
 def counts(data: Any) -> dict[str, int]:
-    """Return numbers of messages by channel; what is no number of them is left out."""
+    """Return numbers of messages by channel; what is no channel, or no number of them, is left out."""
     if not isinstance(data, dict):
         return {}
-    return {str(name): min(count, COUNT) for name, count in data.items() if isinstance(count, int) and count > 0}
+    channels = {name: count for name, count in data.items() if is_name(str(name).partition(" ")[2])}
+    return {str(name): min(count, COUNT) for name, count in channels.items() if isinstance(count, int) and count > 0}
 
 
 def is_claim(claim: Any) -> bool:
     """Return whether a value describes an endpoint, or a parameter, with everything that is asked of it."""
     if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
         return False
-    ends = claim["kind"] in ("publisher", "subscription")
+    kind, name = claim["kind"], claim["name"]
+    if kind == "parameter":
+        return _PARAMETER.fullmatch(name) is not None
+    if not is_name(name) or (kind != "node" and _TYPE.fullmatch(claim["type"]) is None):
+        return False
+    ends = kind in ("publisher", "subscription")
     bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
     return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
 

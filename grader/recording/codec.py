@@ -24,6 +24,8 @@ from grader.model.trace import (
     Request,
     Response,
     ServiceEnd,
+    Start,
+    StartWay,
     Trace,
 )
 
@@ -41,8 +43,13 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
         "stop_ns": trace.stop_ns,
         "notes": list(trace.notes),
         "harness_problem": trace.harness_problem,
+        **({"starts": list(map(_start_to_json, trace.starts))} if trace.starts else {}),
         "observations": [observation_to_json(o) for o in trace.observations],
     }
+
+
+def _start_to_json(start: Start) -> list[Any]:
+    return [start.process, start.file, start.way.value, start.target, list(start.hidden)]
 
 
 def observation_to_json(observation: Observation) -> list[Any]:
@@ -97,6 +104,7 @@ def trace_from_json(data: Any) -> Trace:
             clock_reason=_text(data["clock_reason"]),
             notes=tuple(map(_text, _list(data["notes"]))),
             harness_problem=_text(data["harness_problem"]),
+            starts=tuple(map(_start, _list(data.get("starts", [])))),
         )
     except (KeyError, TypeError, ValueError, IndexError, RecursionError) as error:
         raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
@@ -193,6 +201,12 @@ def _offer(fields: list[Any]) -> Offer:
     t_ns, *texts = fields
     process, kind, name, detail = map(_text, texts)
     return Offer(_whole(t_ns), process, kind, name, detail)
+
+
+def _start(fields: list[Any]) -> Start:
+    process, file, way, target, hidden = fields
+    names = tuple(map(_text, _list(hidden)))
+    return Start(_text(process), _text(file), StartWay(way), _text(target), names)
 
 
 def _mark(fields: list[Any]) -> Mark:

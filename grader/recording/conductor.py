@@ -94,6 +94,7 @@ class Conductor:
             stop_ns=self._stop_ns,
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+            starts=tuple(s.start_told for s in self._students if s.start_told is not None),
         )
 
     def _why_not(self) -> str:
@@ -207,18 +208,19 @@ class Conductor:
                 continue
             self._catch_up(report)
             if kind == "note":
-                student.note(str(report.get("text", "")))
+                student.note(report)
                 continue
             self._write_output(student, final=kind == "exited")
             if kind == "fault":
-                self._tape.add(reported_fault(student.name, self._now_ns, report, self._plan.limits))
+                fault, limits = report.get("fault"), self._plan.limits
+                self._tape.add(reported_fault(student.name, self._now_ns, fault, limits, student.places))
                 continue
             workload.end()
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))
-                stopped = student.stop_signalled
-                self._end(student, ending(student.name, self._now_ns, report, self._plan, stopped=stopped))
+                stopped, places = student.stop_signalled, student.places
+                self._end(student, ending(student.name, self._now_ns, report, self._plan, places, stopped=stopped))
                 if report.get("left"):
                     self._matching.see_off(self._now_ns)
                 return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,10 +11,27 @@ from grader.model.limits import Limits
 from grader.model.quantities import duration, size
 from grader.model.trace import Fault, FaultKind, Mark
 from grader.recording.isolation.start import OUTGROWN
+from grader.recording.places import Places
 from grader.recording.plan import Plan
 
-KINDS = {kind.value: kind for kind in FaultKind}
-TEXT_CHARACTERS, PLACE_CHARACTERS, FRAMES = 500, 300, 20
+TEXT_CHARACTERS, FRAMES = 500, 20
+#: Processor seconds that a node may use until it first blocks, its imports included, and between two such moments.
+START_CPU_S = 10.0
+WAKE_UP_CPU_S = 5.0
+#: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
+BLOCKED_S = 5.0
+#: The words for the codes with which a process is ended that does not come back.
+_HUNG = {
+    "start_limit": f"did not return within {START_CPU_S:g} s of processor time",
+    "wake_up_limit": f"did not return within {WAKE_UP_CPU_S:g} s of processor time",
+    "blocked": f"waited {BLOCKED_S:g} s for something outside the ROS graph",
+    "alarm": "sets an alarm that rings in real time",
+    "process": "starts another process, which runs in real time",
+    "waiting": "waits for something outside the ROS graph",
+}
+#: The whole name of a class, and of a function, as Python writes them: names only, no sentences.
+_TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")
+_FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dictcomp|genexpr)>|[^\W\d]\w*)")
 #: What C++ writes before it ends a process that found no memory.
 NO_MEMORY = b"std::bad_alloc"
 _UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
@@ -24,31 +42,74 @@ STOPPED_CODE = 130
 NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
 
 
-def reported_fault(process: str, t_ns: int, data: Mapping[str, Any], limits: Limits) -> Fault:
-    """Return the fault that a report describes; an error that a limit is behind names the limit."""
-    text = str(data.get("text", ""))[:TEXT_CHARACTERS]
+def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: Places) -> Fault:
+    """Return the fault that a report describes; an error that a limit is behind names the limit.
+
+    Args:
+        process: Name of the process.
+        t_ns: When.
+        data: What it says: a code, where, and for an exception its type and its message, which are its own words.
+        limits: What it may use.
+        places: The files of the submission; any other place is left out.
+    """
+    data = data if isinstance(data, dict) else {}
+    code = data.get("code")
+    hung = _HUNG.get(code) if isinstance(code, str) else None
+    kind = FaultKind.SYNTAX_ERROR if code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
+    text = hung or _own_words(data)
+    if kind is FaultKind.SYNTAX_ERROR:
+        text += f" (read by Python {sys.version_info[0]}.{sys.version_info[1]})"
     behind = next((words for error, words in _errors(limits).items() if error in text), "")
-    frames, line = data.get("frames"), data.get("line")
+    file, line = _place(data, places, kind)
     return Fault(
         t_ns=t_ns,
         process=process,
-        kind=KINDS.get(str(data.get("kind")), FaultKind.EXCEPTION),
+        kind=kind,
         text=f"{text} (the limit is {behind})" if behind else text,
-        file=str(data.get("file", ""))[:PLACE_CHARACTERS],
-        line=line if type(line) is int and line > 0 else 0,
-        frames=tuple(str(f)[:PLACE_CHARACTERS] for f in frames[:FRAMES]) if isinstance(frames, list) else (),
+        file=file,
+        line=line,
+        frames=_frames(data.get("frames"), places),
     )
 
 
-def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Limits) -> Fault:
+def _own_words(data: Mapping[str, Any]) -> str:
+    """Return an exception as Python tells it: `Type: message`, on one line."""
+    name, message = data.get("type"), data.get("message")
+    name = name if isinstance(name, str) and _TYPE.fullmatch(name) else "Exception"
+    message = " ".join(message[:TEXT_CHARACTERS].split()) if isinstance(message, str) else ""
+    return (f"{name}: {message}" if message else name)[:TEXT_CHARACTERS]
+
+
+def _place(data: Mapping[str, Any], places: Places, kind: FaultKind) -> tuple[str, int]:
+    """Return file and line of a fault, where the submission has them; empty and 0 otherwise."""
+    file, line = data.get("file"), data.get("line")
+    if not isinstance(file, str) or not places.has(file):
+        return "", 0
+    if kind is FaultKind.SYNTAX_ERROR and type(line) is int:
+        line = min(line, places.lines(file))  # Python places what is missing at the end behind the last line
+    return (file, line) if type(line) is int and places.has(file, line) else (file, 0)
+
+
+def _frames(data: Any, places: Places) -> tuple[str, ...]:
+    frames = [f for f in data[:FRAMES] if isinstance(f, list) and len(f) == 3] if isinstance(data, list) else []
+    return tuple(
+        f"{file}:{line} in {name}"
+        for file, line, name in frames
+        if places.has(file, line) and isinstance(name, str) and _FUNCTION.fullmatch(name)
+    )
+
+
+def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Limits, places: Places) -> Fault:
     """Return the fault of a process that says how it ended."""
     if isinstance(report.get("fault"), dict):
-        return reported_fault(process, t_ns, report["fault"], limits)
+        return reported_fault(process, t_ns, report["fault"], limits, places)
     code = report.get("code")
     return Fault(t_ns, process, FaultKind.EXITED, f"exited with code {code if type(code) is int else '?'}")
 
 
-def ending(process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, *, stopped: bool) -> Fault | Mark:
+def ending(  # noqa: PLR0913 - each comes from another place
+    process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, places: Places, *, stopped: bool
+) -> Fault | Mark:
     """Return the fault of a process that says how it ended, or the mark of an end that is none.
 
     Args:
@@ -56,13 +117,14 @@ def ending(process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, *, st
         t_ns: When.
         report: What it says.
         plan: Whether it is free to end, and its limits.
+        places: The files of the submission.
         stopped: Whether it had got the stop signal.
     """
     if stopped and is_normal_stop(report):
         return Mark(t_ns, "stopped", process)
     if process in plan.may_exit and is_free_exit(report):
         return Mark(t_ns, "exited", process)
-    return ending_fault(process, t_ns, report, plan.limits)
+    return ending_fault(process, t_ns, report, plan.limits, places)
 
 
 def is_free_exit(report: Mapping[str, Any]) -> bool:
@@ -77,7 +139,7 @@ def is_normal_stop(report: Mapping[str, Any]) -> bool:
     """
     fault = report.get("fault")
     if isinstance(fault, dict):
-        return any(normal in str(fault.get("text", ""))[:TEXT_CHARACTERS] for normal in NORMAL_AT_STOP)
+        return fault.get("code") == "exception" and any(normal in _own_words(fault) for normal in NORMAL_AT_STOP)
     return report.get("code") in (0, STOPPED_CODE)
 
 

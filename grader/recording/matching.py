@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from grader.model.trace import GraphSnapshot
-from grader.recording.claims import announce, compatible, offered, readers_of, serves, takes_ordinary
+from grader.recording.claims import announce, compatible, is_name, offered, readers_of, serves, takes_ordinary
 from grader.recording.desk import Desk
 from grader.recording.exchanges import PlannedCalls, PlannedMessages
 from grader.recording.observer import Observer
@@ -200,8 +200,8 @@ class Matching:
         missing = answer.get("missing")
         if missing:
             self.patience.lose()
-        for name in missing[:WORDS] if isinstance(missing, list) else ():
-            self._tape.note(f"{student.name}: {str(name)[:NAME_CHARACTERS]} was not matched in time")
+        for name in filter(is_name, missing[:WORDS] if isinstance(missing, list) else ()):
+            self._tape.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]

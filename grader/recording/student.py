@@ -17,9 +17,11 @@ from typing import Any
 
 from grader.model.limits import Limits
 from grader.model.quantities import size
-from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine
+from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine, Start
 from grader.recording.ending import ended_by, limit_behind
 from grader.recording.isolation.protocol import Command
+from grader.recording.notes import hidden_notes, note_of, start_of
+from grader.recording.places import Places
 from grader.recording.workload import Workload
 
 #: How the logging library writes records on standard error. Each process has a token of its own, which only the library
@@ -69,6 +71,9 @@ class Student:
         stop_signalled: Whether it is to get, or has got, the stop signal.
         stopping: Whether it has got it.
         log_token: What its log records begin with; without one there are none.
+        file: The file that it runs, relative to the submission.
+        places: The files of the submission.
+        start_told: How its file is started, as it said before anything of it ran.
     """
 
     name: str
@@ -93,6 +98,9 @@ class Student:
     stopping: bool = False
     notes: list[str] = field(default_factory=list)
     log_token: str = ""
+    file: str = ""
+    places: Places = field(default_factory=lambda: Places(None))
+    start_told: Start | None = None
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
@@ -149,9 +157,13 @@ class Student:
         node = name.rpartition("/")[0] if kind == "service" else ""
         return any((c["kind"], c["name"]) in ((kind, name), ("node", node)) for c in self.claims)
 
-    def note(self, text: str) -> None:
-        """Take down what it says that a reader must know; it may say no end of such things."""
-        if len(self.notes) < NOTES:
+    def note(self, report: Mapping[str, Any]) -> None:
+        """Take down how its file is started, which it says first, or what else a reader must know."""
+        if report.get("code") == "started":
+            if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
+                self.start_told = start
+                self.notes += hidden_notes(start)
+        elif len(self.notes) < NOTES and (text := note_of(self.file, report, self.places)):
             self.notes.append(text[:NOTE_CHARACTERS])
 
     def report(self) -> dict[str, Any] | None:
@@ -253,8 +265,9 @@ class Student:
         for match in re.finditer(start + _LOG_FIELDS, text) if start else ():
             found += self._lines(t_ns, stream, text[position : match.start()])
             severity, logger, file, line, message = match.groups()
-            relative = file[len(self.root) + 1 :] if file.startswith(self.root + "/") else ""
-            place = int(line[:9]) if relative else 0
+            relative, place = file.removeprefix(f"{self.root}/"), int(line[:9])
+            if relative == file or not self.places.has(relative, place):
+                relative, place = "", 0
             said = self._anywhere(message)[:TEXT_CHARACTERS]
             found.append(LogRecord(t_ns, self.name, severity, logger, said, relative, place))
             position = match.end()

@@ -90,6 +90,7 @@ class WallConductor:
             clock_reason="it was asked for",
             observations=tuple(self._tape.observations),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+            starts=tuple(s.start_told for s in self._students if s.start_told is not None),
             harness_problem=self._slip(),
         )
 
@@ -160,12 +161,14 @@ class WallConductor:
                 self._tape.add(*student.output(now_ns, final=True), student.death(now_ns))
                 student.ended = True
             elif report.get("kind") == "note":
-                student.note(str(report.get("text", "")))
+                student.note(report)
             elif report.get("kind") == "fault":
-                self._tape.add(reported_fault(student.name, now_ns, report, self._plan.limits))
+                fault, limits = report.get("fault"), self._plan.limits
+                self._tape.add(reported_fault(student.name, now_ns, fault, limits, student.places))
             elif report.get("kind") == "exited":
                 self._tape.add(*student.output(now_ns, final=True))
-                self._tape.add(ending(student.name, now_ns, report, self._plan, stopped=student.stop_signalled))
+                stopped, places = student.stop_signalled, student.places
+                self._tape.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._tape.add(*student.output(now_ns))
 

@@ -24,21 +24,18 @@ from grader.model.limits import Limits
 from grader.model.quantities import GIB, MIB, NS_PER_S
 from grader.model.trace import FaultKind, Mark, Trace
 from grader.recording.codec import trace_to_json
+from grader.recording.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.recording.guard import Budget, Guard
 from grader.recording.isolation.environment import quick_discovery
 from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess, runtime_from_json
 from grader.recording.isolation.tiers import isolation_from_name
+from grader.recording.places import Places
 from grader.recording.plan import Plan, plan_from_json
 from grader.recording.student import LOG_FORMAT, Student
 from grader.recording.usage import usage
 
 #: A run on the wall clock whose reference slipped is repeated so often before the scenario is undecided.
 WALL_TRIES = 3
-#: Processor seconds that a node may use until it first blocks, its imports included, and between two such moments.
-START_CPU_S = 10.0
-WAKE_UP_CPU_S = 5.0
-#: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
-BLOCKED_S = 5.0
 #: Where the guard comes too late, the system ends the worker: at this much mapped, and so much processor time beyond
 #: the guard's limit. A worker maps 0.6 GiB.
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
@@ -134,12 +131,14 @@ class Worker:
             plan.limits,
         )
         try:
-            return Student.start(name, root, command, ours, plan.limits)
+            student = Student.start(name, root, command, ours, plan.limits)
         except OSError:
             ours.close()
             raise
         finally:
             theirs.close()
+        student.file, student.places = file, Places(Path(plan.root))
+        return student
 
 
 def limit_memory() -> None:

@@ -94,8 +94,24 @@ def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
         "criteria": [_criterion(verdict) for verdict in exercise.verdicts],
         "faults": [_fault(fault) for fault in exercise.faults],
         "notes": _notes(exercise, report),
+        **_starts(exercise),
         **_variant(exercise.variant),
     }
+
+
+def _starts(exercise: ExerciseReport) -> dict[str, Any]:
+    """Return how each file was started, where that is known."""
+    starts = [
+        {
+            "process": valid_unicode(start.process),
+            "file": valid_unicode(start.file),
+            "way": start.way.value,
+            "target": valid_unicode(start.target) or None,
+            "hidden": [valid_unicode(name) for name in start.hidden],
+        }
+        for start in exercise.starts
+    ]
+    return {"starts": starts} if starts else {}
 
 
 def _variant(variant: Variant | None) -> dict[str, Any]:

@@ -111,6 +111,16 @@ def summary_to_json(summary: Summary) -> str:
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "processes": list(summary.processes),
+        "starts": [
+            {
+                "process": s.process,
+                "file": s.file,
+                "way": s.way.value,
+                "target": s.target or None,
+                "hidden": list(s.hidden),
+            }
+            for s in summary.starts
+        ],
         "clock": summary.clock.value,
         "clock_reason": summary.clock_reason or None,
         "duration_s": summary.duration_s,

@@ -188,6 +188,12 @@ def run_line(report: Report) -> str:
     return f"graded {shown(report.path)} in {report.duration_s:.1f} s"
 
 
+def starts(report: Report) -> list[str]:
+    """Return how each file was started; each safe to show as a line of text."""
+    found = dict.fromkeys(start for exercise in report.exercises for start in exercise.starts)
+    return [shown(f"{start.process}: run {start.words}", limit=_WORD_LIMIT) for start in found]
+
+
 def reproduction(report: Report) -> list[tuple[str, str]]:
     """Return name and value of all that gives the report again, except the command; safe to show as lines of text."""
     rows = [("versions", versions(report)), ("isolation", isolation(report))]

@@ -60,8 +60,13 @@ class Stage:
         return {"now_ns": report["wake_ns"], "free_until_ns": report["wake_ns"]}
 
     def send(self, report: dict[str, Any]) -> None:
-        """Note a sentence for the report."""
-        self.say(report["text"])
+        """Note what is reported."""
+        self.say(report)
+
+    def note(self, said: dict[str, Any]) -> None:
+        """Note what the host has to mention, as `code: value, value`."""
+        values = ", ".join(str(value) for name, value in said.items() if name != "code" and value)
+        self.say(f"{said['code']}: {values}" if values else said["code"])
 
     def end(self, why: str) -> None:
         """Hand over what was said, and end the process."""
@@ -79,7 +84,7 @@ def perform(request: dict[str, Any], pipe: int) -> None:
     try:
         if "file" in request:
             stand_in_for_ros(stage.say)
-            entry.run_file(request["root"], request["file"], stage.say)
+            entry.run_file(request["root"], request["file"], stage.note, lambda: stage.say("ros"))
         else:
             exec(compile(request["code"], "program", "exec"), {"__name__": "__main__", "say": stage.say})
     except SystemExit as leaving:

@@ -1,5 +1,11 @@
 """How a student's file is started: as a script, as a module of its package, or through what it defines."""
 
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 from staging_programs import play_file
 
@@ -16,11 +22,30 @@ def run(tmp_path):
             path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return [line.partition(" ")[2] for line in play_file(root, file)[:-1]]
 
-    return write_and_run
+    def run_one(files, file="node.py"):
+        started, *said = write_and_run(files, file) or [""]
+        hides = re.search(r"\['(.*)'\]$", started)
+        known = started.startswith("started")
+        return [*([f"module_hidden: {hides[1]}"] if hides else []), *([] if known else [started]), *said]
+
+    return run_one
 
 
+@pytest.fixture
+def start(run):
+    """Write files into a submission, run one of them and return how it was started and what it said."""
+    write_and_run = run.__closure__[0].cell_contents
+
+    def start_one(files, file):
+        started, *said = write_and_run(files, file)
+        return started.removeprefix("started: "), said
+
+    return start_one
+
+
+ROOT = Path(__file__).resolve().parents[2]
 MAIN = "def main():\n    say('main ran')\n"
-UNCALLED = "nothing calls main(), so `python3 node.py` would do nothing; add: if __name__ == '__main__': main()"
+UNCALLED = "main_not_called"
 NODE = "import rclpy\nfrom rclpy.node import Node\nclass Blinker(Node):\n    pass\n"
 
 
@@ -31,7 +56,7 @@ def test_a_guard_is_respected(run):
 
 def test_a_file_without_a_guard_is_run_and_told_so(run):
     """Console scripts call main from elsewhere; the note says what `python3` would do."""
-    assert run({"node.py": MAIN}) == [f"node.py: {UNCALLED}", "main ran"]
+    assert run({"node.py": MAIN}) == [UNCALLED, "main ran"]
 
 
 @pytest.mark.parametrize(
@@ -45,7 +70,7 @@ def test_a_file_without_a_guard_is_run_and_told_so(run):
 )
 def test_a_misspelt_guard_is_run_and_told_so(run, guard):
     """What was meant is graded; that it does not work alone is said."""
-    assert run({"node.py": MAIN + guard}) == [f"node.py: {UNCALLED}", "main ran"]
+    assert run({"node.py": MAIN + guard}) == [UNCALLED, "main ran"]
 
 
 @pytest.mark.parametrize(
@@ -75,12 +100,7 @@ def test_a_main_that_raised_inside_its_guard_is_not_run_again(run):
 
 def test_a_lone_node_class_is_spun_and_told_so(run):
     """Nobody makes the node: the host does, since everything that is graded is there."""
-    assert run({"node.py": NODE}) == [
-        "node.py: nothing starts Blinker, so `python3 node.py` would do nothing; "
-        "add a main() that calls rclpy.init(), makes the node and spins it",
-        "init",
-        "spin Blinker",
-    ]
+    assert run({"node.py": NODE}) == ["class_not_started: Blinker", "init", "spin Blinker"]
 
 
 @pytest.mark.parametrize(
@@ -108,27 +128,214 @@ def test_helper_modules_are_found_beside_the_file(run):
     assert run(files, "src/deep/node.py") == ["found"]
 
 
-def test_a_package_is_importable_by_its_own_name(run):
-    """`ros2 run` has it on the path: absolute and relative imports both work."""
+PACKAGE = {
+    "src/robot/robot/__init__.py": "",
+    "src/robot/robot/words.py": "WORD = 'found'\n",
+    "src/robot/robot/sub/__init__.py": "",
+}
+SETUP = "from setuptools import setup\nname = 'robot'\nsetup(name=name, entry_points={'console_scripts': [%s]})\n"
+
+
+def setup_py(*scripts):
+    """Return a setup.py with some console scripts, as expressions."""
+    return {"src/robot/setup.py": SETUP % ", ".join(scripts), "src/robot/package.xml": "<package/>"}
+
+
+@pytest.mark.parametrize(
+    ("code", "started", "said"),
+    [
+        ("from robot.words import WORD\nsay(WORD)\n", "module, robot.node", ["found"]),
+        (
+            "from .words import WORD\nfrom . import words\nsay(WORD)\nsay(__name__)\n",
+            "module, robot.node",
+            ["found", "__main__"],
+        ),
+        (
+            "from .words import WORD\ndef main():\n    say(WORD)\n    say(__name__)\n",
+            "main, robot.node, main",
+            ["found", "robot.node"],
+        ),
+        (
+            f"from . import words\n{MAIN}if __name__ == '__main__':\n    main()\n",
+            "main, robot.node, main",
+            ["main ran"],
+        ),
+        (f"{MAIN}if __name__ == '_main_':\n    main()\n", "main, robot.node, main", ["main ran"]),
+        (f"{MAIN}main()\n", "module, robot.node", ["main ran"]),
+        ("from . import words\nif __name__ == '__main__':\n    say('guarded')\n", "module, robot.node", ["guarded"]),
+        (
+            f"{MAIN}if __name__ == '__main__':\n    say('its own')\n",
+            "module, robot.node",
+            ["its own", "main_not_called", "main ran"],
+        ),
+        (
+            "def main(node):\n    say(node)\nif __name__ == '__main__':\n    main('given')\n",
+            "module, robot.node",
+            ["given"],
+        ),
+        (
+            "import asyncio\nasync def main():\n    say('awaited')\n"
+            "if __name__ == '__main__':\n    asyncio.run(main())\n",
+            "module, robot.node",
+            ["awaited"],
+        ),
+        ("import robot.words\nsay(robot.words.WORD)\n", "module, robot.node", ["found"]),
+    ],
+)
+def test_a_file_in_a_package_is_run_as_a_part_of_it(start, code, started, said):
+    """Relative imports work, main() is called once whether or not there is a guard, and a script body runs."""
+    assert start({**PACKAGE, "src/robot/robot/node.py": code}, "src/robot/robot/node.py") == (started, said)
+
+
+def test_a_file_deep_in_a_package_knows_its_parents(start):
+    """Packages within packages are parts of one name."""
+    files = {**PACKAGE, "src/robot/robot/sub/node.py": "from ..words import WORD\ndef main():\n    say(WORD)\n"}
+    assert start(files, "src/robot/robot/sub/node.py") == ("main, robot.sub.node, main", ["found"])
+
+
+NODES = {
+    **PACKAGE,
+    "src/robot/robot/node.py": (
+        "import sys\nfrom .words import WORD\ndef go():\n    say('go')\n    return 3\n"
+        f"{MAIN}if __name__ == '__main__':\n    main()\n"
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "scripts",
+    [
+        ["'node = robot.node:go'"],
+        ["'other = robot.other:main'", "'node = robot.node:go'"],
+        ["'x = robot.node:main'", "'node = robot.node:go'"],
+        ["name + '_node=' + name + '.node:go'"],
+        ["f'node = {name}.node:go'"],
+        ["'node = {}.node:go'.format(name)", "unknown"],
+        ["'node = %s.node:go' % name"],
+    ],
+)
+def test_an_entry_point_of_setup_py_is_called(start, scripts):
+    """However setup.py puts the text together, which is never run; the function's result is the exit code."""
+    files = {**NODES, **setup_py(*scripts)}
+    files["src/robot/setup.py"] += "raise SystemExit('setup.py was run')\n"
+    assert start(files, "src/robot/robot/node.py") == ("entry_point, robot.node, go", ["go", "exit 3"])
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"src/robot/setup.cfg": "[options.entry_points]\nconsole_scripts =\n  a = robot.a:b\n  node = robot.node:go\n"},
+        {"src/robot/setup.py": "import x\nx.setup(entry_points='[console_scripts]\\nnode=robot.node:go')\n"},
+        {"src/robot/setup.py": "S = ['node=robot.node:go']\nE = {'console_scripts': S}\nsetup(entry_points=E)\n"},
+    ],
+)
+def test_entry_points_may_stand_elsewhere(start, files):
+    """In setup.cfg, in one text, in variables."""
+    found = start({**NODES, **setup_py(), **files}, "src/robot/robot/node.py")
+    assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        setup_py(),
+        setup_py("'node = robot.other:main'"),
+        setup_py("5", "'node'", "'node = robot.node'", "'node = robot.node:'", "x()"),
+        {"src/robot/setup.py": "setup(\n"},
+        {"src/robot/setup.py": "setup(entry_points={'console_scripts': " + "[" * 150 + "]" * 150 + "})\n"},
+        {"src/robot/setup.py": b"\0\xff"},
+        {"src/robot/setup.py": "a = 'x' * 9\n" + "a = a + a\n" * 60 + "setup(entry_points=a)\n"},
+        {"src/robot/package.xml": "<package/>", "src/robot/setup.cfg": "[[["},
+        {"src/robot/setup.cfg": b"\xff\xfe"},
+    ],
+)
+def test_without_an_entry_point_main_is_called(start, files):
+    """A setup.py that names none for the file, or that nobody can read."""
+    found = start({**NODES, **files}, "src/robot/robot/node.py")
+    assert found == ("main, robot.node, main", ["main ran"])
+
+
+def test_a_package_without_init_is_what_setup_py_says(start):
+    """Its author forgot the file, or uses a namespace; `ros2 run` finds it all the same."""
+    files = {name: code for name, code in NODES.items() if "__init__" not in name}
+    found = start({**files, **setup_py("'node = robot.node:go'")}, "src/robot/robot/node.py")
+    assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
+    assert start(setup_py(), "src/robot/robot/node.py") == ("main, robot.node, main", ["main ran"])
+
+
+@pytest.mark.parametrize("marker", ["setup.py", "package.xml"])
+def test_a_file_beside_setup_py_or_package_xml_is_a_module(start, marker):
+    """No package holds it, but `ros2 run` would call its main."""
+    assert start({marker: "", "node.py": MAIN}, "node.py") == ("main, node, main", ["main ran"])
+
+
+def test_packages_of_a_submission_see_each_other(start):
+    """They are built together."""
     files = {
-        "src/robot/robot/__init__.py": "",
-        "src/robot/robot/words.py": "WORD = 'found'\n",
-        "src/robot/robot/sub/__init__.py": "",
-        "src/robot/robot/absolute.py": "from robot.words import WORD\nsay(WORD)\n",
-        "src/robot/robot/relative.py": "from .words import WORD\nfrom . import words\nsay(WORD)\nsay(__name__)\n",
-        "src/robot/robot/sub/deep.py": "from ..words import WORD\nsay(WORD)\n",
-        "src/robot/robot/uncalled.py": "from .words import WORD\ndef main():\n    say(WORD)\n",
+        **PACKAGE,
+        **setup_py(),
+        "src/drive/package.xml": "",
+        "src/drive/drive/__init__.py": "",
+        "src/drive/drive/node.py": "from robot.words import WORD\ndef main():\n    say(WORD)\n",
     }
-    assert run(files, "src/robot/robot/absolute.py") == ["found"]
-    assert run({}, "src/robot/robot/relative.py") == ["found", "__main__"]
-    assert run({}, "src/robot/robot/sub/deep.py") == ["found"]
-    assert run({}, "src/robot/robot/uncalled.py")[1:] == ["found"]
+    assert start(files, "src/drive/drive/node.py") == ("main, drive.node, main", ["found"])
 
 
-def test_a_relative_import_at_the_top_of_a_submission_works(run):
-    """The folder's own name stands for the package, as if it had been built."""
-    files = {"node.py": "from .helper import WORD\nsay(WORD)\n", "helper.py": "WORD = 'found'\n"}
-    assert run(files) == ["found"]
+def test_a_package_whose_own_folder_was_handed_in_has_no_name(start):
+    """Its files know each other by relative imports."""
+    files = {
+        "__init__.py": "say('package')\n",
+        "node.py": "from .words import WORD\ndef main():\n    say(WORD)\n",
+        "words.py": "WORD = 'found'\n",
+        "plain.py": "from . import words\nsay(words.WORD)\n",
+    }
+    assert start(files, "node.py") == ("main, submission.node, main", ["package", "found"])
+    assert start(files, "plain.py") == ("module, submission.plain", ["package", "found"])
+
+
+def test_a_plain_import_of_a_neighbour_is_mentioned(start):
+    """`python3` finds it, so its author does too; `ros2 run` does not."""
+    files = {**PACKAGE, "src/robot/robot/node.py": "import words\nimport os\ndef main():\n    say(words.WORD)\n"}
+    found = start(files, "src/robot/robot/node.py")
+    assert found == ("main, robot.node, main", ["neighbour_imported: words", "found"])
+
+
+def test_a_package_with_the_name_of_a_module_is_found(start):
+    """What was built comes first on the path."""
+    files = {"src/random/random/__init__.py": "", "src/random/package.xml": "", "src/random/random/node.py": MAIN}
+    found = start(files, "src/random/random/node.py")
+    assert found == ("main, random.node, main, ['random']", ["main ran"])
+
+
+def test_an_entry_point_that_is_not_there_fails(start):
+    """As `ros2 run` does."""
+    files = {**PACKAGE, **setup_py("'node = robot.node:missing'"), "src/robot/robot/node.py": MAIN}
+    (said,) = start(files, "src/robot/robot/node.py")[1]
+    assert said == "raised AttributeError: module 'robot.node' has no attribute 'missing'"
+
+
+@pytest.mark.parametrize("ending", [MAIN, f"{MAIN}main()\n", "say('ran')\n"])
+def test_a_relative_import_in_a_loose_file_fails(run, ending):
+    """As with `python3`: there is no package."""
+    files = {"node.py": f"from .helper import WORD\n{ending}", "helper.py": "WORD = 'found'\n"}
+    assert run(files) == ["raised ImportError: attempted relative import with no known parent package"]
+
+
+PROBE = (
+    "import inspect, os, sys\n"
+    "def main():\n"
+    "    say(sys.modules['__main__'].__name__)\n"
+    "    say(inspect.getmodule(inspect.currentframe()).__name__)\n"
+    "    say([os.path.basename(p) for p in sys.argv])\n"
+)
+
+
+@pytest.mark.parametrize("folder", ["", "robot/"])
+def test_there_is_always_a_main_module(run, folder):
+    """The logger of rclpy looks it up, whoever calls main()."""
+    files = {f"{folder}__init__.py": "", f"{folder}node.py": PROBE} if folder else {"node.py": PROBE}
+    said = run(files, f"{folder}node.py")
+    assert said[-3:] == ["__main__", "robot.node" if folder else "__main__", "['node.py']"]
 
 
 def test_any_encoding_that_python_accepts(run):
@@ -177,7 +384,7 @@ def test_a_script_sees_what_scripts_see(run):
             )
         }
     )
-    assert said == ["1", "node.py", "True", "True", "", "None", "True"]
+    assert said == ["1", "node.py", "True", "True", "None", "None", "True"]
 
 
 def test_objects_of_the_file_can_be_pickled(run):
@@ -198,16 +405,62 @@ def test_future_imports_of_the_host_do_not_leak(run):
     assert run({"node.py": "def f(x: 1 + 1): pass\nsay(f.__annotations__)\n"}) == ["{'x': 2}"]
 
 
-@pytest.mark.parametrize("name", ["random.py", "queue.py", "numpy.py", "rclpy.py", "std_msgs.py"])
-def test_a_file_that_hides_a_needed_module_is_mentioned(run, name):
-    """The node gets the module it needs, and its author hears why `python3` would fail."""
-    said = run(
-        {"node.py": "import queue, random\nsay(random.Random and queue.Queue and 'usable')\n", name: "oops = 1\n"}
+def test_a_script_is_what_python3_makes_of_it(run, tmp_path):
+    """Path, arguments and the names of its module."""
+    code = (
+        "import os, sys\nhere = os.path.dirname(os.path.abspath(__file__))\n"
+        "told = [sys.path[0] == here, sys.path.count(here), __name__, __package__, __spec__, __doc__,\n"
+        "        type(__loader__).__name__, [os.path.basename(a) for a in sys.argv],\n"
+        "        sorted(n for n in globals() if n not in ('here', 'told', 'os', 'sys', '__annotations__'))]\n"
+        "globals().get('say', print)(told)\n"
     )
-    assert said == [
-        f"{name} has the name of a module that Python or ROS needs: `python3` would import it instead; rename it",
-        "usable",
-    ]
+    assert run({"deep/node.py": code.replace("globals().get('say', print)", "say")}, "deep/node.py")
+    (tmp_path / "node.py").write_text(code)
+    real = subprocess.run([sys.executable, tmp_path / "node.py"], check=True, capture_output=True, text=True)
+    assert run({"node.py": code.replace("globals().get('say', print)", "say")}) == [real.stdout.strip()]
+
+
+@pytest.mark.parametrize("name", ["random.py", "queue.py", "numpy.py", "rclpy.py", "std_msgs.py"])
+def test_a_file_that_hides_a_needed_module_is_imported_and_mentioned(run, name):
+    """The folder of a script comes first on the path; the note explains what follows."""
+    module = name.removesuffix(".py")
+    said = run({"node.py": f"import {module}\nsay({module}.WORD)\n", name: "WORD = 'hides'\n"})
+    assert said == [f"module_hidden: {name}", "hides"]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "user"),
+    [("random", "tempfile"), ("queue", "concurrent.futures.thread"), ("heapq", "queue"), ("string", "string")],
+)
+def test_what_needs_a_hidden_module_gets_the_students(run, tmp_path, hidden, user):
+    """Also where the host had imported it before: the program sees what `python3` would make it see."""
+    code = f"try:\n    import {user}\n    said = 'fine'\nexcept Exception as error:\n    said = repr(error)[:40]\n"
+    (tmp_path / "node.py").write_text(code + "print(said)\n")
+    (tmp_path / f"{hidden}.py").write_text("oops = 1\n")
+    real = subprocess.run([sys.executable, "-B", tmp_path / "node.py"], check=True, capture_output=True, text=True)
+    said = run({"node.py": f"{code}say(said)\n", f"{hidden}.py": "oops = 1\n"})
+    assert said == [f"module_hidden: {hidden}.py", real.stdout.strip()]
+
+
+@pytest.mark.parametrize("name", ["time.py", "sys.py", "os.py", "_thread.py", "helper.py", "link.py", "clock.py"])
+def test_what_hides_nothing_is_not_mentioned(run, name):
+    """Modules that are a part of the interpreter are found first; those of the host are nobody's."""
+    module = name.removesuffix(".py")
+    said = run({"node.py": f"import {module}\nsay(hasattr({module}, 'WORD'))\n", name: "WORD = 1\n"})
+    assert said == [str(name in ("helper.py", "link.py", "clock.py"))]
+
+
+def test_the_host_imports_no_part_of_rclpy_by_surprise():
+    """Beside hidden modules, the parts that it changes are imported as the program would import them."""
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "grader/host").glob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
+    names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.level == 0}
+    parts = {name for name in names if name.startswith("rclpy.") and name != "rclpy.impl"}
+    shadows = ast.parse((ROOT / "grader/host/shadows.py").read_text(encoding="utf-8"))
+    known = {node.value for node in ast.walk(shadows) if isinstance(node, ast.Constant)}
+    assert parts
+    assert parts <= known
 
 
 def test_an_exit_is_the_programs_own(run):

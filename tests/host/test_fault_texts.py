@@ -20,7 +20,12 @@ def faults():
 @pytest.fixture
 def text_of(faults, tmp_path):
     """Return what is said of an exception in a submission that lies in a temporary folder."""
-    return lambda error: faults.Describer(str(tmp_path)).exception(error)["text"]
+
+    def one_line(error):
+        told = faults.Describer(str(tmp_path)).exception(error)
+        return f"{told['type']}: {told['message']}" if told["message"] else told["type"]
+
+    return one_line
 
 
 class Widget:
@@ -77,6 +82,13 @@ def test_an_endless_text_is_cut(text_of):
     """Whatever an exception holds, the line stays short, and is found at once."""
     assert text_of(RuntimeError("-/" * 200_000)).startswith("RuntimeError: -/-/")
     assert len(text_of(RuntimeError("/a/b.py " * 200_000))) == 500
+
+
+@pytest.mark.parametrize("message", ["", "no", "ValueError: no", "ValueError"])
+def test_the_name_of_the_class_is_no_part_of_the_message(faults, tmp_path, message):
+    """They are sent as two values."""
+    told = faults.Describer(str(tmp_path)).exception(ValueError(message))
+    assert (told["code"], told["type"], told["message"]) == ("exception", "ValueError", message)
 
 
 def test_a_str_that_raises_leaves_the_class(text_of):

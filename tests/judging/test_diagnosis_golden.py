@@ -22,7 +22,7 @@ from diagnosis_samples import (
 from grader.judging.diagnosis.diagnose import CAUSES
 from grader.model.exercise import Outcome
 from grader.model.report import ExerciseReport, Verdict
-from grader.model.trace import Trace
+from grader.model.trace import Start, StartWay, Trace
 from grader.reading.sources import source_text
 
 Row = Mapping[str, Any]
@@ -37,7 +37,9 @@ def explained(row: Row, traces: Mapping[str, Trace]) -> ExerciseReport:
 
 def crash_traces(row: Row) -> dict[str, Trace]:
     scenarios = exercise_of(row["file"]).scenarios
-    return {s.id: crashed(row["file"], row["fault"]).trace(s.id) for s in scenarios if row["file"] in s.processes}
+    starts = (Start(row["file"], row["file"], StartWay.SCRIPT, hidden=tuple(row["fault"].get("hidden", ()))),)
+    rec = crashed(row["file"], row["fault"])
+    return {s.id: rec.trace(s.id, starts=starts) for s in scenarios if row["file"] in s.processes}
 
 
 def behaviour_traces(row: Row) -> dict[str, Trace]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import Any
 
 from grader.model.trace import Endpoint, Fault, FaultKind, GraphSnapshot, OutputLine
 from grader.recording.observer import Taken
+from grader.recording.places import Places
 from grader.recording.plan import Plan, PlannedNumbers
 from grader.recording.workload import Delay
 
+#: Stands for the submission: this file is in it.
+HERE = Path(__file__).resolve().parent
 MS = 1_000_000
 EPOCH_NS = 1_767_225_600_000_000_000
 FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
@@ -126,6 +130,8 @@ class ScriptedStudent:
         self.workload: ScriptedWorkload | None = None
         self.unsettled = ""
         self.notes: list[str] = []
+        self.places = Places(HERE)
+        self.start_told = None
         self.stop_signalled = self.stopping = False
         self.heard: list[dict[str, Any]] = []
         self.missing: Any = []
@@ -188,9 +194,9 @@ class ScriptedStudent:
         written, self._written = self._written, []
         return [OutputLine(t_ns, self.name, "stdout", text) for text in written]
 
-    def note(self, text: str) -> None:
+    def note(self, report: dict[str, Any]) -> None:
         """Take a note."""
-        self.notes.append(text)
+        self.notes.append(str(report.get("code")))
 
     def drain(self, reads: int = 1) -> None:
         """Read what has been written: it has been."""

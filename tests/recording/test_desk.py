@@ -198,9 +198,16 @@ def test_more_requests_than_the_limit_end_the_recording():
         ({"code": 130}, False, True),
         ({"code": 1}, False, False),
         ({}, False, False),
-        ({"code": 0, "fault": {"text": "AttributeError: no"}}, False, False),
-        ({"code": 1, "fault": {"text": "rclpy.executors.ExternalShutdownException"}}, False, True),
-        ({"code": 1, "fault": {"text": "RCLError: failed to shutdown: rcl_shutdown already called on"}}, False, True),
+        ({"code": 0, "fault": {"code": "exception", "type": "AttributeError", "message": "no"}}, False, False),
+        ({"code": 1, "fault": {"code": "exception", "type": "rclpy.executors.ExternalShutdownException"}}, False, True),
+        (
+            {
+                "code": 1,
+                "fault": {"code": "exception", "type": "RCLError", "message": "rcl_shutdown already called on"},
+            },
+            False,
+            True,
+        ),
     ],
 )
 def test_ends_that_are_no_faults(report, free, normal):

@@ -13,18 +13,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.model.limits import Limits
-from grader.model.trace import FaultKind, LogRecord, OutputLine
+from grader.model.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.recording import student as module
 from grader.recording.isolation.protocol import Command
+from grader.recording.places import Places
 from grader.recording.student import Student
 
 ROOT = "/submission"
 TOKEN = "0123456789abcdef" * 2
 
 
+class OneFile(Places):
+    """A submission of one file, pkg/a.py, with a hundred lines."""
+
+    def __init__(self) -> None:
+        super().__init__(None)
+
+    def lines(self, file: str) -> int:
+        return 100 if file == "pkg/a.py" else 0
+
+
 def silent() -> Student:
     """Return a student whose output a test makes up."""
-    return Student("a.py", ROOT, None, None, log_token=TOKEN)
+    return Student("a.py", ROOT, None, None, log_token=TOKEN, file="pkg/a.py", places=OneFile())
 
 
 def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> list:
@@ -74,7 +85,11 @@ def test_a_place_outside_the_submission_is_none():
     """Only the student's own files are named."""
     assert read(record(file="/usr/lib/x.py")) == [logged("hello", file="", line=0)]
     assert read(record(file=f"{ROOT}-other/a.py")) == [logged("hello", file="", line=0)]
-    assert read(record(line=10**30)) == [logged("hello", line=10**8)]
+    assert read(record(file=f"{ROOT}/../../etc/passwd")) == [logged("hello", file="", line=0)]
+    assert read(record(file=f"{ROOT}/pkg/b.py")) == [logged("hello", file="", line=0)]
+    assert read(record(line=10**30)) == [logged("hello", file="", line=0)]
+    assert read(record(line=100)) == [logged("hello", line=100)]
+    assert read(record(line=0)) == [logged("hello", file="", line=0)]
 
 
 @given(st.integers(min_value=0, max_value=len(record("one\ntwo") + b"and a line\n" + record("three"))))
@@ -143,6 +158,84 @@ def test_a_token_is_what_the_host_draws(start, token):
     student = start(f"report(kind='ready', log_token={token!r})")
     assert student.is_ready()
     assert student.log_token == ""
+
+
+@pytest.mark.parametrize(
+    ("report", "notes"),
+    [
+        ({"code": "main_not_called"}, ["pkg/a.py: nothing calls main(), so `python3 pkg/a.py` would do nothing"]),
+        ({"code": "main_not_called", "text": "x", "file": "b.py"}, ["pkg/a.py: nothing calls main()"]),
+        ({"code": "class_not_started", "class": "Pub"}, ["pkg/a.py: nothing starts Pub, so `python3 pkg/a.py` would"]),
+        ({"code": "class_not_started", "class": "the machine failed"}, []),
+        ({"code": "class_not_started", "class": "x" * 101}, []),
+        ({"code": "class_not_started"}, []),
+        (
+            {"code": "neighbour_imported", "module": "a"},
+            ["pkg/a.py: import a finds a.py beside it with `python3` only"],
+        ),
+        ({"code": "neighbour_imported", "module": "b"}, []),
+        ({"code": "neighbour_imported", "module": ["a"]}, []),
+        ({"code": "the machine failed"}, []),
+        ({"code": ["main_not_called"]}, []),
+        ({"text": "the machine failed; by the course's rule this counts as 30 of 30"}, []),
+    ],
+)
+def test_notes_are_codes_and_the_words_are_ours(report, notes):
+    """A process cannot have a sentence of its own shown as the grader's."""
+    student = silent()
+    student.note({"kind": "note", **report})
+    assert [told[: len(note)] for told, note in zip(student.notes, notes, strict=True)] == notes
+
+
+STARTED = {"code": "started", "module": "pkg.a", "function": "main", "hidden": []}
+
+
+@pytest.mark.parametrize(
+    ("said", "way", "target"),
+    [
+        ({"way": "script"}, StartWay.SCRIPT, ""),
+        ({"way": "script", "module": "the machine failed"}, StartWay.SCRIPT, ""),
+        ({"way": "main"}, StartWay.MAIN, "pkg.a:main"),
+        ({"way": "entry_point", "function": "Robot.main"}, StartWay.ENTRY_POINT, "pkg.a:Robot.main"),
+        ({"way": "module", "function": ""}, StartWay.MODULE, "pkg.a"),
+    ],
+)
+def test_how_a_file_was_started_is_told_once(said, way, target):
+    """Before anything of it runs: whatever is said later is not believed."""
+    student = silent()
+    student.note({**STARTED, **said})
+    student.note({**STARTED, "way": "module", "function": ""})
+    assert student.start_told == Start("a.py", "pkg/a.py", way, target)
+    assert student.notes == []
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"way": "by magic"},
+        {"way": "main", "function": "the machine failed"},
+        {"way": "main", "function": 5},
+        {"way": "main", "module": "the machine failed; a"},
+        {"way": "main", "module": "other"},
+        {"way": "main", "module": None},
+        {"way": ["main"]},
+    ],
+)
+def test_what_is_no_way_to_start_a_file_is_dropped(said):
+    """Only names fit."""
+    student = silent()
+    student.note({**STARTED, **said})
+    assert student.start_told is None
+
+
+def test_files_that_hide_modules_are_files_of_the_submission():
+    """Any other name is made up."""
+    student = silent()
+    hidden = ["a.py", "random.py", "../a.py", "pkg/a.py", 5, None]
+    student.note({**STARTED, "way": "script", "hidden": hidden})
+    assert student.start_told.hidden == ("a.py",)
+    (note,) = student.notes
+    assert note.startswith("a.py has the name of a module that Python or ROS needs")
 
 
 def test_the_record_after_a_broken_one_is_found():

@@ -147,12 +147,12 @@ def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
     """An exit with a fault, a death without a word, and what was written before."""
 
     def leaves(me, world):
-        yield {"kind": "note", "text": "no guard"}
+        yield {"kind": "note", "code": "main_not_called"}
         me.write("bye")
-        yield {"kind": "exited", "code": 1, "fault": {"kind": "exception", "text": "ValueError: x"}}
+        yield {"kind": "exited", "code": 1, "fault": {"code": "exception", "type": "ValueError", "message": "x"}}
 
     def dies(me, world):
-        yield {"kind": "fault", "text": "KeyError: in a thread"}
+        yield {"kind": "fault", "fault": {"code": "exception", "type": "KeyError", "message": "in a thread"}}
         me.write("last words")
         yield None
 
@@ -163,7 +163,7 @@ def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
         ("b.py", FaultKind.KILLED, "ended by SIGKILL"),
     ]
     assert [line.text for line in trace.lines()] == ["bye", "last words"]
-    assert trace.notes == ("no guard",)
+    assert trace.notes == ("main_not_called",)
     assert trace.stop_ns == 1000 * MS
 
 

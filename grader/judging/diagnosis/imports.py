@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
@@ -112,7 +113,34 @@ def _shadowed(case: Case) -> Clue | None:
     return Clue(f"a file of yours has the name of the module {found[1]} and is imported in its place: rename the file")
 
 
+def _hidden_module(case: Case) -> Clue | None:
+    """A file of the submission is imported in place of the module that the error names."""
+    found = case.said(r"^(?:ImportError|ModuleNotFoundError|AttributeError): .*")
+    hidden = [name for start in case.trace.starts if start.process == case.process for name in start.hidden]
+    words = re.findall(r"'([\w.]+)'", found[0]) if found is not None else []
+    named = {word.partition(".")[0] for word in words}
+    name = next((name for name in hidden if name.removesuffix(".py") in named), None)
+    if name is None:
+        return None
+    return Clue(f"{name} has the name of a module and is imported in its place: rename it")
+
+
+def _no_package(case: Case) -> Clue | None:
+    if case.said(r"^ImportError: attempted relative import with no known parent package") is None:
+        return None
+    source, fault = case.source, case.fault
+    written = [n for n in source.all(ast.ImportFrom) if n.level and fault and n.lineno == fault.line] if source else []
+    advice = "a relative import works in a package only, and this file is in none"
+    if source is None or not written or written[0].level > 1:
+        return Clue(f"{advice}: hand in the whole package, with its setup.py and __init__.py")
+    names = ", ".join(a.name + (f" as {a.asname}" if a.asname else "") for a in written[0].names)
+    plain = f"from {written[0].module} import {names}" if written[0].module else f"import {names}"
+    return Clue(f"{advice}: write {plain}, or hand in the whole package, with its setup.py and __init__.py")
+
+
 IMPORTS = (
+    Cause("hidden_module", _hidden_module),
+    Cause("no_package", _no_package),
     Cause("ros_1", _ros_1),
     Cause("missing_module", _missing_module),
     Cause("cannot_import", _cannot_import),

@@ -30,6 +30,8 @@ from grader.model.trace import (
     Request,
     Response,
     ServiceEnd,
+    Start,
+    StartWay,
     Trace,
 )
 from grader.recording.codec import FORMAT, lively, trace_from_json, trace_to_json
@@ -153,6 +155,7 @@ class _Packed(msgspec.Struct, forbid_unknown_fields=True):
     notes: tuple[str, ...]
     harness_problem: str
     observations: list[_Message | _Delivery | _Request | _Response | _Log | _Line | _Graph | _Fault | _Offer | _Mark]
+    starts: list[tuple[str, str, StartWay, str, tuple[str, ...]]] = []
 
 
 _DECODER = msgspec.json.Decoder(_Packed)
@@ -238,6 +241,7 @@ def unpack(data: bytes) -> Trace:
         packed.clock_reason,
         packed.notes,
         packed.harness_problem,
+        tuple(Start(*start) for start in packed.starts),
     )
 
 

@@ -1,0 +1,276 @@
+"""Finds out how a ROS user starts a file: `python3 FILE`, or as `ros2 run` does where the file belongs to a package.
+
+Nothing is imported or run here: setup.py is only parsed.
+"""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import os
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+#: What makes a folder that of a ROS package.
+MARKERS = ("setup.py", "package.xml")
+#: The name of a package whose own folder is all that was handed in.
+NAMELESS = "submission"
+#: Folders of a submission that are looked at in search of packages, and the longest text that is put together of a
+#: setup.py.
+FOLDERS, TEXT_CHARACTERS = 500, 10_000
+
+SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
+
+
+class Layout(NamedTuple):
+    """Where a file lies.
+
+    Attributes:
+        module: Its dotted name in its package; empty for a file in none.
+        base: The folder that the dotted name begins in, absolute; empty if that is above the submission.
+        package: Relative folder of the ROS package, that of its setup.py or package.xml; None without one.
+    """
+
+    module: str = ""
+    base: str = ""
+    package: str | None = None
+
+
+class Start(NamedTuple):
+    """How a file is started.
+
+    Attributes:
+        way: `script` as `python3 FILE`, `module` as `python3 -m MODULE`, `main` imports the module and calls its
+            main(), `entry_point` calls what setup.py names for it.
+        module: Dotted name; empty for a script.
+        function: What is called, empty if nothing is.
+        base: As for `Layout`.
+    """
+
+    way: str
+    module: str = ""
+    function: str = ""
+    base: str = ""
+
+
+def layout_of(root: str, file: str) -> Layout:
+    """Return where a file lies; it is in a package with `__init__.py` beside it or a setup.py or package.xml above."""
+    folder = os.path.dirname(file)
+    above = [folder]
+    while above[-1]:
+        above.append(os.path.dirname(above[-1]))
+    package = next((f for f in above if any(_is_file(root, f, marker) for marker in MARKERS)), None)
+    inside = [f for f in above if _is_file(root, f, "__init__.py")]
+    chain = above[: next((n for n, f in enumerate(above) if f not in inside), len(above))]
+    stem = os.path.splitext(os.path.basename(file))[0]
+    if not chain and package is None:
+        return Layout()
+    if not chain and package is not None:
+        below = os.path.relpath(folder, package) if folder != package else ""
+        names, base = [part for part in below.split("/") if part], os.path.join(root, package)
+    else:
+        names = [os.path.basename(f) or NAMELESS for f in reversed(chain)]
+        base = "" if chain[-1] == "" else os.path.join(root, os.path.dirname(chain[-1]))
+    names.append(stem)
+    return Layout() if any("." in name for name in names) else Layout(".".join(names), base.rstrip("/"), package)
+
+
+def _is_file(root: str, folder: str, name: str) -> bool:
+    return os.path.isfile(os.path.join(root, folder, name))
+
+
+def package_folders(root: str) -> list[str]:
+    """Return the folders of all ROS packages of a submission, which are importable together once they are built."""
+    found = []
+    for number, (folder, folders, files) in enumerate(os.walk(root)):
+        folders.sort()
+        if number >= FOLDERS:
+            break
+        found += [folder] if any(marker in files for marker in MARKERS) else []
+    return found
+
+
+def start_of(root: str, file: str, layout: Layout, tree: ast.Module) -> Start:
+    """Return how a file is started.
+
+    Args:
+        root: The submission's folder.
+        file: The file, relative to it.
+        layout: Where it lies.
+        tree: Its code.
+    """
+    if not layout.module:
+        return Start(SCRIPT)
+    if layout.package is not None:
+        found = _entry_point(root, file, layout)
+        if found is not None:
+            return found
+    way = MAIN if _offers_main(tree) else MODULE
+    return Start(way, layout.module, "main" if way == MAIN else "", layout.base)
+
+
+def _entry_point(root: str, file: str, layout: Layout) -> Start | None:
+    """Return the console script that runs a file, that of the file's own name before others."""
+    folder = os.path.join(root, layout.package or "")
+    has_init = _is_file(root, os.path.dirname(file), "__init__.py")
+    found = []
+    for name, module, function in console_scripts(folder):
+        path = f"/{module.replace('.', '/')}.py"
+        base = os.path.join(root, file).removesuffix(path)
+        inside = base == folder.rstrip("/") or base.startswith(os.path.join(folder, ""))
+        # without an __init__.py the package is what setup.py says; with one, the name must be right
+        if module == layout.module or (not has_init and base + path == os.path.join(root, file) and inside):
+            base = layout.base if module == layout.module else base
+            found.append((name == module.rpartition(".")[2], Start(ENTRY_POINT, module, function, base)))
+    return max(found, key=lambda pair: pair[0], default=(False, None))[1]
+
+
+def console_scripts(folder: str) -> list[tuple[str, str, str]]:
+    """Return name, module and function of the console scripts that setup.py and setup.cfg of a folder name."""
+    lines: list[str] = []
+    try:
+        with open(os.path.join(folder, "setup.py"), "rb") as source:
+            lines += _scripts_of_setup(ast.parse(source.read()))
+    except (OSError, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
+        pass  # a setup.py that nobody can read names nothing
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read(os.path.join(folder, "setup.cfg"), encoding="utf-8")
+        lines += parser.get("options.entry_points", "console_scripts", fallback="").splitlines()
+    except (configparser.Error, OSError, UnicodeDecodeError):
+        pass
+    return [script for line in lines if (script := _script(line)) is not None]
+
+
+def _script(line: str) -> tuple[str, str, str] | None:
+    """Return the parts of `name = module:function`."""
+    name, equals, target = (part.strip() for part in line.partition("="))
+    module, colon, function = (part.strip() for part in target.partition("[")[0].partition(":"))
+    parts = [*module.split("."), *function.split(".")]
+    return (name, module, function) if equals and colon and all(part.isidentifier() for part in parts) else None
+
+
+def _scripts_of_setup(tree: ast.Module) -> list[str]:
+    known: dict[str, Any] = {}
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            known[statement.targets[0].id] = _value(statement.value, known)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _name(node.func) == "setup":
+            given = next((_value(k.value, known) for k in node.keywords if k.arg == "entry_points"), None)
+            scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
+            scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
+            return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, (list, tuple)) else []
+    return []
+
+
+def _ini_scripts(text: Any) -> list[str]:
+    """Return the console scripts of entry points that are written as one text."""
+    lines = text.splitlines() if isinstance(text, str) else []
+    section, found = "", []
+    for line in map(str.strip, lines):
+        if line.startswith("["):
+            section = line.strip("[] ")
+        elif section == "console_scripts":
+            found.append(line)
+    return found
+
+
+def _name(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+
+
+def _value(node: ast.expr | None, known: dict[str, Any]) -> Any:
+    """Return what an expression of texts, lists and dictionaries comes to; None for anything else."""
+    value: Any = None
+    if isinstance(node, ast.Constant):
+        value = node.value
+    elif isinstance(node, ast.Name):
+        value = known.get(node.id)
+    elif isinstance(node, (ast.List, ast.Tuple)):
+        value = [_value(item, known) for item in node.elts]
+    elif isinstance(node, ast.Dict):
+        value = {_value(k, known): _value(v, known) for k, v in zip(node.keys, node.values, strict=True) if k}
+    elif isinstance(node, ast.JoinedStr):
+        parts = [_value(p.value if isinstance(p, ast.FormattedValue) else p, known) for p in node.values]
+        value = "".join(parts) if all(isinstance(part, str) for part in parts) else None
+    elif isinstance(node, ast.BinOp):
+        value = _combined(node, known)
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
+        text, values = _value(node.func.value, known), [_value(a, known) for a in node.args]
+        named = {k.arg: _value(k.value, known) for k in node.keywords if k.arg}
+        plain = all(isinstance(v, str) for v in (*values, *named.values()))
+        value = text.format(*values, **named) if isinstance(text, str) and len(text) < 1000 and plain else None
+    if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
+        raise ValueError
+    return value
+
+
+def _combined(node: ast.BinOp, known: dict[str, Any]) -> Any:
+    left, right = _value(node.left, known), _value(node.right, known)
+    if isinstance(node.op, ast.Add) and isinstance(left, str) and isinstance(right, str):
+        return left + right
+    if isinstance(node.op, ast.Add) and isinstance(left, list) and isinstance(right, list):
+        return left + right
+    if isinstance(node.op, ast.Mod) and isinstance(left, str) and len(left) < 1000:
+        values = tuple(right) if isinstance(right, list) else (right,)
+        return left % values if all(isinstance(v, str) for v in values) else None
+    return None
+
+
+def _offers_main(tree: ast.Module) -> bool:
+    """Return whether `main()` starts a module: it can be called so, and the module itself does nothing else."""
+    main = next((s for s in _top_level(tree.body) if _defines_main(s)), None)
+    if main is None or (isinstance(main, ast.FunctionDef) and _must_be_given(main.args)):
+        return False
+    guards = [s for s in _top_level(tree.body) if is_guard(s)]
+    others = [s for s in tree.body if not never_true(s) and not any(guard in ast.walk(s) for guard in guards)]
+    return not calls(others, "main") and (not guards or calls(guards, "main"))
+
+
+def _top_level(statements: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield the statements that run when a module is imported, those inside of conditions too."""
+    for statement in statements:
+        yield statement
+        if isinstance(statement, (ast.If, ast.Try)):
+            yield from _top_level([*statement.body, *statement.orelse, *getattr(statement, "finalbody", ())])
+
+
+def _defines_main(statement: ast.stmt) -> bool:
+    if isinstance(statement, ast.ImportFrom):
+        return any((alias.asname or alias.name) == "main" for alias in statement.names)
+    return isinstance(statement, ast.FunctionDef) and statement.name == "main"
+
+
+def _must_be_given(arguments: ast.arguments) -> bool:
+    positional = len(arguments.posonlyargs) + len(arguments.args) - len(arguments.defaults)
+    return positional > 0 or any(default is None for default in arguments.kw_defaults)
+
+
+def is_guard(statement: ast.stmt) -> bool:
+    """Return whether a statement is `if __name__ == "__main__":`, in whatever order."""
+    if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
+        return False
+    test = statement.test
+    names = {node.id for node in ast.walk(test) if isinstance(node, ast.Name)}
+    texts = {node.value for node in ast.walk(test) if isinstance(node, ast.Constant)}
+    return "__name__" in names and "__main__" in texts and not isinstance(test.ops[0], ast.NotEq)
+
+
+def never_true(statement: ast.stmt) -> bool:
+    """Return whether a statement is a guard on `__name__` that does not hold, such as a misspelt one."""
+    if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
+        return False
+    names = {node.id for node in ast.walk(statement.test) if isinstance(node, ast.Name)}
+    texts = {node.value for node in ast.walk(statement.test) if isinstance(node, ast.Constant)}
+    return "__name__" in texts or ("__name__" in names and "__main__" not in texts)
+
+
+def calls(statements: Sequence[ast.stmt], name: str) -> bool:
+    """Return whether one of some statements calls a name when it runs, outside of functions and classes."""
+    return any(
+        isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == name
+        for statement in statements
+        if not isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef))
+        for node in ast.walk(statement)
+    )

@@ -1,0 +1,101 @@
+"""What a student's process has to mention, as codes; the words are here, and what they name is checked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from grader.model.trace import Start, StartWay
+from grader.recording.places import Places
+
+_WAYS = {way.value: way for way in StartWay}
+_NAME_CHARACTERS, _HIDDEN = 100, 20
+#: The dotted name of a module; folders may have any name, and may not have any sign.
+_TARGET = re.compile(r"[\w.() -]{1,300}")
+
+
+def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
+    """Return the sentence for a code; empty for a code that is unknown, or that names what cannot be.
+
+    Args:
+        file: The file that the process runs.
+        data: What it says.
+        places: The files of the submission.
+    """
+    say = NOTES.get(str(data.get("code")))
+    return say(file, data, places) if say is not None else ""
+
+
+def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -> Start | None:
+    """Return how a process says that its file is started; None if it says no such thing.
+
+    Args:
+        process: Name of the process.
+        file: The file that it runs.
+        data: What it says.
+        places: The files of the submission.
+    """
+    way, module, function = _WAYS.get(str(data.get("way"))), data.get("module"), data.get("function")
+    if way is None or not isinstance(module, str) or not isinstance(function, str):
+        return None
+    stem = file.rpartition("/")[2].rpartition(".")[0]
+    named = all(map(_is_name, function.split("."))) if function else True
+    if way is not StartWay.SCRIPT and (not named or module.rpartition(".")[2] != stem or not _TARGET.fullmatch(module)):
+        return None
+    target = "" if way is StartWay.SCRIPT else f"{module}:{function}" if function else module
+    hidden = data.get("hidden")
+    kept = [n for n in hidden[:_HIDDEN] if _is_there(n, file, places)] if isinstance(hidden, list) else []
+    return Start(process, file, way, target, tuple(kept))
+
+
+def hidden_notes(start: Start) -> list[str]:
+    """Return a sentence for each file that hides a module."""
+    need = "has the name of a module that Python or ROS needs: `python3` imports it instead; rename it"
+    return [f"{name} {need}" for name in start.hidden]
+
+
+def _is_there(name: object, file: str, places: Places) -> bool:
+    """Return whether a module lies beside a file, or in a folder above it."""
+    if not isinstance(name, str) or "/" in name:
+        return False
+    folders = [file]
+    while folders[-1]:
+        folders.append(folders[-1].rpartition("/")[0])
+    paths = [f"{folder}/{name}".lstrip("/") for folder in folders[1:]]
+    return any(places.has(path) or places.has(f"{path}/__init__.py") for path in paths)
+
+
+def _main_not_called(file: str, data: Mapping[str, Any], places: Places) -> str:
+    del data, places
+    said = f"{file}: nothing calls main(), so `python3 {file}` would do nothing"
+    return f"{said}; add: if __name__ == '__main__': main()"
+
+
+def _class_not_started(file: str, data: Mapping[str, Any], places: Places) -> str:
+    del places
+    name = data.get("class")
+    if not _is_name(name):
+        return ""
+    said = f"{file}: nothing starts {name}, so `python3 {file}` would do nothing"
+    return f"{said}; add a main() that calls rclpy.init(), makes the node and spins it"
+
+
+def _neighbour_imported(file: str, data: Mapping[str, Any], places: Places) -> str:
+    name = data.get("module")
+    if not _is_name(name) or not places.has(f"{file.rpartition('/')[0]}/{name}.py".lstrip("/")):
+        return ""
+    said = f"{file}: import {name} finds {name}.py beside it with `python3` only, not with `ros2 run`"
+    return f"{said}; in a package, write: from . import {name}"
+
+
+def _is_name(name: object) -> bool:
+    return isinstance(name, str) and name.isidentifier() and len(name) <= _NAME_CHARACTERS
+
+
+#: Every code that a process may send, and its sentence.
+NOTES: Mapping[str, Callable[[str, Mapping[str, Any], Places], str]] = {
+    "main_not_called": _main_not_called,
+    "class_not_started": _class_not_started,
+    "neighbour_imported": _neighbour_imported,
+}
