@@ -29,6 +29,7 @@ from grader.recording.budget import RealTimeBudget
 from grader.recording.codec import trace_from_json
 from grader.recording.ending import is_unexplained
 from grader.recording.isolation.environment import worker_environment
+from grader.recording.isolation.exposure import worker_view
 from grader.recording.isolation.protocol import Isolation, PythonRuntime, runtime_to_json
 from grader.recording.plan import Plan, plan_to_json
 from grader.recording.usage import families, usage
@@ -83,7 +84,9 @@ class WorkerProcess:
         self._line, theirs = socket.socketpair()
         request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": runtime_to_json(runtime)}
         argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
-        command = isolation.worker_command(argv, _environment(runtime, scratch), (theirs.fileno(),))
+        command = isolation.worker_command(
+            argv, _environment(runtime, scratch), (theirs.fileno(),), worker_view(runtime, scratch)
+        )
         self._process = subprocess.Popen(
             command.argv,
             env=dict(command.environment),
@@ -204,7 +207,8 @@ class Recorder:
         isolation: The tier.
         runtime: Interpreter and ROS.
         domains: Gives ROS domains, a new one for every scenario.
-        scratch: A folder for what ROS writes beside its work; the caller removes it.
+        scratch: A folder for what ROS writes beside its work, and for all that is recorded: a worker may see no
+            other. The caller removes it.
         workers: How many scenarios are recorded at the same time.
     """
 

@@ -1,6 +1,7 @@
 """What tests that record real nodes share."""
 
 import pytest
+from hostile import staging
 
 from grader.recording.studio import open_studio
 
@@ -9,4 +10,4 @@ from grader.recording.studio import open_studio
 def studio():
     """The strongest sandbox of this machine, with warm workers."""
     with open_studio("auto") as studio:
-        yield studio
+        yield staging(studio)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 from grader.model.limits import Limits
@@ -64,6 +67,23 @@ def hostile(harm: str = "", later: str = "", before: str = "") -> str:
             "main(Hostile)",
         )
     )
+
+
+def staging(studio: Studio) -> Studio:
+    """Have a studio copy what is recorded into its own folder, because workers see no other."""
+    each = studio.recorder.each
+
+    def each_staged(jobs, progress):
+        root = Path(tempfile.mkdtemp(dir=studio.folder))
+        for number, job in enumerate(jobs):
+            shutil.copytree(job.plan.root, root / str(number))
+        root.chmod(0o755)
+        yield from each(
+            [replace(j, plan=replace(j.plan, root=str(root / str(n)))) for n, j in enumerate(jobs)], progress
+        )
+
+    studio.recorder.each = each_staged
+    return studio
 
 
 def record(studio: Studio, folder: Path, *programs: str, limits: Limits | None = None, **fields: object) -> Trace:

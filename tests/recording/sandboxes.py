@@ -17,7 +17,7 @@ import grader
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation.bubblewrap import Bubblewrap
 from grader.recording.isolation.environment import runtime_environment
-from grader.recording.isolation.exposure import closed_folders
+from grader.recording.isolation.exposure import closed_folders, worker_view
 from grader.recording.isolation.flat import FlatBubblewrap
 from grader.recording.isolation.landlock import Landlock
 from grader.recording.isolation.protocol import Command, Isolation, Limits, StudentProcess
@@ -69,7 +69,8 @@ class Sandbox:
     def worker(self, argv: tuple[str, ...], *, pass_fds: tuple[int, ...] = (), **variables: str) -> Command:
         """Return the command of a worker."""
         environment = {**runtime_environment(self.ros.runtime), **variables}
-        command = self.isolation.worker_command(argv, environment, pass_fds)
+        view = worker_view(self.ros.runtime, self.submission)
+        command = self.isolation.worker_command(argv, environment, pass_fds, view)
         return replace(command, argv=(*self.start_as, *command.argv))
 
     def run(self, code: str, **options: object) -> subprocess.CompletedProcess[str]:

@@ -1,6 +1,7 @@
 """What the walls around students' processes hold back, tried with real processes."""
 
 import errno
+import fcntl
 import json
 import os
 import secrets
@@ -539,6 +540,51 @@ def test_a_worker_dies_with_the_grader(any_tier):
     assert _wait_until(lambda: not _living(marker)), _living(marker)
 
 
+LOCKS = {
+    "flock": "fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)",
+    "process": "fcntl.lockf(file, fcntl.LOCK_SH | fcntl.LOCK_NB)",
+    "descriptor": "fcntl.fcntl(file, 37, struct.pack('hhqqi4x', fcntl.F_RDLCK, 0, 0, 0, 0))",
+}
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_lock_on_a_shared_file_is_felt_by_nobody(any_tier, tmp_path, ros, lock):
+    """Students who are graded at the same time could speak by it; the program believes that it has its lock."""
+    if any_tier.isolation.name == "none":
+        pytest.skip("there is no filter")
+    shared = Path(os.__file__)
+    code = f"""
+import fcntl, struct, sys, time
+file = open({str(shared)!r}, "rb")
+{LOCKS[lock]}
+print("locked", flush=True)
+time.sleep(60)
+"""
+    student = any_tier.student(code)
+    with start(any_tier.around(student)) as process, shared.open("rb+") as file:
+        close(student)
+        assert process.stdout.readline() == "locked\n", process.stderr.read()
+        (fcntl.flock if lock == "flock" else fcntl.lockf)(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_a_student_hears_nothing_of_who_opens_a_shared_file(any_tier):
+    """Neither by a watch nor by a lease."""
+    if any_tier.isolation.name == "none":
+        pytest.skip("there is no filter")
+    code = """
+import ctypes, fcntl, os
+system = ctypes.CDLL(None, use_errno=True)
+watch = system.inotify_add_watch(system.inotify_init(), os.__file__.encode(), 0xFFF)
+try:
+    fcntl.fcntl(open(os.__file__), fcntl.F_SETLEASE, fcntl.F_RDLCK)
+    lease = "lease"
+except PermissionError:
+    lease = ""
+print([watch, lease])
+"""
+    assert any_tier.run(code).stdout == "[-1, '']\n"
+
+
 # --- the worker ---
 
 
@@ -558,6 +604,47 @@ print(json.dumps([dict(os.environ), [name for _, name in socket.if_nameindex()],
     assert environment["COLOUR"] == "blue"
     assert (network, folder, files, memory, first) == (["lo"], "/", True, ["marker-of-a-worker"], True)
     assert not Path("/dev/shm/marker-of-a-worker").exists()
+
+
+#: Prints every file that a worker can open, without those of the system, and every folder that it can write to.
+LOOK_AROUND = """
+import json, os, sys
+readable, writable = [], []
+for folder, folders, files in os.walk("/"):
+    if folder in ("/proc", "/usr"):
+        folders.clear()
+        continue
+    if os.access(folder, os.W_OK):
+        writable.append(folder)
+    for name in files:
+        path = os.path.join(folder, name)
+        try:
+            os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+        except OSError:
+            continue
+        readable.append(path)
+print(json.dumps([readable, writable]))
+"""
+
+
+def test_a_worker_opens_nothing_of_the_instructor(sandbox, tmp_path, ros):
+    """It sees Python, ROS, its own modules and its folder: no other folder, no rubric, no key, no other submission."""
+    beside = sandbox.submission.parent / "another-submission.py"
+    beside.write_text("canary", encoding="utf-8")
+    beside.chmod(0o644)
+    command = sandbox.worker((sys.executable, "-I", "-S", "-c", LOOK_AROUND))
+    readable, writable = (set(map(Path, found)) for found in said(finish(command)))
+    package = HOST.parent
+    seen = {path.relative_to(package).parts[0] for path in readable if package in path.parents}
+    assert seen == {"__init__.py", "model", "host", "recording"}
+    needed = (*ros.runtime.read_paths, ros.runtime.executable, package, sandbox.submission, Path("/dev"))
+    roots = {path.resolve() for path in needed} | set(needed)
+    programs = {Path("/run/rclpy-grader.users")}
+    strangers = {p for p in readable - programs if roots.isdisjoint((p, *p.parents, p.resolve()))}
+    assert strangers == set()
+    assert beside not in readable
+    ours = (sandbox.submission, Path("/tmp"), Path("/dev"))
+    assert {path for path in writable if not any(own in (path, *path.parents) for own in ours)} == set()
 
 
 def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier):

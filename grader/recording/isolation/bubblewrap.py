@@ -13,8 +13,8 @@ from pathlib import Path
 from grader.model.errors import EnvironmentFault
 from grader.recording.isolation import seccomp
 from grader.recording.isolation.environment import student_environment
-from grader.recording.isolation.exposure import STUDENT_GROUP, make_readable, secrets_within, some_user
-from grader.recording.isolation.protocol import Command, Limits, StudentProcess
+from grader.recording.isolation.exposure import STUDENT_GROUP, make_readable, secrets_within, some_user, taken_users
+from grader.recording.isolation.protocol import Command, Limits, StudentProcess, WorkerView
 from grader.recording.isolation.remedies import install_command
 from grader.recording.isolation.view import parents_of, view_of
 
@@ -82,18 +82,48 @@ class Bubblewrap:
         """Where a student's process sees the `host` package."""
         return str(HOST)
 
-    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
         """Return the command that starts the trusted worker.
 
-        It sees all files, but has its own network with only `lo`, its own processes and its own /dev/shm: what it
-        leaves behind goes with it. It is killed when the caller dies.
+        It has its own network with only `lo`, its own processes and its own /dev/shm: what it leaves behind goes with
+        it. It is killed when the caller dies.
         """
         walls = [
             *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
             *(() if self.as_root else ("--unshare-user",)),
-            *("--dev-bind", "/", "/", "--proc", "/proc", "--perms", "1777", "--tmpfs", "/dev/shm", "--chdir", "/"),  # noqa: S108
+            *(("--dev-bind", "/", "/", "--proc", "/proc") if view is None else self._workers_files(view)),
+            *("--perms", "1777", "--tmpfs", "/dev/shm", "--chdir", "/"),  # noqa: S108
+            *(() if view is None else ("--remount-ro", "/")),
         ]
         return Command((str(self.bwrap), *walls, "--", *argv), dict(environment), tuple(pass_fds))
+
+    def _workers_files(self, view: WorkerView) -> list[str]:
+        """Return the options that show a worker what it needs, the programs that start a student among them."""
+        shared = taken_users() if self.as_root else ()
+        read = view_of((*view.read, self.bwrap, self.prlimit, self.setpriv))
+        own = view_of(view.own)
+        options = ["--proc", "/proc", "--dev", "/dev", "--perms", "1777", "--tmpfs", "/tmp"]  # noqa: S108
+        for folder in parents_of((*read.bound, *(where for where, _ in read.links), *view.write, *shared)):
+            options += ["--perms", "0755", "--dir", str(folder)]
+        for path in read.bound:
+            options += ["--ro-bind", str(path), str(path)]
+        for where, target in read.links:
+            options += ["--symlink", target, str(where)]
+        for folder in view.hidden:
+            options += ["--perms", "0755", "--tmpfs", str(folder)]
+        for path in own.bound:
+            options += ["--ro-bind", str(path), str(path)]
+        for folder in view.hidden:
+            options += ["--remount-ro", str(folder)]
+        for path in (*view.write, *shared):
+            options += ["--bind", str(path), str(path)]
+        return options
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker.

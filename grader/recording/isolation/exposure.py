@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import os
@@ -13,7 +14,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import grader
-from grader.recording.isolation.protocol import PythonRuntime
+from grader.recording.isolation.protocol import PythonRuntime, WorkerView
+from grader.recording.isolation.view import view_of
 
 # Where there is no user namespace, the kernel counts processes by user: students who run at the same time on one
 # machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since
@@ -71,6 +73,14 @@ def some_user() -> int:
     return _USERS.next()
 
 
+def taken_users() -> tuple[Path, ...]:
+    """Return the file in which workers note the users they have taken, made if it is not there; nothing if neither."""
+    with contextlib.suppress(OSError):
+        os.close(os.open(TAKEN, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600))
+        return (TAKEN,)
+    return ()
+
+
 def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
     """Return the folders with rubrics and checks that would be seen through a folder that is shown."""
     package = Path(grader.__file__).resolve().parent
@@ -79,6 +89,20 @@ def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
     installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
     places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
     return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
+
+
+def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
+    """Return what a worker sees: Python, ROS, the part of this package that it runs, and a folder for its work.
+
+    Args:
+        runtime: Interpreter and ROS.
+        folder: That folder; what is recorded is staged there.
+    """
+    package = Path(grader.__file__).resolve().parent
+    read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
+    hidden = tuple(secrets_within(view_of(read).bound, runtime))
+    own = tuple(package / name for name in ("__init__.py", "model", "host", "recording"))
+    return WorkerView(read, hidden, own, (folder,))
 
 
 def make_readable(folder: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from grader.model.limits import Limits
 from grader.recording.isolation.bubblewrap import Bubblewrap
-from grader.recording.isolation.protocol import Command, StudentProcess
+from grader.recording.isolation.protocol import Command, StudentProcess, WorkerView
 from grader.recording.isolation.starting import HOST, Ground, require_walls, walled_command
 
 NAME = "bubblewrap-flat"
@@ -59,9 +59,15 @@ class FlatBubblewrap:
         """Where the `host` package lies."""
         return str(HOST)
 
-    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
         """Return the command that starts the trusted worker; see `Bubblewrap.worker_command`."""
-        return self.outer.worker_command(argv, environment, pass_fds)
+        return self.outer.worker_command(argv, environment, pass_fds, view)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.model.limits import Limits
-from grader.recording.isolation.protocol import Command, StudentProcess
+from grader.recording.isolation.protocol import Command, StudentProcess, WorkerView
 from grader.recording.isolation.starting import (
     HOST,
     Ground,
@@ -61,8 +61,18 @@ class Landlock:
         """Where the `host` package lies."""
         return str(HOST)
 
-    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
-        """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
+        """Return the command that starts the worker, in a session of its own; it is killed when the caller dies.
+
+        Nothing is hidden from it: that takes namespaces.
+        """
+        del view
         return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:

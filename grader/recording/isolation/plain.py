@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.recording.isolation.environment import student_environment
-from grader.recording.isolation.protocol import Command, Limits, StudentProcess
+from grader.recording.isolation.protocol import Command, Limits, StudentProcess, WorkerView
 from grader.recording.isolation.starting import (
     HOST,
     by_resource,
@@ -50,8 +50,15 @@ class Plain:
         """Where the `host` package lies."""
         return str(HOST)
 
-    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
         """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
+        del view
         return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:

@@ -15,6 +15,7 @@ __all__ = [
     "Limits",
     "PythonRuntime",
     "StudentProcess",
+    "WorkerView",
     "runtime_from_json",
     "runtime_to_json",
 ]
@@ -84,6 +85,23 @@ class StudentProcess:
 
 
 @dataclass(frozen=True, slots=True)
+class WorkerView:
+    """What the trusted worker needs to see of this machine's files.
+
+    Attributes:
+        read: Absolute files and folders, read-only; one that does not exist is left out.
+        hidden: Folders within them that it does not need.
+        own: Files and folders, read-only, that it needs all the same of what is hidden.
+        write: Folders that it may write to; what students' processes are to see of a submission lies in one.
+    """
+
+    read: tuple[Path, ...]
+    hidden: tuple[Path, ...]
+    own: tuple[Path, ...]
+    write: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
     """A process ready for `subprocess.Popen`, once: what `opened_fds` lists is read by the start and then of no use.
 
@@ -126,8 +144,21 @@ class Isolation(Protocol):
         """Absolute folder at which a student process sees the `host` package; `launcher.py` lies in it."""
         ...
 
-    def worker_command(self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: tuple[int, ...]) -> Command:
-        """Return the command that starts the trusted worker: all files, a network of its own with only `lo`."""
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
+        """Return the command that starts the trusted worker.
+
+        Args:
+            argv: Program and arguments.
+            environment: Its whole environment.
+            pass_fds: Descriptors it inherits.
+            view: The files it sees, where the tier can hide any; None for all.
+        """
         ...
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:

@@ -36,6 +36,12 @@ NEW_TIME_NAMESPACE = 0x00000080
 
 TIOCSTI, TIOCLINUX = 0x5412, 0x541C
 
+# fcntl: locks of a process and of a descriptor, each with and without waiting; leases and notes of what others do
+SET_LOCKS = (6, 7, 37, 38)
+SET_LEASE, NOTIFY = 1024, 1026
+#: A call that is refused with this does nothing and says that it did.
+NO_ERROR = 0
+
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
@@ -78,6 +84,11 @@ ARGUMENT_RULES = (
     ArgumentRule("unshare", 0, never_bits=NEW_NAMESPACES | NEW_TIME_NAMESPACE),
     ArgumentRule("ioctl", 1, never=(TIOCSTI, TIOCLINUX)),
     ArgumentRule("prlimit64", 0, only=(0,)),
+    # Files that many students see carry no word from one to another. A lock is granted and not made: whoever it would
+    # keep out sees other files.
+    ArgumentRule("flock", 1, never_bits=0xFFFFFFFF, error=NO_ERROR),
+    ArgumentRule("fcntl", 1, never=SET_LOCKS, error=NO_ERROR),
+    ArgumentRule("fcntl", 1, never=(SET_LEASE, NOTIFY)),
 )
 
 # Sorted by what they are for. A filter cannot look into the struct that clone3 takes, so that call does not exist:
@@ -88,6 +99,9 @@ NUMBERS = {
     "unshare": Numbers(272, 97),
     "ioctl": Numbers(16, 29),
     "prlimit64": Numbers(302, 261),
+    "flock": Numbers(73, 32),
+    "fcntl": Numbers(72, 25),
+    "inotify_add_watch": Numbers(254, 27),
     "clone3": Numbers(435, 435),
     "setns": Numbers(308, 268),
     # other processes

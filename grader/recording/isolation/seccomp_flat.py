@@ -10,15 +10,13 @@ import errno
 import platform
 import socket
 
-from grader.recording.isolation.seccomp import ARGUMENT_RULES, NUMBERS, ArgumentRule, Numbers, assembled
+from grader.recording.isolation.seccomp import ARGUMENT_RULES, NO_ERROR, NUMBERS, ArgumentRule, Numbers, assembled
 from grader.recording.isolation.start import OWN_PROCESS
 
 OWN_GROUP = -OWN_PROCESS & 0xFFFFFFFF
 SET_OWNER, SET_SIGNAL, SET_OWNER_EXTENDED = 8, 10, 15  # fcntl
 FIOSETOWN, SIOCSPGRP = 0x8901, 0x8902
 IOPRIO_WHO_PROCESS = 1
-#: A call that is refused with this does nothing and says that it did.
-NO_ERROR = 0
 # The two flags that a type of socket may carry: close on exec, and not to block.
 PAIRS = tuple(socket.SOCK_STREAM | flags for flags in (0, 0x800, 0x80000, 0x80800))
 
@@ -46,7 +44,6 @@ FLAT_NUMBERS = {
     "fremovexattr": Numbers(199, 16),
     "removexattrat": Numbers(466, 466),
     "file_setattr": Numbers(469, 469),
-    "inotify_add_watch": Numbers(254, 27),
     # other processes; whoever left the group would outlive it
     "setsid": Numbers(112, 157),
     "setpgid": Numbers(109, 154),
@@ -60,7 +57,6 @@ FLAT_NUMBERS = {
     "sched_setattr": Numbers(314, 274),
     "setpriority": Numbers(141, 140),
     "ioprio_set": Numbers(251, 30),
-    "fcntl": Numbers(72, 25),
     # sockets with a path
     "socketpair": Numbers(53, 199),
 }

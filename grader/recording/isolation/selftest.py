@@ -20,6 +20,7 @@ from typing import Any
 from grader.model.containment import PROPERTIES, TIERS, Property, TierReport, missing
 from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.environment import PACKAGE, worker_environment
+from grader.recording.isolation.exposure import worker_view
 from grader.recording.isolation.mechanisms import mechanism
 from grader.recording.isolation.protocol import Isolation, runtime_to_json
 from grader.recording.isolation.trial import EXCHANGE, NO_EXCHANGE
@@ -105,7 +106,7 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
     }
     module = "grader.recording.isolation.trial"
     argv = (str(ros.runtime.executable), "-s", "-B", "-m", module, json.dumps(request), bait.secret)
-    command = isolation.worker_command(argv, environment(ros, bait), ())
+    command = isolation.worker_command(argv, environment(ros, bait), (), worker_view(ros.runtime, bait.folder))
     try:
         done = subprocess.run(
             command.argv,
