@@ -41,11 +41,15 @@ class WallTime:
         publish, destroy = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.destroy
         matched = self._publishing
         self._patience = Duration(seconds=ACKNOWLEDGED_S)
+        domain = int(os.environ.get("ROS_DOMAIN_ID", "0"))
 
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
-                deadline = originals.perf_counter() + MATCH_S
+                # In another domain nobody listens: waiting there would hold up the rest of the program.
+                deadline = originals.perf_counter() + (
+                    MATCH_S if _domain_of(self, ros.MADE_NODES, domain) == domain else 0.0
+                )
                 while self.get_subscription_count() == 0 and originals.perf_counter() < deadline:
                     originals.sleep(0.001)
                 matched.add(self)
@@ -84,3 +88,12 @@ class WallTime:
     def summary(self) -> dict[str, Any]:
         """Return what the last report carries."""
         return {}
+
+
+def _domain_of(publisher: Any, made: list[weakref.ref[Any]], usual: int) -> int:
+    """Return the ROS domain of the node that a publisher belongs to; the usual one if that cannot be found out."""
+    with contextlib.suppress(Exception):  # a node that is being destroyed, or a context that is being shut down
+        nodes = [node for reference in made if (node := reference()) is not None]
+        owner = next(node for node in nodes if any(publisher is own for own in node.publishers))
+        return int(owner.context.get_domain_id())
+    return usual

@@ -169,7 +169,9 @@ class Conductor:
         self._hear(student, workload)
         self._dismiss_done()
         self._steps += 1
-        if self._plan.stop_when_unfit and hopeless(self._students) and self._why_not():
+        hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._why_not()
+        # A flood is wrong on every clock: it goes on to its limit, which is the same on every machine.
+        if hopeless_now and not self._tape.floods(self._now_ns):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")

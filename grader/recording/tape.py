@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from grader.model.limits import Limits
-from grader.model.quantities import size
+from grader.model.quantities import NS_PER_S, size
 from grader.model.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer, Request, Response
 from grader.recording.observer import Taken
 
@@ -15,6 +15,11 @@ NOTES, NOTE_CHARACTERS, NAME_CHARACTERS = 50, 500, 200
 #: Bounds beyond which nobody's nodes go, and which keep a trace small enough to be handed on: publishers and
 #: subscriptions at one moment, the same over all snapshots of the graph, faults and offers.
 ENDPOINTS, GRAPH_PARTS, FAULTS, OFFERS = 500, 100_000, 200, 2_000
+
+
+#: Messages a second on one topic, and so many more, beyond which nobody's nodes go either: a node that publishes as
+#: fast as it can.
+FLOOD_HZ, BURST = 1_000, 100
 
 
 class Tape:
@@ -47,6 +52,10 @@ class Tape:
     def seen(self, topic: str) -> int:
         """Return how many messages on a topic were taken down."""
         return self._messages[topic]
+
+    def floods(self, now_ns: int) -> bool:
+        """Return whether more messages have come on a topic, for the time it is, than any right node sends."""
+        return max(self._messages.values(), default=0) > BURST + FLOOD_HZ * now_ns / NS_PER_S
 
     def add(self, *observations: Observation) -> None:
         """Take down what needs no counting, or little: of faults and offers only the first ones."""

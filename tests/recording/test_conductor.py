@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -522,3 +524,29 @@ def test_nothing_that_a_process_says_breaks_the_conductor(reports, missing):
     for o in run.trace.faults():
         assert type(o.text) is str
         assert isinstance(o.kind, FaultKind)
+
+
+def flooding(count):
+    """Return a program that publishes so many messages every 10 ms."""
+
+    def program(me, world):
+        claims = world.have(me.name, claim("publisher", "/x"))
+        yield from wait(10, endpoints=claims)
+        for at in range(20, 900, 10):
+            for _ in range(count):
+                world.publish("/x")
+            yield from wait(at, sent={"topic /x": count})
+
+    return program
+
+
+@pytest.mark.parametrize(("count", "reason", "whole"), [(200, "", True), (1, "it is busy", False)])
+def test_a_flood_goes_on_to_its_limit_on_every_machine(monkeypatch, count, reason, whole):
+    """However late it makes its process: it is wrong on every clock. What is no flood is cut short, and repeated."""
+    steps = itertools.count()
+    monkeypatch.setattr(module, "hopeless", lambda students: next(steps) > 5)
+    monkeypatch.setattr(module, "unfit", lambda students, seen, *, full: "" if full else "it is busy")
+    run = Run(flooding(count), stop_when_unfit=True, limits=Limits(messages=2000))
+    assert run.trace.clock_reason == reason
+    assert (len(run.trace.messages("/x")) == 2000) is whole
+    assert run.trace.stop_ns < 1000 * MS

@@ -117,3 +117,13 @@ def test_notes_are_few_short_and_told_once(own, others):
     assert notes[0] == f"enough: {REST}"
     assert len(notes) == len(set(notes)) <= module.NOTES
     assert all(len(note) <= module.NOTE_CHARACTERS for note in notes)
+
+
+@pytest.mark.parametrize(("count", "at_ns", "floods"), [(101, 0, True), (100, 0, False), (1100, 10**9, False)])
+def test_a_flood_is_told_by_the_time_it_is(count, at_ns, floods):
+    """A burst is none, and neither is a thousand a second; topics are counted each for itself."""
+    tape = Tape(Limits())
+    for _ in range(count):
+        tape.message(at_ns, taken("/a"))
+        tape.message(at_ns, taken("/b"))
+    assert tape.floods(at_ns) is floods

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from hostile import MS, hostile, record
+from hostile import MS, hostile, record, staging
 
 from grader.model.limits import Limits
 from grader.model.quantities import NS_PER_S
@@ -291,6 +291,23 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run):
     assert len(trace.messages("/cmd_vel")) == 39
 
 
+def test_nobody_is_waited_for_in_another_domain(studio, tmp_path):
+    """On the wall clock a first message waits for its subscription; where the grader is not, there will be none."""
+    tmp_path.chmod(0o755)
+    elsewhere = """
+        self.others = []
+        for domain in (1, 2, 3):
+            context = rclpy.Context()
+            rclpy.init(context=context, domain_id=domain)
+            node = rclpy.create_node(f"elsewhere_{domain}", context=context)
+            self.others.append((node, node.create_publisher(Twist, "/cmd_vel", 10)))
+    """
+    later = "if self.count == 3:\n    for _, publisher in self.others: publisher.publish(Twist())"
+    program = hostile(harm=elsewhere, later=later)
+    trace = record(studio, tmp_path / "s", program, clock="wall", duration_ns=5 * NS_PER_S, first_message_on="/cmd_vel")
+    assert len(trace.messages("/cmd_vel")) > 10, "three waits take longer than the recording"
+
+
 #: One packet of 52 bytes, after a while, in the name of the program's own publisher.
 GAP = """
 if self.count == 20:
@@ -379,7 +396,8 @@ def ancestors(pid: int) -> list[int]:
 def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
     """Its scenario is recorded again by another worker; what a killed one had is gone with it."""
     tmp_path.chmod(0o755)
-    with open_studio("auto") as studio:
+    with open_studio("auto") as opened:
+        studio = staging(opened)
         killed = threading.Event()
 
         def kill() -> None:
@@ -400,7 +418,8 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
 def test_a_worker_that_is_always_killed_decides_nothing(tmp_path):
     """No trace, no marks: a problem of ours."""
     tmp_path.chmod(0o755)
-    with open_studio("auto") as studio:
+    with open_studio("auto") as opened:
+        studio = staging(opened)
         done = threading.Event()
 
         def kill() -> None:
