@@ -31,6 +31,8 @@ from grader.model.trace import (
     Request,
     Response,
     ServiceEnd,
+    Start,
+    StartWay,
     Trace,
 )
 from grader.reading.rubric_file import read_rubric
@@ -93,6 +95,7 @@ TRACES = st.builds(
     clock_reason=_TEXTS,
     notes=_several(_TEXTS),
     harness_problem=_TEXTS,
+    starts=_several(st.builds(Start, _TEXTS, _TEXTS, st.sampled_from(StartWay), _TEXTS, _several(_TEXTS))),
 )
 
 

@@ -27,6 +27,8 @@ from grader.model.trace import (
     Request,
     Response,
     ServiceEnd,
+    Start,
+    StartWay,
     Trace,
 )
 from grader.recording.codec import observation_to_json, trace_from_json, trace_to_json
@@ -133,8 +135,18 @@ SOUND = trace_to_json(
             Request(4, "/s", "t", 1, "grader", 1, {"data": True}),
             Response(4, "/s", "t", 1, "student", 1, {"message": math.inf}, b"\0\1\0\0"),
         ),
+        starts=(Start("a.py", "src/a.py", StartWay.ENTRY_POINT, "p.a:main", ("random.py",)),),
     )
 )
+
+
+def test_a_trace_of_an_earlier_version_says_nothing_of_starts():
+    """It is read all the same, and written as it was."""
+    earlier = {name: value for name, value in SOUND.items() if name != "starts"}
+    assert trace_from_json(earlier).starts == ()
+    assert trace_to_json(trace_from_json(earlier)) == earlier
+
+
 WRONG = (None, True, 1, 1.5, "x", [], {}, [["x"]], {"x": 1}, "\ud800")
 
 

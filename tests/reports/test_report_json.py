@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from report_samples import NASTY, SAMPLES, criterion, exercise, hostile, middling, perfect, report, undecided
 
 from grader.model.exercise import Outcome
+from grader.model.trace import Start, StartWay
 from grader.reports.json_report import dumps, report_schema, report_to_json
 
 
@@ -116,6 +117,24 @@ def test_values_land_where_they_belong():
     assert (first["clock"], first["clock_reason"]) == ("virtual", None)
     assert second["clock"] == "wall"
     assert "did not settle" in second["clock_reason"]
+
+
+def test_how_files_were_started_is_told_where_it_is_known():
+    """As the schema says, with hostile names whole; reports on earlier evidence leave it out."""
+    starts = (
+        Start("a.py", "a.py", StartWay.SCRIPT, hidden=("random.py",)),
+        Start("b.py", "p/b.py", StartWay.ENTRY_POINT, "p.b:main"),
+        Start(NASTY, NASTY, StartWay.MODULE, NASTY, (NASTY,)),
+    )
+    whole = report_to_json(report(exercise("e", "1", "E", criterion("c", "C", 1), starts=starts)))
+    validator().validate(json.loads(json.dumps(whole)))
+    told = whole["exercises"][0]["starts"]
+    assert told[:2] == [
+        {"process": "a.py", "file": "a.py", "way": "script", "target": None, "hidden": ["random.py"]},
+        {"process": "b.py", "file": "p/b.py", "way": "entry_point", "target": "p.b:main", "hidden": []},
+    ]
+    dumps(report(exercise("e", "1", "E", criterion("c", "C", 1), starts=starts))).encode()
+    assert "starts" not in report_to_json(middling())["exercises"][0]
 
 
 def test_faults_carry_seconds():

@@ -1,0 +1,38 @@
+"""How files were started, and an exception's own words, in the sentences that people read."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.judging.judge import started
+from grader.judging.wording import fault_sentence
+from grader.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
+
+
+@pytest.mark.parametrize(
+    ("way", "target", "notes"),
+    [
+        (StartWay.SCRIPT, "", ()),
+        (StartWay.MODULE, "p.a", ("p/a.py: run as `python3 -m p.a`",)),
+        (StartWay.MAIN, "p.a:main", ("p/a.py: run as `ros2 run` would: p.a:main()",)),
+        (StartWay.ENTRY_POINT, "p.a:go", ("p/a.py: run as `ros2 run` does: the entry point p.a:go",)),
+    ],
+)
+def test_only_what_is_not_ordinary_is_noted(way, target, notes):
+    """A script that was run as a script needs no line."""
+    trace = Trace("alone", ClockKind.VIRTUAL, 0, (), starts=(Start("a.py", "p/a.py", way, target),))
+    assert started(trace) == notes
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("KeyError: 'speed'", "a.py:3: KeyError: 'speed'"),
+        ('ValueError: no; "x" counts', "a.py:3: ValueError: \"no; 'x' counts\""),
+        ("ValueError: a: b; c", 'a.py:3: ValueError: "a: b; c"'),
+        ("KeyboardInterrupt", "a.py:3: KeyboardInterrupt"),
+    ],
+)
+def test_a_message_that_reads_like_parts_of_a_reason_is_quoted(text, told):
+    """A semicolon separates what the grader says: an exception cannot go on in its place."""
+    assert fault_sentence(Fault(0, "a.py", FaultKind.EXCEPTION, text, "a.py", 3)) == told
