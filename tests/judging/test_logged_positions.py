@@ -237,3 +237,38 @@ def test_an_exit_in_the_middle_is_the_reason_for_a_broken_period() -> None:
     assert finding.credit == 0
     assert "exited after 10.5 s with code 0" in finding.reason
     assert finding.evidence["fault"]["kind"] == FaultKind.EXITED.value
+
+
+def _word(n: int) -> str:
+    return "".join("abcdefgh"[n // 8**place % 8] + "xyz"[place % 3] for place in range(4))
+
+
+def _never_the_same(numbers: str) -> Writer:
+    words = (_word(n) for n in itertools.count())
+    return lambda _x, _y: f"{next(words)}: {numbers}"
+
+
+GUESSES = {
+    "whole metres": _never_the_same(" ".join(str(n) for n in range(-3, 4)) + " / -3 -2 -1 0 1 2 3"),
+    "labelled": _never_the_same(" ".join(f"x={x} y={y}" for x in range(-3, 3) for y in range(-2, 3))),
+    "tenths": _never_the_same(" ".join(f"{n / 4:.1f}" for n in range(-10, 10))),
+}
+
+
+@pytest.mark.parametrize("write", GUESSES.values(), ids=GUESSES)
+def test_many_numbers_in_texts_that_are_never_the_same_show_no_position(write: Writer) -> None:
+    """Some pair of them is right at each instant, and always another one."""
+    finding = POSITION.judge(position_logs(write).trace())
+    assert finding.credit == 0
+    assert finding.evidence["cause"] in ("chance", "wrong")
+
+
+def test_a_growing_list_of_positions_shows_the_newest() -> None:
+    """Each of its texts is a template of its own, and few positions are that fine by chance."""
+    path: list[tuple[float, float]] = []
+
+    def write(x: float, y: float) -> str:
+        path.append((round(x, 2), round(y, 2)))
+        return f"x, y so far, the newest first: {path[::-1][:6]}"
+
+    assert POSITION.judge(position_logs(write).trace()).credit == 1

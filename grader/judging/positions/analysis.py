@@ -17,6 +17,10 @@ _POSITION_SHARE = 0.5
 #: Streams longer than this must be logged more than once or twice.
 _LONG_STREAM_NS = 5 * NS_PER_S
 _FEWEST_IN_LONG_STREAM = 3
+#: A printed number shows positions over so many units of its last digit, with a margin.
+_UNITS_SHOWN = 2
+#: Share of the right templates that chance may be expected to make right.
+_LUCK = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +32,14 @@ class Analysis:
         right: Texts that show a pose that was current, in order.
         wrong: Texts of the same templates that show none, in order.
         needed: How many instants with a right text it takes.
+        by_chance: Whether positions stand in the texts only because so many numbers do; none of them is right then.
     """
 
     groups: tuple[Group, ...] = ()
     right: tuple[Entry, ...] = ()
     wrong: tuple[Entry, ...] = ()
     needed: int = 1
+    by_chance: bool = False
 
     @property
     def times_ns(self) -> tuple[int, ...]:
@@ -77,12 +83,26 @@ def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: Cl
 def _judged(texts: Sequence[Text], track: Track, *, decimal_comma: bool) -> Analysis:
     groups = tuple(matched(g, track) for g in grouped(texts, decimal_comma=decimal_comma))
     chosen = [g for g in groups if g.right and g.share >= _POSITION_SHARE]
+    if chosen and track.moves and sum(_luck(g, track) for g in groups) > _LUCK * len(chosen):
+        return Analysis(groups, needed=_needed(track), by_chance=True)
     entries = sorted((e for g in chosen for e in g.entries), key=lambda e: e.t_ns)
     settled_ns = track.times_ns[0] + STALE_NS
     right = tuple(e for e in entries if e.right)
     # a timer that fires while the first message is still on its way shows what the node started with
     wrong = tuple(e for e in entries if not e.right and e.t_ns > settled_ns)
     return Analysis(groups, right, wrong, _needed(track))
+
+
+def _luck(group: Group, track: Track) -> float:
+    """Return how many pairs of a template are expected to show positions by chance, all of its texts together."""
+    if not group.pairs:
+        return 0.0
+    first, second = group.pair or group.pairs[0]
+    steps = [(e.numbers[first].step, e.numbers[second].step) for e in group.entries]
+    chance = min(1.0, _UNITS_SHOWN * max(x for x, _ in steps) / track.spans[0])
+    chance *= min(1.0, _UNITS_SHOWN * max(y for _, y in steps) / track.spans[1])
+    told = {(e.numbers[first].value, e.numbers[second].value) for e in group.entries}
+    return float(len(group.pairs) * chance ** len(told))
 
 
 def _needed(track: Track) -> int:

@@ -11,7 +11,7 @@ from grader.judging.positions.labels import Pair
 from grader.judging.positions.matching import Entry, Group, Wanted, matched
 from grader.judging.positions.numbers import Printed
 from grader.judging.positions.track import STALE_NS, Pose, Track, X, Y
-from grader.judging.wording import moment, number, quote, span
+from grader.judging.wording import counted, moment, number, quote, span
 
 #: Share of a template's texts that must show the same thing for it to be named.
 _SURE = 0.8
@@ -88,6 +88,8 @@ _SINGLES = (
 
 def cause_of(analysis: Analysis, track: Track) -> Cause:
     """Return what the texts show instead of the position, or at least where they first differ."""
+    if analysis.by_chance:
+        return _chance(analysis)
     sampled = [_sample(g) for g in analysis.groups]
     if analysis.right and analysis.wrong:  # a position log most of the time, so no other thing
         return _first_difference(analysis, track)
@@ -95,6 +97,12 @@ def cause_of(analysis: Analysis, track: Track) -> Cause:
     if likely is None:
         likely = _variant(sampled, track) or _single(sampled, track) or _stale(sampled, track)
     return likely or _first_difference(analysis, track)
+
+
+def _chance(analysis: Analysis) -> Cause:
+    numbers = sum(len(e.numbers) for g in analysis.groups for e in g.entries)
+    said = f"{counted(numbers, 'number')} in {counted(len(analysis.groups), 'sentence')} of different wording, "
+    return Cause("chance", f"{said}some of which show the position by chance", _POSITION_HINT)
 
 
 def _sample(group: Group) -> Group:

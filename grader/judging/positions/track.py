@@ -58,6 +58,7 @@ class Track:
     start_ns: int
     stop_ns: int
     jitter_ns: int
+    _spans: list[tuple[float, float]] = field(default_factory=list, init=False, repr=False, compare=False)
     _made: dict[int, Pose] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def current(self, t_ns: int) -> range:
@@ -81,9 +82,15 @@ class Track:
     @property
     def moves(self) -> bool:
         """Whether the poses differ by more than a centimetre."""
-        poses = self.poses
-        xs, ys = [p.x for p in poses], [p.y for p in poses]
-        return bool(xs) and max(max(xs) - min(xs), max(ys) - min(ys)) > 0.01
+        return bool(self.times_ns) and max(self.spans) > 0.01
+
+    @property
+    def spans(self) -> tuple[float, float]:
+        """How far the poses reach in x and in y, metres, at least a centimetre each for the sake of divisions."""
+        if not self._spans:
+            xs, ys = [p.x for p in self.poses], [p.y for p in self.poses]
+            self._spans.append((max(max(xs) - min(xs), 0.01), max(max(ys) - min(ys), 0.01)))
+        return self._spans[0]
 
 
 def track_of(trace: Trace, topic: str) -> Track | None:
