@@ -1,0 +1,2 @@
+FORWARD = 0.5
+TURN = 0.1
