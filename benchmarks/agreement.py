@@ -14,6 +14,7 @@ import multiprocessing
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +51,10 @@ def print_nothing(step: str) -> None:
     """Hear which step begins, and say nothing."""
 
 
-def judged(folder: str, exercises: tuple[str, ...], clock: str) -> dict[str, Any]:
+def judged(folder: str, exercises: tuple[str, ...], how: Request) -> dict[str, Any]:
     """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
     try:
-        report = grade(Request(str(SUBMISSIONS / folder), exercises=exercises, clock=clock), print_nothing)
+        report = grade(replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises), print_nothing)
     except GraderError as fault:
         return {"outcomes": {"error": fault.message}, "wall": []}
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
@@ -64,12 +65,13 @@ def judged(folder: str, exercises: tuple[str, ...], clock: str) -> dict[str, Any
     }
 
 
-def run(mode: str, expected: Mapping[str, Any], results: Results, path: Path, jobs: int) -> None:
+def run(  # noqa: PLR0913  one parameter a choice
+    mode: str, how: Request, expected: Mapping[str, Any], results: Results, path: Path, *, jobs: int, load: bool = False
+) -> None:
     """Grade every folder that has no result under a mode, and write each result when it is there."""
-    clock, _, load = mode.partition("-")
     left = [folder for folder in expected if folder not in results.setdefault(mode, {})]
     with busy(2 * multiprocessing.cpu_count() if load else 0), ThreadPoolExecutor(jobs) as pool:
-        futures = {pool.submit(judged, f, tuple(expected[f]["graded"]), clock): f for f in left}
+        futures = {pool.submit(judged, f, tuple(expected[f]["graded"]), how): f for f in left}
         for number, future in enumerate(as_completed(futures), 1):
             results[mode][futures[future]] = future.result()
             path.write_text(json.dumps(results, indent=1), encoding="utf-8")
@@ -96,6 +98,12 @@ def table(expected: Mapping[str, Any], results: Results) -> None:
                     print(f"    {criterion}: {reason}")
 
 
+def what_is_known(path: Path) -> tuple[dict[str, Any], Results]:
+    """Return what every folder should be given, and the results so far."""
+    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
+    return expected, json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
 def main() -> None:
     """Run the modes asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -106,11 +114,12 @@ def main() -> None:
     arguments = parser.parse_intermixed_args()
     if unknown := set(arguments.modes) - set(MODES):
         parser.error(f"expected modes of {', '.join(MODES)}, found {', '.join(sorted(unknown))}")
-    expected = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
-    results: Results = json.loads(arguments.results.read_text(encoding="utf-8")) if arguments.results.exists() else {}
+    expected, results = what_is_known(arguments.results)
     chosen = {folder: entry for folder, entry in expected.items() if arguments.only in folder}
     for mode in arguments.modes:
-        run(mode, chosen, results, arguments.results, arguments.jobs)
+        clock, _, load = mode.partition("-")
+        how = Request("", clock=clock)
+        run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs, load=bool(load))
     table(expected, results)
 
 

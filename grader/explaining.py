@@ -16,12 +16,19 @@ from grader.model.explanation import CheckExplanation, CriterionExplanation, Par
 from grader.model.quantities import Unit, duration
 from grader.model.scenario import (
     ActionGoal,
+    AnyOrder,
+    Count,
+    CountBetween,
     MessageStream,
     NumberStream,
     Scenario,
     ServiceCalls,
     ServiceServer,
+    SomeOf,
     Stimulus,
+    Time,
+    TimeBetween,
+    cases,
 )
 from grader.reading.manuals import Manual, manual_of
 from grader.reading.rubric_file import own_checks
@@ -162,7 +169,7 @@ def _unit(annotation: Any) -> Unit | None:
 def _situation(scenario: Scenario) -> str:
     """Return in a sentence what runs, for how long, and what the grader publishes meanwhile."""
     span = scenario.span
-    text = f"{' and '.join(scenario.processes)} observed for {duration(span.duration_ns)}"
+    text = f"{' and '.join(scenario.processes)} observed for {_time(span.duration_ns)}"
     if span.after_first_message_on:
         text += f" from the first message on {span.after_first_message_on} on"
         text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
@@ -171,23 +178,47 @@ def _situation(scenario: Scenario) -> str:
 
 def _stimulus(stimulus: Stimulus) -> str:
     if isinstance(stimulus, NumberStream):
-        pace = f"one every {duration(stimulus.period_ns)}, each value for {duration(stimulus.hold_ns)}"
-        return f"the grader publishes {len(stimulus.values)} values on {stimulus.topic}, {pace}"
+        pace = f"one every {duration(stimulus.period_ns)}, each value for {_time(stimulus.hold_ns)}"
+        return f"the grader publishes {_cases(stimulus.values, 'values')} on {stimulus.topic}, {pace}"
     if isinstance(stimulus, MessageStream):
-        pace = f"one every {duration(stimulus.period_ns)} from {duration(stimulus.start_ns)} on"
-        return f"the grader publishes {len(stimulus.values) * stimulus.repeats} messages on {stimulus.topic}, {pace}"
+        pace = f"one every {duration(stimulus.period_ns)} from {_time(stimulus.start_ns)} on"
+        times = "" if stimulus.repeats == 1 else f", each {_count(stimulus.repeats)} times"
+        return f"the grader publishes {_cases(stimulus.values, 'messages')}{times} on {stimulus.topic}, {pace}"
     if isinstance(stimulus, ServiceServer):
-        return f"the grader offers the service {stimulus.service} from {duration(stimulus.start_ns)} on"
+        answers = f" with {_cases(stimulus.responses, 'responses')}" if _is_open(stimulus.responses) else ""
+        return f"the grader offers the service {stimulus.service}{answers} from {_time(stimulus.start_ns)} on"
     if isinstance(stimulus, ServiceCalls):
         who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
-        times = "once" if stimulus.calls == 1 else f"{stimulus.calls} times"
-        pace = f"{times} from {duration(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"
+        times = "once" if stimulus.calls == 1 else f"{_count(stimulus.calls)} times"
+        pace = f"{times} from {_time(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"
         return f"{who} of the grader's calling {stimulus.service} {pace}"
     if isinstance(stimulus, ActionGoal):
         then = f", and cancels it {duration(stimulus.cancel_after_ns)} later" if stimulus.cancel_after_ns else ""
-        return f"a client of the grader's sends {stimulus.action} a goal at {duration(stimulus.start_ns)}{then}"
-    played = f"from {duration(stimulus.start_ns)} on for {duration(stimulus.duration_ns)}"
+        return f"a client of the grader's sends {stimulus.action} a goal at {_time(stimulus.start_ns)}{then}"
+    played = f"from {_time(stimulus.start_ns)} on for {_time(stimulus.duration_ns)}"
     return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
+
+
+def _time(time: Time) -> str:
+    """Return a time in words; of a drawn one, both ends."""
+    if not isinstance(time, TimeBetween):
+        return duration(time)
+    return f"{duration(time.low_ns)} to {duration(time.high_ns)} (drawn)"
+
+
+def _count(count: Count) -> str:
+    return f"{count.low} to {count.high} (drawn)" if isinstance(count, CountBetween) else str(count)
+
+
+def _cases(items: tuple[Any, ...], what: str) -> str:
+    """Return how many cases there are, and whether their order is drawn."""
+    low, high = cases(items)
+    order = " in a drawn order" if _is_open(items) else ""
+    return f"{low if low == high else f'{low} to {high}'} {what}{order}"
+
+
+def _is_open(items: tuple[Any, ...]) -> bool:
+    return any(isinstance(item, (AnyOrder, SomeOf)) for item in items)
 
 
 def _unknown(name: str, names: Sequence[str]) -> GraderError:

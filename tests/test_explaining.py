@@ -78,7 +78,7 @@ def test_a_check_shows_what_a_rubric_has_to_give():
         "topic": True,
         "rate": True,
         "tolerance": True,
-        "window": True,
+        "window": False,
         "partly_tolerance": False,
     }
     assert check.used_by == (

@@ -10,7 +10,7 @@ from typing import Any
 from grader.judging.checks import CHECKS
 from grader.model.exercise import Criterion, Exercise
 from grader.model.quantities import duration
-from grader.model.scenario import Scenario
+from grader.model.scenario import Scenario, shortest
 from grader.reading.manuals import manual_of
 from grader.reading.yaml_tree import TOP, Mistake, TreePath, YamlTree
 
@@ -67,7 +67,7 @@ def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree
 
 
 def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    observed: int = scenario.span.duration_ns
+    observed = shortest(scenario.span.duration_ns)
     check: Any = criterion.check
     for field in fields(check):
         asked = getattr(check, field.name)

@@ -11,6 +11,80 @@ from grader.model.quantities import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
+class TimeBetween:
+    """A time drawn from the seed: whole milliseconds in [low_ns, high_ns]."""
+
+    low_ns: int
+    high_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class CountBetween:
+    """A count drawn from the seed, in [low, high]."""
+
+    low: int
+    high: int
+
+
+Time = int | TimeBetween
+Count = int | CountBetween
+
+
+def shortest(time: Time) -> int:
+    """Return the least that a time may come to, in nanoseconds."""
+    return time.low_ns if isinstance(time, TimeBetween) else time
+
+
+def longest(time: Time) -> int:
+    """Return the most that a time may come to, in nanoseconds."""
+    return time.high_ns if isinstance(time, TimeBetween) else time
+
+
+def fewest(count: Count) -> int:
+    """Return the least that a count may come to."""
+    return count.low if isinstance(count, CountBetween) else count
+
+
+def most(count: Count) -> int:
+    """Return the most that a count may come to."""
+    return count.high if isinstance(count, CountBetween) else count
+
+
+@dataclass(frozen=True, slots=True)
+class InOrder:
+    """Cases that follow each other as they are written, wherever among others they come."""
+
+    items: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SomeOf:
+    """A drawn number of cases, each one of several kinds."""
+
+    items: tuple[Any, ...]
+    count: Count
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOrder:
+    """Cases in an order drawn from the seed, each of them present; those of a SomeOf are scattered among the others."""
+
+    items: tuple[Any, ...]
+
+
+def cases(items: tuple[Any, ...]) -> tuple[int, int]:
+    """Return how many cases a list of items comes to, the fewest and the most."""
+    each = [_cases(item) for item in items]
+    return sum(low for low, _ in each), sum(high for _, high in each)
+
+
+def _cases(item: Any) -> tuple[int, int]:
+    if isinstance(item, SomeOf):
+        return fewest(item.count), most(item.count)
+    return cases(item.items) if isinstance(item, (InOrder, AnyOrder)) else (1, 1)
+
+
+@dataclass(frozen=True, slots=True)
 class Span:
     """How long a scenario is observed.
 
@@ -20,7 +94,7 @@ class Span:
         wait_at_most_ns: How long that first message is waited for.
     """
 
-    duration_ns: int
+    duration_ns: Time
     after_first_message_on: str | None = None
     wait_at_most_ns: int = 60 * NS_PER_S
 
@@ -48,6 +122,8 @@ class JustBelow:
 
 
 NumberSpec = float | Between | JustAbove | JustBelow
+#: A number, or several in an order of their own.
+NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +135,17 @@ class NumberStream:
         type: Message type used while no subscription tells another, e.g. `std_msgs/msg/Float32`.
         values: Numbers in order.
         period_ns: Time between two messages.
-        hold_ns: How long each number is repeated.
+        hold_ns: How long each number is repeated; where that is drawn, for each number anew, the last one is repeated
+            until the end of an observation that begins with the scenario.
         start_ns: Time of the first message since scenario start.
     """
 
     topic: str
     type: str
-    values: tuple[NumberSpec, ...]
+    values: tuple[NumberItem, ...]
     period_ns: int
-    hold_ns: int
-    start_ns: int
+    hold_ns: Time
+    start_ns: Time
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +159,8 @@ class OdometryStream:
     """
 
     topic: str
-    start_ns: int
-    duration_ns: int
+    start_ns: Time
+    duration_ns: Time
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +188,8 @@ class Written:
 #: What a field of a planned message may hold; mappings are nested messages, tuples are sequences. Mappings have no
 #: hash: stimuli that differ in nothing else share theirs, and are told apart by comparing them.
 FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
+#: The fields of one message, or of several in an order of their own.
+FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +202,7 @@ class MessageStream:
         values: Fields of each message; fields left out keep the type's defaults.
         period_ns: Time between two messages.
         start_ns: Time of the first message.
-        repeats: How often each is sent, one a period.
+        repeats: How often each is sent, one a period; where that is drawn, for each anew.
         stop_ns: When the publisher disappears; 0 for never.
         best_effort: Whether it offers best effort only.
         latched: Whether it offers transient local.
@@ -131,10 +210,10 @@ class MessageStream:
 
     topic: str
     type: str
-    values: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
+    values: tuple[FieldsItem, ...] = field(hash=False)
     period_ns: int
-    start_ns: int = 0
-    repeats: int = 1
+    start_ns: Time = 0
+    repeats: Count = 1
     stop_ns: int = 0
     best_effort: bool = False
     latched: bool = False
@@ -157,12 +236,12 @@ class ServiceServer:
 
     service: str
     type: str
-    responses: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
-    start_ns: int = 0
+    responses: tuple[FieldsItem, ...] = field(hash=False)
+    start_ns: Time = 0
     stop_ns: int = 0
-    delay_ns: int = 0
+    delay_ns: Time = 0
     cycle: bool = False
-    answers: int = 0
+    answers: Count = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,11 +261,11 @@ class ServiceCalls:
 
     service: str
     type: str
-    requests: tuple[Mapping[str, FieldSpec], ...] = field(hash=False)
-    calls: int = 1
+    requests: tuple[FieldsItem, ...] = field(hash=False)
+    calls: Count = 1
     clients: int = 1
     period_ns: int = NS_PER_S
-    start_ns: int = 0
+    start_ns: Time = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,11 +286,30 @@ class ActionGoal:
     action: str
     type: str
     goal: Mapping[str, FieldSpec] = field(hash=False)
-    start_ns: int = 0
+    start_ns: Time = 0
     cancel_after_ns: int = 0
 
 
 Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
+
+
+def longest_course_ns(stimulus: Stimulus) -> int:
+    """Return when a stimulus has shown all of its cases at the latest; for a server, when it appears."""
+    start_ns = longest(stimulus.start_ns)
+    if isinstance(stimulus, NumberStream):
+        return start_ns + cases(stimulus.values)[1] * longest(stimulus.hold_ns)
+    if isinstance(stimulus, MessageStream):
+        return start_ns + cases(stimulus.values)[1] * most(stimulus.repeats) * stimulus.period_ns
+    if isinstance(stimulus, ServiceCalls):
+        return start_ns + most(stimulus.calls) * stimulus.period_ns
+    return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, OdometryStream) else start_ns
+
+
+def is_open(stimulus: Stimulus) -> bool:
+    """Return whether anything but values is left to the seed."""
+    parts = [getattr(stimulus, name) for name in stimulus.__slots__]
+    inside = [item for part in parts if isinstance(part, tuple) for item in part]
+    return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +332,7 @@ class Scenario:
     span: Span
     stimuli: tuple[Stimulus, ...] = ()
     limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
-    starts_ns: tuple[tuple[str, int], ...] = ()
+    starts_ns: tuple[tuple[str, Time], ...] = ()
     may_exit: tuple[str, ...] = ()
     shutdown_ns: int = 0
 

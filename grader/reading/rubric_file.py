@@ -22,6 +22,7 @@ from grader.reading.check_parameters import build
 from grader.reading.feedback import feedback_of
 from grader.reading.own_checks import OwnFile, digest_of, load, named_files, own_files
 from grader.reading.quoting import shown
+from grader.reading.rubric_drawing import time_of
 from grader.reading.rubric_limits import limits_of
 from grader.reading.rubric_links import broken_links
 from grader.reading.rubric_mistakes import mistakes_of
@@ -254,7 +255,7 @@ def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Crite
 
 def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
     span = Span(
-        duration_ns=shape.observe.duration,
+        duration_ns=time_of(shape.observe.duration),
         after_first_message_on=shape.observe.after_first_message_on,
         wait_at_most_ns=shape.observe.wait_at_most,
     )
@@ -264,7 +265,7 @@ def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
         span=span,
         stimuli=tuple(stimulus_of(stimulus) for stimulus in shape.stimuli),
         limits=limits,
-        starts_ns=tuple((name, shape.start[name]) for name in shape.processes if name in shape.start),
+        starts_ns=tuple((name, time_of(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
         shutdown_ns=shape.shutdown or 0,
     )

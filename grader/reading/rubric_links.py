@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+from grader.model.quantities import duration
+from grader.model.scenario import Stimulus, TimeBetween, is_open, longest, longest_course_ns, shortest
 from grader.reading.quoting import listed, shown
+from grader.reading.rubric_drawing import DrawnLongTimeShape, DrawnTimeShape, time_of
 from grader.reading.rubric_mistakes import nearest
 from grader.reading.rubric_model import CriterionShape, RubricShape, ScenarioShape
+from grader.reading.rubric_stimuli import stimulus_of
 from grader.reading.yaml_tree import TOP, Mistake, TreePath, YamlTree
 
 
@@ -58,6 +62,7 @@ def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree
     for number, stimulus in enumerate(scenario.stimuli):
         kind, parameters = stimulus.chosen
         yield from _in_stimulus(kind, parameters, scenario, (*path, "stimuli", number, kind), tree)
+        yield from _cut_off(stimulus_of(stimulus), scenario, (*path, "observe", "duration"), tree)
 
 
 def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -66,8 +71,13 @@ def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree
         yield tree.keys.get(path, TOP).mistake(text, nearest(name, known))
 
 
-def _too_late(start_ns: int, scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    if start_ns >= scenario.observe.duration and scenario.observe.after_first_message_on is None:
+def _too_late(
+    start: int | DrawnTimeShape | DrawnLongTimeShape, scenario: ScenarioShape, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    if (
+        longest(time_of(start)) >= shortest(time_of(scenario.observe.duration))
+        and scenario.observe.after_first_message_on is None
+    ):
         yield tree.values.get(path, TOP).mistake("expected a start before the end of `observe`")
 
 
@@ -75,12 +85,22 @@ def _in_stimulus(
     kind: str, parameters: Any, scenario: ScenarioShape, path: TreePath, tree: YamlTree
 ) -> Iterator[Mistake]:
     yield from _too_late(parameters.start, scenario, (*path, "start"), tree)
-    if kind == "numbers" and parameters.hold < parameters.period:
+    if kind == "numbers" and shortest(time_of(parameters.hold)) < parameters.period:
         text = "expected each number to be held for at least one period, found a shorter `hold`"
         yield tree.values.get((*path, "hold"), TOP).mistake(text)
     stop_ns = getattr(parameters, "stop", None)
-    if stop_ns is not None and stop_ns <= parameters.start:
+    if stop_ns is not None and stop_ns <= longest(time_of(parameters.start)):
         yield tree.values.get((*path, "stop"), TOP).mistake("expected a stop after the start")
+
+
+def _cut_off(stimulus: Stimulus, scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield the mistake that some draw leaves out a case, because the observation ends before it."""
+    observed = time_of(scenario.observe.duration)
+    needed_ns = longest_course_ns(stimulus)
+    if (isinstance(observed, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(observed):
+        text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
+        text += f"{'as little as ' if isinstance(observed, TimeBetween) else ''}{duration(shortest(observed))}"
+        yield tree.values.get(path, TOP).mistake(text)
 
 
 def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:

@@ -10,6 +10,7 @@ from pydantic import Field, create_model
 from grader.model.quantities import NS_PER_S
 from grader.reading.check_parameters import Choice, Shape, choice_model
 from grader.reading.feedback import FeedbackField
+from grader.reading.rubric_drawing import SomeLongTime
 from grader.reading.rubric_limits import LimitsShape
 from grader.reading.rubric_stimuli import StimulusShape
 from grader.reading.rubric_types import (
@@ -39,7 +40,7 @@ class ExerciseShape(Shape):
 class ObserveShape(Shape):
     """How long a scenario is observed."""
 
-    duration: LongDuration
+    duration: SomeLongTime
     after_first_message_on: Topic | None = None
     wait_at_most: LongDuration = 60 * NS_PER_S
 
@@ -51,7 +52,7 @@ class ScenarioShape(Shape):
     processes: tuple[PythonFile, ...] = Field(min_length=1)
     observe: ObserveShape
     stimuli: tuple[StimulusShape, ...] = ()
-    start: dict[PythonFile, LongDuration] = Field(default={}, description="processes that start late")
+    start: dict[PythonFile, SomeLongTime] = Field(default={}, description="processes that start late")
     may_exit: Annotated[tuple[PythonFile, ...], Field(description="processes that are free to end by themselves")] = ()
     shutdown: Annotated[
         LongDuration | None, Field(description="how long they may take to end after Ctrl-C, which comes at the end")

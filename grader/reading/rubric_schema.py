@@ -80,6 +80,9 @@ def _inside(node: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_scalar(node: dict[str, Any]) -> bool:
+    options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if options:
+        return any(map(_is_scalar, options))
     kinds = node.get("type", ())
     return bool({kinds} & _SCALARS if isinstance(kinds, str) else set(kinds) & _SCALARS)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
@@ -23,10 +23,19 @@ from grader.model.scenario import (
     Stimulus,
 )
 from grader.reading.check_parameters import Choice, Shape
+from grader.reading.rubric_drawing import (
+    DrawnCountShape,
+    SomeLongTime,
+    SomeTime,
+    cases_model,
+    cases_of,
+    count_of,
+    drawn_or_not,
+    time_of,
+)
 from grader.reading.rubric_fields import Fields, FieldValue, LowHigh, field_of, fields_of
 from grader.reading.rubric_types import (
     ActionType,
-    Duration,
     LongDuration,
     MessageType,
     Real,
@@ -70,8 +79,28 @@ def _count_to(most: int) -> AfterValidator:
     return AfterValidator(check)
 
 
-Calls = Annotated[Whole, _count_to(CALLS)]
+def _drawn_to(most: int) -> AfterValidator:
+    def check(drawn: DrawnCountShape) -> DrawnCountShape:
+        if not 1 <= drawn.between[0] < drawn.between[1] <= most:
+            raise wrong(f"two whole numbers from 1 to {most:,}, the lower one first")
+        return drawn
+
+    return AfterValidator(check)
+
+
+Calls = Annotated[
+    Annotated[Whole, _count_to(CALLS), Tag("<fixed>")] | Annotated[DrawnCountShape, _drawn_to(CALLS), Tag("<drawn>")],
+    Discriminator(drawn_or_not),
+]
 Clients = Annotated[Whole, _count_to(CLIENTS)]
+
+
+if TYPE_CHECKING:
+    NumberCase = Any  # made at run time; pydantic reads those below
+    FieldsCase = Any
+else:
+    NumberCase = cases_model(NumberShape, "Numbers")
+    FieldsCase = cases_model(Fields, "Messages")
 
 
 class NumbersShape(Shape):
@@ -79,18 +108,18 @@ class NumbersShape(Shape):
 
     topic: Topic
     type: MessageType
-    values: tuple[NumberShape, ...] = Field(min_length=1)
+    values: tuple[NumberCase, ...] = Field(min_length=1)
     period: LongDuration
-    hold: LongDuration
-    start: Duration = 0
+    hold: SomeLongTime
+    start: SomeTime = 0
 
 
 class OdometryShape(Shape):
     """A stimulus: the recorded odometry."""
 
     topic: Topic
-    start: Duration = 0
-    duration: LongDuration
+    start: SomeTime = 0
+    duration: SomeLongTime
 
 
 class MessagesShape(Shape):
@@ -98,9 +127,9 @@ class MessagesShape(Shape):
 
     topic: Topic
     type: MessageType
-    values: tuple[Fields, ...] = Field(min_length=1)
+    values: tuple[FieldsCase, ...] = Field(min_length=1)
     period: LongDuration = NS_PER_S
-    start: Duration = 0
+    start: SomeTime = 0
     repeats: Calls = 1
     stop: LongDuration | None = None
     best_effort: YesNo = False
@@ -112,10 +141,10 @@ class ServerShape(Shape):
 
     service: Topic
     type: ServiceType
-    responses: tuple[Fields, ...]
-    start: Duration = 0
+    responses: tuple[FieldsCase, ...]
+    start: SomeTime = 0
     stop: LongDuration | None = None
-    delay: Duration = 0
+    delay: SomeTime = 0
     cycle: YesNo = False
     answers: Calls | None = None
 
@@ -125,11 +154,11 @@ class CallsShape(Shape):
 
     service: Topic
     type: ServiceType
-    requests: tuple[Fields, ...] = Field(default=({},), min_length=1)
+    requests: tuple[FieldsCase, ...] = Field(default=({},), min_length=1)
     calls: Calls = 1
     clients: Clients = 1
     period: LongDuration = NS_PER_S
-    start: Duration = 0
+    start: SomeTime = 0
 
 
 class ParameterShape(Shape):
@@ -138,7 +167,7 @@ class ParameterShape(Shape):
     node: Topic | None = None
     name: Text
     set: FieldValue | None = None
-    start: Duration = 0
+    start: SomeTime = 0
 
 
 class TransitionShape(Shape):
@@ -146,14 +175,14 @@ class TransitionShape(Shape):
 
     node: Topic | None = None
     to: Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
-    start: Duration = 0
+    start: SomeTime = 0
 
 
 class StateShape(Shape):
     """A stimulus: the student's lifecycle node is asked for its state; without a node the only one."""
 
     node: Topic | None = None
-    start: Duration = 0
+    start: SomeTime = 0
 
 
 class GoalShape(Shape):
@@ -162,7 +191,7 @@ class GoalShape(Shape):
     action: Topic
     type: ActionType
     goal: Fields = Field(default={})
-    start: Duration = 0
+    start: SomeTime = 0
     cancel_after: LongDuration | None = None
 
 
@@ -187,17 +216,17 @@ def stimulus_of(shape: StimulusShape) -> Stimulus:
 
 
 def _odometry(shape: OdometryShape) -> Stimulus:
-    return OdometryStream(topic=shape.topic, start_ns=shape.start, duration_ns=shape.duration)
+    return OdometryStream(topic=shape.topic, start_ns=time_of(shape.start), duration_ns=time_of(shape.duration))
 
 
 def _numbers(shape: NumbersShape) -> Stimulus:
     return NumberStream(
         topic=shape.topic,
         type=shape.type,
-        values=tuple(_number(value) for value in shape.values),
+        values=cases_of(shape.values, _number),
         period_ns=shape.period,
-        hold_ns=shape.hold,
-        start_ns=shape.start,
+        hold_ns=time_of(shape.hold),
+        start_ns=time_of(shape.start),
     )
 
 
@@ -214,10 +243,10 @@ def _messages(shape: MessagesShape) -> Stimulus:
     return MessageStream(
         topic=shape.topic,
         type=shape.type,
-        values=tuple(map(fields_of, shape.values)),
+        values=cases_of(shape.values, fields_of),
         period_ns=shape.period,
-        start_ns=shape.start,
-        repeats=shape.repeats,
+        start_ns=time_of(shape.start),
+        repeats=count_of(shape.repeats),
         stop_ns=shape.stop or 0,
         best_effort=shape.best_effort,
         latched=shape.latched,
@@ -228,12 +257,12 @@ def _server(shape: ServerShape) -> Stimulus:
     return ServiceServer(
         service=shape.service,
         type=shape.type,
-        responses=tuple(map(fields_of, shape.responses)),
-        start_ns=shape.start,
+        responses=cases_of(shape.responses, fields_of),
+        start_ns=time_of(shape.start),
         stop_ns=shape.stop or 0,
-        delay_ns=shape.delay,
+        delay_ns=time_of(shape.delay),
         cycle=shape.cycle,
-        answers=shape.answers or 0,
+        answers=count_of(shape.answers or 0),
     )
 
 
@@ -241,11 +270,11 @@ def _calls(shape: CallsShape) -> Stimulus:
     return ServiceCalls(
         service=shape.service,
         type=shape.type,
-        requests=tuple(map(fields_of, shape.requests)),
-        calls=shape.calls,
+        requests=cases_of(shape.requests, fields_of),
+        calls=count_of(shape.calls),
         clients=shape.clients,
         period_ns=shape.period,
-        start_ns=shape.start,
+        start_ns=time_of(shape.start),
     )
 
 
@@ -263,10 +292,10 @@ def _parameter(shape: ParameterShape) -> Stimulus:
     if "set" not in shape.model_fields_set or shape.set is None:
         asked: Mapping[str, FieldSpec] = {"names": (shape.name,)}
         kind = "rcl_interfaces/srv/GetParameters"
-        return ServiceCalls(f"{node}/get_parameters", kind, (asked,), start_ns=shape.start)
+        return ServiceCalls(f"{node}/get_parameters", kind, (asked,), start_ns=time_of(shape.start))
     wanted: Mapping[str, FieldSpec] = {"name": shape.name, "value": _parameter_value(field_of(shape.set))}
     kind = "rcl_interfaces/srv/SetParameters"
-    return ServiceCalls(f"{node}/set_parameters", kind, ({"parameters": (wanted,)},), start_ns=shape.start)
+    return ServiceCalls(f"{node}/set_parameters", kind, ({"parameters": (wanted,)},), start_ns=time_of(shape.start))
 
 
 def _parameter_value(value: Any) -> Mapping[str, FieldSpec]:
@@ -284,16 +313,20 @@ def _transition(shape: TransitionShape) -> Stimulus:
     # without a number the label counts; the numbers of shutdown differ from state to state
     asked: Mapping[str, FieldSpec] = {"transition": {"id": 0, "label": shape.to}}
     kind = "lifecycle_msgs/srv/ChangeState"
-    return ServiceCalls(f"{shape.node or '~'}/change_state", kind, (asked,), start_ns=shape.start)
+    return ServiceCalls(f"{shape.node or '~'}/change_state", kind, (asked,), start_ns=time_of(shape.start))
 
 
 def _state(shape: StateShape) -> Stimulus:
-    return ServiceCalls(f"{shape.node or '~'}/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=shape.start)
+    return ServiceCalls(
+        f"{shape.node or '~'}/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=time_of(shape.start)
+    )
 
 
 def _goal(shape: GoalShape) -> Stimulus:
     goal = fields_of(shape.goal)
-    return ActionGoal(shape.action, shape.type, goal, start_ns=shape.start, cancel_after_ns=shape.cancel_after or 0)
+    return ActionGoal(
+        shape.action, shape.type, goal, start_ns=time_of(shape.start), cancel_after_ns=shape.cancel_after or 0
+    )
 
 
 _MAKERS: Mapping[str, Callable[[Any], Stimulus]] = {

@@ -12,12 +12,14 @@ from grader.model.scenario import (
     ActionGoal,
     Between,
     Choose,
+    CountBetween,
     FieldSpec,
     MessageStream,
     ServiceCalls,
     ServiceServer,
     Written,
 )
+from grader.recording.drawing import drawn_count, drawn_time, in_drawn_order
 
 Planned = TypeVar("Planned", bound="PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal")
 Fields = Mapping[str, Any]
@@ -118,17 +120,22 @@ def goal_call(goal: PlannedGoal) -> Call:
 
 
 def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:
-    """Return a message stream with every field drawn."""
+    """Return a message stream with every field drawn, and the order and number of messages where they are open."""
+    start_ns, values, repeats = drawn_time(stream.start_ns, draw), in_drawn_order(stream.values, draw), stream.repeats
+    each = [(value, drawn_count(repeats, draw)) for value in values] if isinstance(repeats, CountBetween) else []
+    planned = [drawn_fields(value, draw) for value in values]
+    if each:
+        planned = [fields for fields, (_, times) in zip(planned, each, strict=True) for _ in range(times)]
     return PlannedMessages(
         topic=stream.topic,
         type=stream.type,
-        start_ns=stream.start_ns,
+        start_ns=start_ns,
         stop_ns=stream.stop_ns,
         period_ns=stream.period_ns,
-        repeats=stream.repeats,
+        repeats=1 if isinstance(repeats, CountBetween) else repeats,
         best_effort=stream.best_effort,
         latched=stream.latched,
-        values=tuple(drawn_fields(value, draw) for value in stream.values),
+        values=tuple(planned),
     )
 
 
@@ -137,22 +144,24 @@ def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
     return PlannedServer(
         service=server.service,
         type=server.type,
-        start_ns=server.start_ns,
+        start_ns=drawn_time(server.start_ns, draw),
         stop_ns=server.stop_ns,
-        delay_ns=server.delay_ns,
+        delay_ns=drawn_time(server.delay_ns, draw),
         cycle=server.cycle,
-        answers=server.answers,
-        responses=tuple(drawn_fields(response, draw) for response in server.responses),
+        answers=drawn_count(server.answers, draw),
+        responses=tuple(drawn_fields(response, draw) for response in in_drawn_order(server.responses, draw)),
     )
 
 
 def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
     """Return calls with every request drawn, for each call and client anew."""
-    wanted = [calls.requests[call % len(calls.requests)] for call in range(calls.calls) for _ in range(calls.clients)]
+    start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
+    requests = in_drawn_order(calls.requests, draw)
+    wanted = [requests[call % len(requests)] for call in range(count) for _ in range(calls.clients)]
     return PlannedCalls(
         service=calls.service,
         type=calls.type,
-        start_ns=calls.start_ns,
+        start_ns=start_ns,
         period_ns=calls.period_ns,
         clients=calls.clients,
         requests=tuple(drawn_fields(request, draw) for request in wanted),
@@ -164,7 +173,7 @@ def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
     return PlannedGoal(
         action=goal.action,
         type=goal.type,
-        start_ns=goal.start_ns,
+        start_ns=drawn_time(goal.start_ns, draw),
         cancel_after_ns=goal.cancel_after_ns,
         goal=drawn_fields(goal.goal, draw),
         uuid=tuple(draw.randbytes(16)),

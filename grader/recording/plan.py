@@ -22,9 +22,12 @@ from grader.model.scenario import (
     Scenario,
     ServiceCalls,
     ServiceServer,
+    TimeBetween,
+    shortest,
 )
 from grader.model.submission import Submission
 from grader.recording.bag import Odometry, window
+from grader.recording.drawing import drawn_time, in_drawn_order
 from grader.recording.exchanges import (
     PlannedCalls,
     PlannedGoal,
@@ -134,22 +137,25 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         odometry: The recording, if the scenario plays one.
         clock: `virtual` or `wall`.
     """
-    draw = random.Random(derive(seed, "stimuli", exercise, scenario.id))  # noqa: S311 - it has to repeat
-    numbers = tuple(_numbers(s, draw) for s in scenario.stimuli if isinstance(s, NumberStream))
+    purposes = ("stimuli", exercise, scenario.id)
+    # each draws from a source of its own: one more stimulus changes no other
+    drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
+    course = random.Random(derive(seed, "course", exercise, scenario.id))  # noqa: S311 - it has to repeat
+    duration_ns = drawn_time(scenario.span.duration_ns, course)
+    until_ns = 0 if scenario.span.after_first_message_on else duration_ns
+    draw = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
+    numbers = tuple(_numbers(s, draw, own, until_ns) for s, own in drawn if isinstance(s, NumberStream))
     recordings = tuple(
-        _recording(s, odometry, draw.getrandbits(32))
-        for s in scenario.stimuli
+        _recording(s, odometry, draw.getrandbits(32), own)
+        for s, own in drawn
         if isinstance(s, OdometryStream) and odometry is not None
     )
-    # each draws from a source of its own: one more stimulus changes no other
-    purposes = ("stimuli", exercise, scenario.id)
-    drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
     return Plan(
         scenario=scenario.id,
         processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
         root=str(submission.root),
         host_seed=derive(seed, "host", exercise, scenario.id),
-        duration_ns=scenario.span.duration_ns,
+        duration_ns=duration_ns,
         first_message_on=scenario.span.after_first_message_on or "",
         wait_at_most_ns=scenario.span.wait_at_most_ns,
         numbers=numbers,
@@ -160,7 +166,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
         calls=tuple(plan_calls(s, source) for s, source in drawn if isinstance(s, ServiceCalls)),
         goals=tuple(plan_goal(s, source) for s, source in drawn if isinstance(s, ActionGoal)),
-        starts_ns=scenario.starts_ns,
+        starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
         may_exit=scenario.may_exit,
         shutdown_ns=scenario.shutdown_ns,
     )
@@ -172,15 +178,24 @@ def derive(seed: int, *purpose: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _numbers(stream: NumberStream, draw: random.Random) -> PlannedNumbers:
-    return PlannedNumbers(
-        topic=stream.topic,
-        type=stream.type,
-        start_ns=stream.start_ns,
-        period_ns=stream.period_ns,
-        repeats=max(1, stream.hold_ns // stream.period_ns),
-        numbers=tuple(_number(spec, draw) for spec in stream.values),
-    )
+def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:
+    """Return the numbers of a stream.
+
+    Args:
+        stream: What is to be published.
+        draw: Draws the numbers, for all streams of the scenario.
+        own: Draws what else is open in this one.
+        until_ns: When the observation ends; 0 if that is not known.
+    """
+    start_ns = drawn_time(stream.start_ns, own)
+    numbers = tuple(_number(spec, draw) for spec in in_drawn_order(stream.values, own))
+    repeats = max(1, shortest(stream.hold_ns) // stream.period_ns)
+    if isinstance(stream.hold_ns, TimeBetween) and numbers:
+        each = [max(1, drawn_time(stream.hold_ns, own) // stream.period_ns) for _ in numbers]
+        # who hears nothing for long may well switch off: the last number goes on, however little time the others took
+        each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
+        numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
+    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers)
 
 
 def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
@@ -196,14 +211,15 @@ def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
     return spec, 0
 
 
-def _recording(stream: OdometryStream, odometry: Odometry, seed: int) -> PlannedRecording:
-    messages = window(odometry, duration_ns=stream.duration_ns, seed=seed)
-    kept = tuple((stream.start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= stream.duration_ns)
+def _recording(stream: OdometryStream, odometry: Odometry, seed: int, own: random.Random) -> PlannedRecording:
+    start_ns, duration_ns = drawn_time(stream.start_ns, own), drawn_time(stream.duration_ns, own)
+    messages = window(odometry, duration_ns=duration_ns, seed=seed)
+    kept = tuple((start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= duration_ns)
     return PlannedRecording(
         topic=stream.topic,
         type="nav_msgs/msg/Odometry",
-        start_ns=stream.start_ns,
-        stop_ns=kept[-1][0] + 1 if kept else stream.start_ns,
+        start_ns=start_ns,
+        stop_ns=kept[-1][0] + 1 if kept else start_ns,
         messages=kept,
     )
 

@@ -278,3 +278,25 @@ def test_wrong_answers_away_from_the_threshold_do_not_blame_the_comparison() -> 
     off = both(each(lambda v: 100.0 if v > 22 else 0.0))[1]
     assert off.credit == 0
     assert off.hint == "publish 100 above 25 °C and 0 at or below it"
+
+
+def behind(start_s: float, pace_s: float) -> Recording:
+    """Answers with the value that it had one input before, or at its own pace."""
+    rec = scripted(FAN_VALUES)
+    sent = [(0.5 + 0.2 * k, FAN_VALUES[k // 10]) for k in range(10 * len(FAN_VALUES))]
+    for k, (t, _) in enumerate(sent):
+        rec.number(t if not pace_s else start_s + pace_s * k, "/fan_speed", right(sent[max(0, k - 1)][1]))
+    return rec
+
+
+def test_who_answers_with_each_value_has_to_answer_that_value() -> None:
+    """The one before is wrong for as long as it takes the next to come, however soon that is."""
+    on, off = both(behind(0.5, 0.0))
+    assert (on.credit, off.credit) == (0, 0)
+    assert "0 for 25.001" in on.reason
+
+
+def test_a_timer_may_be_one_value_late() -> None:
+    """It does not answer in the instant in which a value comes."""
+    on, off = both(behind(0.6, 0.2))
+    assert (on.credit, off.credit) == (1, 1)

@@ -215,9 +215,7 @@ def test_silence_is_explained() -> None:
     assert "carries no number" in CHECK.judge(rec.trace()).reason
 
 
-@pytest.mark.parametrize(
-    ("behind", "said"), [(1, "1 message before"), (2, "2 messages before"), (7, "7 messages before")]
-)
+@pytest.mark.parametrize(("behind", "said"), [(2, "2 messages before"), (7, "7 messages before")])
 def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> None:
     """A controller that compares what it stored last time is told so."""
     rec, sent = sensor()
@@ -227,6 +225,14 @@ def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> N
     assert finding.credit == 0
     assert f"the answers are right for what came {said}" in finding.reason
     assert finding.evidence["behind"] == behind
+
+
+def test_one_value_behind_is_told_from_a_timer_by_the_check_of_the_controller_alone() -> None:
+    """A timer of the sensor's own pace answers like this, and what it says first is of before the first value."""
+    rec, sent = sensor()
+    for k, (t, _) in enumerate(sent):
+        rec.number(t, "/fan_speed", right(sent[k - 1][1]) if k else 100.0 - right(sent[0][1]))
+    assert CHECK.judge(rec.trace()).credit == 1
 
 
 def test_wrong_answers_are_not_called_late() -> None:

@@ -125,7 +125,7 @@ def test_the_schema_knows_every_check_and_parameter():
     assert set(check["properties"]) == set(CHECKS)
     assert (check["minProperties"], check["maxProperties"]) == (1, 1)
     rate = schema["$defs"][CHECKS["topic_rate"].__name__]
-    assert set(rate["required"]) == {"topic", "rate", "tolerance", "window"}
+    assert set(rate["required"]) == {"topic", "rate", "tolerance"}
     assert "partly_tolerance" in rate["properties"]
     assert rate["additionalProperties"] is False
 

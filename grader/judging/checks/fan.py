@@ -11,12 +11,20 @@ from typing import Any, Literal
 from grader.judging.findings import met, not_met
 from grader.judging.lateness import lag_ns
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
-from grader.judging.values import Held, Reading, held, last_of_instant, published, published_numbers
+from grader.judging.values import (
+    Held,
+    Reading,
+    delivered_numbers,
+    held,
+    last_of_instant,
+    published,
+    published_numbers,
+)
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
 from grader.model.quantities import NS_PER_MS, seconds, within
-from grader.model.trace import Trace
+from grader.model.trace import ClockKind, Trace
 
 #: How long after a new input an answer to the one before is still accepted.
 _GRACE_NS = 300 * NS_PER_MS
@@ -25,6 +33,8 @@ _LONGEST_GRACE_NS = 1_200 * NS_PER_MS
 #: A controller that speaks at least this often repeats itself; silence then means that it stopped.
 _REPEATING_NS = 1_200 * NS_PER_MS
 _EXACT = 1e-6
+#: So many answers, and this share of them, that come in the instant of an input are no timer's.
+_FEWEST_AT_ONCE, _SHARE_AT_ONCE = 10, 0.97
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +51,8 @@ class ThresholdResponse:
     """A controller alone answers held inputs: one value above a threshold, another at or below it.
 
     It may answer each input, publish on change only, or publish on a timer of up to a second. After a new input the old
-    answer may still come for a while, but not once the new one is there, and no other.
+    answer may still come for a while, but not once the new one is there, and no other. One that answers in the
+    instant in which an input comes must answer that input, and not the one before.
 
     Attributes:
         input: Topic that the numbers are published on.
@@ -74,7 +85,9 @@ class ThresholdResponse:
             type_ = messages[0].type
             return self._once(not_met(f"{self.output}: {quote(type_)} carries no number", {"type": type_}))
         grace_ns = _grace(answers)
-        violations = [v for v in (self._violation(h, every, trace, grace_ns) for h in mine) if v is not None]
+        prompt = answers if _answers_at_once(trace, self.input, answers) else ()
+        found = [self._violation(h, every, trace, grace_ns) or self._behind(h, prompt) for h in mine]
+        violations = [v for v in found if v is not None]
         evidence = self._evidence(inputs, answers)
         if violations:
             return self._violated(trace, violations, inputs, every, evidence)
@@ -114,6 +127,13 @@ class ThresholdResponse:
             return _Violation(asked.start_ns, asked, None)
         carried = before[-1].value
         return None if self._right(carried, asked.value) else _Violation(asked.start_ns, asked, carried)
+
+    def _behind(self, asked: Held, prompt: Sequence[Reading]) -> _Violation | None:
+        """Return that who answers in the instant of an input still answered the one before; None if that is not so."""
+        at_once = next((a for a in prompt if a.t_ns == asked.start_ns), None)
+        if at_once is None or self._right(at_once.value, asked.value):
+            return None
+        return _Violation(at_once.t_ns, asked, at_once.value)
 
     def _unsettled(self, asked: Held, during: Sequence[Reading], before: Sequence[Reading]) -> Reading | None:
         """Return the first answer that is neither the old one, as long as no new one has come, nor right for good."""
@@ -232,6 +252,14 @@ class ThresholdResponse:
 def _deaf(subscriptions: Sequence[Any]) -> str:
     latched = all(e.durability == "transient_local" for e in subscriptions)
     return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
+
+
+def _answers_at_once(trace: Trace, topic: str, answers: Sequence[Reading]) -> bool:
+    """Return whether a controller answers each input in its own instant, which only virtual time tells for sure."""
+    asked = {r.t_ns for r in delivered_numbers(trace, topic)}
+    prompt = sum(a.t_ns in asked for a in answers)
+    enough = trace.clock is ClockKind.VIRTUAL and prompt >= _FEWEST_AT_ONCE and 2 * prompt >= len(asked)
+    return enough and prompt >= _SHARE_AT_ONCE * len(answers)
 
 
 def _gaps(answers: Sequence[Reading]) -> list[int]:

@@ -16,6 +16,8 @@ from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
+#: Fewer messages of the later half say nothing about its rate.
+_FEWEST_LATER = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +55,21 @@ class TopicRate:
     """A topic is published at a rate, measured from its first message on.
 
     The rate is (n - 1) / (t_last - t_first) over the window, as `ros2 topic hz` has it. Messages must go on to the end
-    of the window and be spread over it: bursts of the right average do not count. The type is free.
+    of the window and be spread over it: bursts of the right average do not count. Without a window all of the
+    observation counts, and its later half must fit within twice the tolerance. The type is free.
 
     Attributes:
         topic: Topic name as on the wire.
         rate: Rate expected.
         tolerance: Largest difference for full credit; the edge is inside.
-        window: How long is looked at, from the first message on.
+        window: How long is looked at, from the first message on; to the end of the observation if left out.
         partly_tolerance: Largest difference for half credit; none if left out.
     """
 
     topic: str
     rate: Hertz
     tolerance: Hertz
-    window: DurationNs
+    window: DurationNs | None = None
     partly_tolerance: Hertz | None = None
 
     def judge(self, trace: Trace) -> Finding:
@@ -74,13 +77,13 @@ class TopicRate:
         times = [m.t_ns for m in published(trace, self.topic)]
         if not times:
             return explain_no_message(trace, self.topic)
-        stop_ns = min(trace.stop_ns, times[0] + self.window)
+        stop_ns = trace.stop_ns if self.window is None else min(trace.stop_ns, times[0] + self.window)
         inside = tuple(sorted(t for t in times if t < stop_ns))
         if inside[-1] == inside[0]:
             return self._too_few(trace, inside)
         found = _measure(inside, stop_ns)
         evidence = self._evidence(found)
-        return self._flaw(trace, found, evidence) or self._grade(found, evidence)
+        return self._flaw(trace, found, evidence) or self._slack(found, evidence) or self._grade(found, evidence)
 
     @property
     def _period_ns(self) -> float:
@@ -88,7 +91,21 @@ class TopicRate:
 
     @property
     def _wanted(self) -> str:
-        return f"expected {number(self.rate)} ± {number(self.tolerance)} Hz over {span(self.window)}"
+        over = "" if self.window is None else f" over {span(self.window)}"
+        return f"expected {number(self.rate)} ± {number(self.tolerance)} Hz{over}"
+
+    def _slack(self, found: _Measured, evidence: dict[str, object]) -> Finding | None:
+        """Return that a node let go in the later half, which the average hides; None if it did not."""
+        first, last = found.times_ns[0], found.times_ns[-1]
+        later = tuple(t for t in found.times_ns if t >= (first + last) // 2)
+        if self.window is not None or len(later) < _FEWEST_LATER or later[-1] == later[0]:
+            return None
+        rate_hz = _measure(later, found.stop_ns).rate_hz
+        if within(rate_hz, self.rate, 2 * max(self.tolerance, self.partly_tolerance or 0)):
+            return None
+        half = f"{rate_hz:.3f} Hz from {moment(later[0])} on"
+        reason = f"{self.topic}: {found.sentence()}; {half}; {self._wanted} to the end"
+        return not_met(reason, evidence | {"later_rate_hz": rate_hz}, hint=self._hint(rate_hz))
 
     def _evidence(self, found: _Measured) -> dict[str, object]:
         return {
@@ -124,7 +141,10 @@ class TopicRate:
             ended, fault = _ending(trace, first, last)
             hint = fault_hint(fault) if fault else ""
             return not_met(f"{seen}; {ended}; {self._wanted}", evidence, hint=hint, fault=fault)
-        if found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]:
+        if (
+            self.window is not None
+            and found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]
+        ):
             observed = (
                 f"only {span(found.stop_ns - first)} could be observed, the first message came at {moment(first)}"
             )

@@ -29,6 +29,8 @@ _AGREEING_SHARE = 0.75
 #: The same where time is exact and about every input is answered.
 _AGREEING_SHARE_PROMPT = 0.97
 _FEWEST_FOR_SHARE = 10
+#: Gaps that differ by this at most, and the share of them from which on they are those of a timer.
+_EVEN_NS, _EVEN_SHARE = 20 * NS_PER_MS, 0.9
 #: Share of the inputs on one side up to which an answer to them may be missing where answers are few.
 _RARE = 0.3
 #: Fewest steps that show in which range a sensor draws, and how many usual steps that range holds at most. Independent
@@ -124,9 +126,13 @@ class AnswersTogether:
     def _wrong_answer(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
-        times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
+        times, jitter_ns, timed = [r.t_ns for r in inputs], JITTER_NS[trace.clock], _on_a_timer(answers)
         for answer in answers:
             recent = _recent(inputs, times, answer.t_ns, jitter_ns)
+            # what a timer told of before the first input, nobody knows: until then either answer may be right
+            first = timed and answer.t_ns <= times[0] + jitter_ns
+            if first and any(within(answer.value, either, _EXACT) for either in (self.above, self.otherwise)):
+                continue
             if not recent or any(within(answer.value, self._expected(r.value), _EXACT) for r in recent):
                 continue
             value, unit = recent[-1].value, unit_of(self.input)
@@ -156,7 +162,9 @@ class AnswersTogether:
         prompt = trace.clock is ClockKind.VIRTUAL and len(inputs) <= 2 * len(answers) <= 2 * len(inputs)
         enough = _AGREEING_SHARE_PROMPT if prompt else _AGREEING_SHARE
         shares = []
-        for delay_ns in (-JITTER_NS[trace.clock], *range(0, _CURRENT_NS + 1, _CURRENT_NS // 5)):
+        # a timer of its own makes a controller late by one period at most
+        latest_ns = min(_CURRENT_NS, _usual_gap(answers) - 1) if prompt else _CURRENT_NS
+        for delay_ns in (-JITTER_NS[trace.clock], *range(0, latest_ns + 1, _CURRENT_NS // 5)):
             for side in (bisect_left, bisect_right):
                 seen = [inputs[side(times, a.t_ns - delay_ns) - 1] for a in later]
                 fitting = sum(
@@ -166,7 +174,7 @@ class AnswersTogether:
                 if shares[-1] >= enough:
                     return None
         reason = f"{self.output}: at best {number(100 * max(shares))} % of {len(later)} answers fit {self.input}, "
-        return not_met(f"{reason}expected all of them", evidence)
+        return self._behind(f"{reason}expected all of them", inputs, answers, evidence)
 
     def _stopped_sensor(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
         gaps = [b.t_ns - a.t_ns for a, b in pairwise(inputs)]
@@ -226,6 +234,19 @@ class AnswersTogether:
             f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
         )
         return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
+
+
+def _usual_gap(answers: Sequence[Reading]) -> int:
+    return round(statistics.median(b.t_ns - a.t_ns for a, b in pairwise(answers)))
+
+
+def _on_a_timer(answers: Sequence[Reading]) -> bool:
+    """Return whether answers may come from a timer: nearly all of them at one pace."""
+    if len(answers) < _FEWEST_FOR_SHARE:
+        return True
+    usual = _usual_gap(answers)
+    even = sum(abs(b.t_ns - a.t_ns - usual) <= _EVEN_NS for a, b in pairwise(answers))
+    return even >= _EVEN_SHARE * (len(answers) - 1)
 
 
 def _stays(inputs: Sequence[Reading]) -> bool:

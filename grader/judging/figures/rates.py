@@ -24,7 +24,7 @@ def rate_chart(check: TopicRate, trace: Trace) -> Chart | None:
     times = sorted(m.t_ns for m in published(trace, check.topic))
     if len(times) < 2 or times[0] == times[-1]:
         return None
-    inside = [t for t in times if t < times[0] + check.window]
+    inside = [t for t in times if check.window is None or t < times[0] + check.window]
     return Chart(
         id=f"rate {check.topic}",
         title=f"How often {check.topic} came",
