@@ -11,7 +11,7 @@ from tracing import TWIST, Recording, twist, velocity
 
 from grader.judging.checks.rate import TopicRate
 from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind
+from grader.model.trace import ClockKind, Trace
 
 RATE = TopicRate("/cmd_vel", 20.0, 1.0, 10 * NS_PER_S, 2.0)
 HALF = Fraction(1, 2)
@@ -172,3 +172,45 @@ def test_credit_never_falls_as_the_tolerance_grows(rate: float, a: float, b: flo
     trace = velocity(rate).trace()
     narrow, wide = (TopicRate("/cmd_vel", 20.0, t, 10 * NS_PER_S).judge(trace).credit for t in sorted((a, b)))
     assert narrow <= wide
+
+
+TO_THE_END = TopicRate("/cmd_vel", 20, 1, partly_tolerance=2)
+
+
+def driven(*paces: tuple[float, float], stop_s: float = 13.0) -> Trace:
+    """Return a trace of messages at one rate after another, each until a time."""
+    rec, t = Recording(stop_s=stop_s), 0.05
+    for hz, until in paces:
+        while t < until - 1e-9:
+            rec.message(t, "/cmd_vel", {})
+            t = round(t + 1 / hz, 9)
+    return rec.trace()
+
+
+def test_without_a_window_a_rate_holds_to_the_end() -> None:
+    """However long that is."""
+    assert TO_THE_END.judge(driven((20, 13.0))).credit == 1
+    assert TO_THE_END.judge(driven((20, 11.0), stop_s=11.0)).credit == 1
+    assert TO_THE_END.judge(driven((18.2, 13.0))).credit == Fraction(1, 2)
+    assert TO_THE_END.judge(driven((10, 13.0))).credit == 0
+
+
+@pytest.mark.parametrize(("hz", "said"), [(1, "/cmd_vel"), (5, "average"), (10, "Hz from t = 9")])
+def test_who_lets_go_after_ten_seconds_is_found(hz: float, said: str) -> None:
+    """Also where the average hides it."""
+    finding = TO_THE_END.judge(driven((20, 10.05), (hz, 12.0), stop_s=12.0))
+    assert finding.credit == 0
+    assert said in finding.reason
+
+
+def test_who_is_silent_after_ten_seconds_stopped() -> None:
+    """A second of silence is enough at this rate."""
+    finding = TO_THE_END.judge(driven((20, 10.05), stop_s=11.0))
+    assert finding.credit == 0
+    assert "stopped after 9.9 s" in finding.reason
+
+
+def test_a_rate_with_a_window_looks_no_further() -> None:
+    """Rubrics that name one mean it."""
+    check = TopicRate("/cmd_vel", 20, 1, window=10_000_000_000)
+    assert check.judge(driven((20, 10.05))).credit == 1

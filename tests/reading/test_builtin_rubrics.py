@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 from grader.judging.checks import CHECKS
 from grader.model.quantities import NS_PER_S
-from grader.model.scenario import OdometryStream
+from grader.model.scenario import OdometryStream, longest_course_ns, shortest
 from grader.reading import shipped
 from grader.reading.builtin_rubrics import builtin_headers, builtin_rubrics
 from grader.reading.rubric_file import NOTES, read_rubric
@@ -88,18 +88,20 @@ def test_every_lost_criterion_has_something_to_say(name):
 
 
 def test_odometry_comes_late_and_goes_early():
-    """Exercise 2 is observed for 24 s: 5 s of silence, 16 s of odometry, 3 s of silence."""
+    """Exercise 2 is observed for 24 s: at least 5 s of silence, 15 s of odometry and 1 s of silence."""
     (scenario,) = exercise("odom_subscriber").scenarios
     (stream,) = scenario.stimuli
-    assert stream == OdometryStream("/odom", 5 * NS_PER_S, 16 * NS_PER_S)
-    assert scenario.span.duration_ns == 24 * NS_PER_S
+    assert isinstance(stream, OdometryStream)
+    assert shortest(stream.start_ns) == 5 * NS_PER_S
+    assert shortest(stream.duration_ns) == 15 * NS_PER_S
+    assert scenario.span.duration_ns - longest_course_ns(stream) >= NS_PER_S
 
 
 def test_every_scripted_number_is_held_for_its_whole_time():
     """No scripted value of exercise 3 is cut off by the end of its scenario."""
     for scenario in exercise("two_node_communication").scenarios:
         for stream in scenario.stimuli:
-            assert stream.start_ns + stream.hold_ns * len(stream.values) <= scenario.span.duration_ns
+            assert longest_course_ns(stream) <= shortest(scenario.span.duration_ns)
 
 
 def test_the_shipped_schema_is_up_to_date():

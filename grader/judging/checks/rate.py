@@ -16,7 +16,7 @@ from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
-#: Fewer messages of the later half say nothing about its rate.
+#: Fewer messages of the last quarter say nothing about its rate.
 _FEWEST_LATER = 10
 
 
@@ -56,7 +56,7 @@ class TopicRate:
 
     The rate is (n - 1) / (t_last - t_first) over the window, as `ros2 topic hz` has it. Messages must go on to the end
     of the window and be spread over it: bursts of the right average do not count. Without a window all of the
-    observation counts, and its later half must fit within twice the tolerance. The type is free.
+    observation counts, and its last quarter must fit within twice the tolerance. The type is free.
 
     Attributes:
         topic: Topic name as on the wire.
@@ -83,7 +83,8 @@ class TopicRate:
             return self._too_few(trace, inside)
         found = _measure(inside, stop_ns)
         evidence = self._evidence(found)
-        return self._flaw(trace, found, evidence) or self._slack(found, evidence) or self._grade(found, evidence)
+        graded = self._flaw(trace, found, evidence) or self._grade(found, evidence)
+        return (self._slack(found, evidence) if graded.credit else None) or graded
 
     @property
     def _period_ns(self) -> float:
@@ -95,16 +96,16 @@ class TopicRate:
         return f"expected {number(self.rate)} ± {number(self.tolerance)} Hz{over}"
 
     def _slack(self, found: _Measured, evidence: dict[str, object]) -> Finding | None:
-        """Return that a node let go in the later half, which the average hides; None if it did not."""
+        """Return that a node let go at the end, which the average hides; None if it did not."""
         first, last = found.times_ns[0], found.times_ns[-1]
-        later = tuple(t for t in found.times_ns if t >= (first + last) // 2)
+        later = tuple(t for t in found.times_ns if t >= (first + 3 * last) // 4)
         if self.window is not None or len(later) < _FEWEST_LATER or later[-1] == later[0]:
             return None
         rate_hz = _measure(later, found.stop_ns).rate_hz
         if within(rate_hz, self.rate, 2 * max(self.tolerance, self.partly_tolerance or 0)):
             return None
-        half = f"{rate_hz:.3f} Hz from {moment(later[0])} on"
-        reason = f"{self.topic}: {found.sentence()}; {half}; {self._wanted} to the end"
+        reason = f"{self.topic}: {found.sentence()}; {rate_hz:.3f} Hz from {moment(later[0])} on; "
+        reason += f"{self._wanted} to the end"
         return not_met(reason, evidence | {"later_rate_hz": rate_hz}, hint=self._hint(rate_hz))
 
     def _evidence(self, found: _Measured) -> dict[str, object]:
