@@ -266,20 +266,12 @@ def answering_once() -> Recording:
     return mute().number(0.5, "/fan_speed", 0.0)
 
 
-def answering_behind(messages: int, together: bool = False) -> Recording:
+def answering_behind(messages: int) -> Recording:
     """A controller whose answers are right for what came some messages before."""
     rec = mute()
-    if together:
-        rec = cool()
-        rec.items = [o for o in rec.items if hasattr(o, "endpoints")]
-    rng = random.Random(5)
-    seen: list[float] = [rng.uniform(20, 30) if together else float(held_at(0.5 + 0.2 * k) or 0) for k in range(82)]
-    for k, value in enumerate(seen):
-        t_s = (0.2 if together else 0.5) + 0.2 * k
-        if together:
-            rec.number(t_s, "/temperature", value)
-        old = seen[k - messages] if k >= messages else 50 - value if together else seen[0]
-        rec.number(t_s, "/fan_speed", 100.0 if old > 25 else 0.0)
+    seen = [float(held_at(0.5 + 0.2 * k) or 0) for k in range(82)]
+    for k in range(len(seen)):
+        rec.number(0.5 + 0.2 * k, "/fan_speed", 100.0 if seen[max(0, k - messages)] > 25 else 0.0)
     return rec
 
 
@@ -380,7 +372,6 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "fanned": ("sensor_alone", fanned),
     "answering": ("controller_alone", answering),
     "answering_behind": ("controller_alone", answering_behind),
-    "behind_together": ("together", lambda messages: answering_behind(messages, together=True)),
     "latching": ("controller_alone", latching),
     "mute": ("controller_alone", mute),
     "apart": ("together", apart),
