@@ -29,6 +29,7 @@ from grader.options import (
     exit_code,
     parse_outputs,
     parse_percent,
+    parse_share,
     readers,
     time_budget_option,
 )
@@ -122,6 +123,14 @@ class _Everyday(click.Command):
     help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
 )
 @time_budget_option
+@click.option(
+    "--spot-checks",
+    metavar="P%",
+    default="0%",
+    show_default=True,
+    callback=parse_share,
+    help="Share of submissions that are drawn and checked on the wall clock as well.",
+)
 @click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
 @audience_options
@@ -142,6 +151,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     clock: str,
     isolation: str,
     time_budget_s: float,
+    spot_checks: float,
     student: str,
     variant_key: Path | None,
     audience: str | None,
@@ -171,6 +181,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
         clock=clock,
         isolation=isolation,
         time_budget_s=time_budget_s,
+        spot_checks=spot_checks,
         student=student.strip(),
         variant_key=variant_key,
         draw=drawn_by(student, variant_key),

@@ -129,6 +129,18 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
     return Fraction(str(value))
 
 
+def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
+    """Return what `--spot-checks 5%` asks for, from 0 to 1; for click."""
+    del ctx, param
+    try:
+        percent = float(value.removesuffix("%"))
+    except ValueError:
+        percent = -1.0
+    if not 0 <= percent <= 100:  # NaN loses
+        raise click.BadParameter(f"expected a share from 0% to 100%, found {value!r}")
+    return percent / 100
+
+
 def exit_code(report: Report, min_score: Fraction | None) -> int:
     """Return what the exit code says about a report.
 

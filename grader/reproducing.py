@@ -54,6 +54,8 @@ def command_words(request: Request, seed: int) -> tuple[str, ...]:
         words += ["--isolation", request.isolation]
     if request.time_budget_s != TIME_BUDGET_S:
         words += ["--time-budget", f"{request.time_budget_s:g}"]
+    if request.spot_checks:
+        words += ["--spot-checks", f"{request.spot_checks:.6%}".rstrip("%").rstrip("0").rstrip(".") + "%"]
     return tuple(words)
 
 

@@ -6,6 +6,7 @@ import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -19,20 +20,23 @@ from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
+from grader.model.trace import Trace
 from grader.reading.builtin_rubrics import builtin_headers, require_exercises
 from grader.reading.collected import Collected
 from grader.reading.quoting import listed, shown
 from grader.reading.rubric_file import read_rubric
 from grader.reading.shipped import builtin_odometry
-from grader.reading.sources import read_sources
+from grader.reading.sources import read_reaches, read_sources
 from grader.reading.submission import stage_collected, stage_submission
 from grader.reading.variants import Draw
 from grader.recording.bag import Odometry, read_odometry
+from grader.recording.budget import RealTimeBudget
 from grader.recording.plan import plan_scenario
 from grader.recording.recorder import Job
-from grader.recording.studio import NO_ISOLATION, Studio, open_studio, planned_clock
+from grader.recording.studio import AUTO, NO_ISOLATION, Studio, open_studio, planned_clock
 from grader.reproducing import reproduction
 from grader.seeding import PRACTICE, PRACTICE_NOTE, SeedKey
+from grader.spot_checks import SpotChecks, check
 
 #: ROS releases that the test suite passes on.
 TRIED_ON = ("jazzy", "kilted")
@@ -58,6 +62,7 @@ class Request:
         collected: What was read of the submission before, perhaps elsewhere; None to read it now.
         student: Id of the student whose variants are graded; empty where nothing varies.
         variant_key: File with the course key, as the user typed it; None if nobody did.
+        spot_checks: Share of submissions, from 0 to 1, that are drawn to be recorded on the wall clock as well.
         draw: What variants come to; None if nobody says, and then a rubric that has some is refused.
     """
 
@@ -72,6 +77,7 @@ class Request:
     isolation: str = "auto"
     time_budget_s: float = TIME_BUDGET_S
     workers: int | None = None
+    spot_checks: float = 0.0
     collected: Collected | None = None
     student: str = ""
     variant_key: Path | None = None
@@ -134,11 +140,26 @@ def grade(
             reproduce=reproduction(request, exercises, odometry, seed),
         )
         take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
-        traces = studio.record(jobs, request.clock, progress, take, budget_s=request.time_budget_s)
+        checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
+        later = request.clock == AUTO and checks.certain
+        first = None if later else take
+        traces = studio.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
+        if request.clock == AUTO:
+            # what the grader itself wants to see twice takes nothing of a submission's time
+            record = partial(_record_one, studio, progress, RealTimeBudget(request.time_budget_s))
+            traces = check(checks, jobs, traces, record, take or _nobody_hears)
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if hear is not None:
             hear(run, exercises)
         return judge_run(exercises, run, pictures=pictures)
+
+
+def _record_one(studio: Studio, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
+    return studio.recorder.record([replace(job, budget=budget)], progress)[0]
+
+
+def _nobody_hears(key: tuple[str, str], trace: Trace) -> None:
+    """Stand for whoever would hear of a trace early."""
 
 
 def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[Exercise]:

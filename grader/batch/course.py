@@ -103,6 +103,7 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
         clock=grading.clock,
         isolation=grading.isolation,
         time_budget_s=grading.time_budget_s,
+        spot_checks=grading.spot_checks,
         every=grading.every,
     )
 

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from grader.model.errors import GraderError
 from grader.model.limits import TIME_BUDGET_S
 from grader.model.variant import Drawn
+from grader.spot_checks import is_drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,7 @@ class Conditions:
         time_budget_s: Real time that all recordings of a submission may take together.
         every: Whether only exercises count of which a submission has a file.
         variants: The values that are this student's own; None if nothing varies.
+        spot_checks: Share of the class that is drawn to be checked on the wall clock, from 0 to 1.
     """
 
     grader: str
@@ -36,10 +38,15 @@ class Conditions:
     every: bool = False
     variants: Drawn | None = None
     time_budget_s: float = TIME_BUDGET_S
+    spot_checks: float = 0.0
 
     def key(self, submission: str) -> str:
         """Return the key of the result of a submission, by its digest."""
-        text = json.dumps({**asdict(self), "submission": submission}, sort_keys=True)
+        depends_on = {**asdict(self), "submission": submission}
+        # Only who is drawn with one share and not with another is graded again.
+        if is_drawn(depends_on.pop("spot_checks"), self.seed or 0, submission):
+            depends_on["spot_check"] = True
+        text = json.dumps(depends_on, sort_keys=True)
         return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 

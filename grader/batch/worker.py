@@ -82,6 +82,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
         clock=conditions.clock,
         isolation=conditions.isolation,
         time_budget_s=conditions.time_budget_s,
+        spot_checks=conditions.spot_checks,
         workers=task.workers,
         collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
         student=own.student if own is not None else "",

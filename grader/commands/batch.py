@@ -11,7 +11,16 @@ import click
 
 from grader.batch.cluster.extra import require_dask
 from grader.model.containment import TIERS
-from grader.options import ALL_MET, INTERRUPTED, NOT_ALL_MET, PATH, UNDECIDED, drawn_with, time_budget_option
+from grader.options import (
+    ALL_MET,
+    INTERRUPTED,
+    NOT_ALL_MET,
+    PATH,
+    UNDECIDED,
+    drawn_with,
+    parse_share,
+    time_budget_option,
+)
 from grader.reports.escape import encoded, shown
 from grader.similarity.extra import require_library
 
@@ -42,6 +51,14 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 @click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
 @click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
 @time_budget_option
+@click.option(
+    "--spot-checks",
+    metavar="P%",
+    default="5%",
+    show_default=True,
+    callback=parse_share,
+    help="Share of the class that is drawn and checked on the wall clock as well.",
+)
 @click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
@@ -79,6 +96,7 @@ def command(  # noqa: PLR0913  one parameter an option
     clock: str,
     isolation: str,
     time_budget_s: float,
+    spot_checks: float,
     variant_key: Path | None,
     standalone: bool,
     canvas: str | None,
@@ -131,6 +149,7 @@ def command(  # noqa: PLR0913  one parameter an option
             clock=clock,
             isolation=isolation,
             time_budget_s=time_budget_s,
+            spot_checks=spot_checks,
             variant_key=variant_key,
         ),
         jobs=jobs,

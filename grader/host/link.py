@@ -28,6 +28,10 @@ class Link:
             if not self._cut:
                 self._socket.sendall(line)
 
+    def is_free(self) -> bool:
+        """Return whether nobody is sending at this moment."""
+        return not self._sending.locked()
+
     def cut(self) -> None:
         """Say nothing any more: a forked process is none that the grader knows."""
         self._cut = True

@@ -21,6 +21,7 @@ from .log import Log
 from .outside import install_alarms, install_processes
 from .stand_ins import install_stand_ins
 from .virtual import VirtualTime
+from .watch import Watch
 from .watchdog import Watchdog
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def run(request: dict[str, Any]) -> None:
         install_alarms(watchdog.give_up_on_alarms)
         install_processes(watchdog.give_up_on_processes)
         time.give_up_outside = watchdog.give_up_on_waiting
+        Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
     if watchdog is not None:
         watchdog.stop()

@@ -305,6 +305,7 @@ class Trace:
         notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
         harness_problem: What failed on our side or the machine's, and forbids judging; empty if nothing did.
         starts: How each process was started; empty in traces of earlier versions.
+        reached: What of their own insides the processes reached for, as these say: a reason to look twice, no evidence.
     """
 
     scenario: str
@@ -315,6 +316,7 @@ class Trace:
     notes: tuple[str, ...] = ()
     harness_problem: str = ""
     starts: tuple[Start, ...] = ()
+    reached: tuple[str, ...] = ()
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

@@ -105,6 +105,7 @@ def trace_from_json(data: Any) -> Trace:
             notes=tuple(map(_text, _list(data["notes"]))),
             harness_problem=_text(data["harness_problem"]),
             starts=tuple(map(_start, _list(data.get("starts", [])))),
+            reached=tuple(map(_text, _list(data.get("reached", [])))),
         )
     except (KeyError, TypeError, ValueError, IndexError, RecursionError) as error:
         raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error

@@ -25,9 +25,11 @@ from rclpy.serialization import deserialize_message, serialize_message
 from grader.model.limits import Limits
 from grader.model.quantities import MIB, size
 from grader.model.trace import Endpoint, GraphSnapshot
+from grader.recording.console import TEXT_CHARACTERS, Logged
 from grader.recording.interfaces import message_class, plain_fields
 from grader.recording.service_ends import ServiceEnds
 
+LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Deep enough for everything that can be published between two looks.
 DEPTH = 5000
@@ -74,6 +76,7 @@ class Observer:
         self._readers: dict[tuple[str, str, bool], Any] = {}
         self._writers: dict[str, Any] = {}
         self._participants: dict[bytes, int] = {}
+        self._logs: Any = None
         self.services = ServiceEnds(self.node)
         self._broken: Counter[str] = Counter()
         self._large: Counter[str] = Counter()
@@ -225,6 +228,23 @@ class Observer:
                 break
         return found
 
+    def hear_logs(self) -> None:
+        """Subscribe to what the loggers of nodes publish; what came before is kept for those who come late."""
+        message = message_class(LOG_TYPE)
+        qos = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._logs = self._make(_subscribing(message, "/rosout", qos))
+
+    def logs(self) -> list[Logged]:
+        """Return the log records that have been published since the last time; broken ones are left out."""
+        found: list[Logged] = []
+        with self._logs.handle:
+            while len(found) < AT_ONCE and (taken := self._logs.handle.take_message(self._logs.msg_type, True)):  # noqa: FBT003
+                with contextlib.suppress(Exception):  # whatever bytes a student's node sends
+                    log = deserialize_message(taken[0], self._logs.msg_type)
+                    at = log.stamp.sec, log.stamp.nanosec
+                    found.append(Logged(*at, log.name, log.msg[:TEXT_CHARACTERS], log.file, log.line))
+        return found
+
     def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:
         if len(cdr) > self._limits.message_bytes:
             self._large[topic] += 1
@@ -270,11 +290,15 @@ class Observer:
 
 
 def _make_node(domain: int) -> Node:
-    """Return a node in a participant of its own, without services and under a name no student's node can guess."""
+    """Return a node in a participant of its own, without services.
+
+    It is called as the daemon of the `ros2` command is, which is in most graphs: no student's node can guess the name,
+    or tell from it that it is being graded.
+    """
     context = Context()
     context.init(domain_id=domain)
     return Node(
-        f"_observer_{secrets.token_hex(8)}",
+        f"_ros2cli_daemon_{domain}_{secrets.token_hex(16)}",
         context=context,
         use_global_arguments=False,
         enable_rosout=False,

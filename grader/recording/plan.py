@@ -92,6 +92,9 @@ class Plan:
         starts_ns: Name and time of the processes that start late.
         may_exit: Names of the processes that are free to end.
         shutdown_ns: How long processes may take to end after the stop signal; 0 if that is not looked at.
+        bare: Whether the files run as `python3 FILE` does, on the wall clock, with nothing of the grader in their
+            processes.
+        first_node_ns: When the first node of the bare processes is expected: their time is counted from it.
     """
 
     scenario: str
@@ -113,6 +116,8 @@ class Plan:
     starts_ns: tuple[tuple[str, int], ...] = ()
     may_exit: tuple[str, ...] = ()
     shutdown_ns: int = 0
+    bare: bool = False
+    first_node_ns: int = 0
 
 
 #: The stimuli that are written the same way over the line, by their names in a plan.

@@ -37,8 +37,10 @@ REPORT_BYTES = 4 << 20
 REPORTS_AT_ONCE, READS_AT_ONCE = 1000, 256
 #: Notes that are kept, and how long one is at most.
 NOTES, NOTE_CHARACTERS = 100, 500
+#: The host tells of so many things that its program reached for, by names of this length.
+REACHED, NAME_CHARACTERS = 20, 60
 #: The end of what a process wrote on standard error, kept to tell what ended it.
-LAST_BYTES = 2000
+LAST_BYTES = 16_000
 #: A text longer than this is cut.
 TEXT_CHARACTERS = 4000
 #: Real seconds that a process gets to end by itself after the stop signal.
@@ -74,6 +76,7 @@ class Student:
         file: The file that it runs, relative to the submission.
         places: The files of the submission.
         start_told: How its file is started, as it said before anything of it ran.
+        reached: What its program reached for, as it says: names of events of Python's.
     """
 
     name: str
@@ -101,6 +104,7 @@ class Student:
     file: str = ""
     places: Places = field(default_factory=lambda: Places(None))
     start_told: Start | None = None
+    reached: list[str] = field(default_factory=list)
     _pending: bytes = b""
     _streams: dict[str, bytearray] = field(default_factory=lambda: {"stdout": bytearray(), "stderr": bytearray()})
     _kept: dict[str, int] = field(default_factory=lambda: {"stdout": 0, "stderr": 0})
@@ -167,6 +171,14 @@ class Student:
             self.notes.append(text[:NOTE_CHARACTERS])
 
     def report(self) -> dict[str, Any] | None:
+        """Wait for the next report, as `_next_report` does; what its program reached for is taken down."""
+        report = self._next_report()
+        while report is not None and report.get("kind") == "reached" and len(self.reached) < REACHED:
+            self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
+            report = self._next_report()
+        return report
+
+    def _next_report(self) -> dict[str, Any] | None:
         """Wait for the next report, reading its output meanwhile; None if the process has ended or never reports."""
         deadline = time.monotonic() + SILENCE_S
         while b"\n" not in self._pending:

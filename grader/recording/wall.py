@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, Delivery, Mark, Trace
+from grader.model.trace import ClockKind, Delivery, Mark, Observation, Trace
 from grader.recording.desk import Desk
 from grader.recording.ending import ending, never_stopped, reported_fault
 from grader.recording.exchanges import PlannedCalls
@@ -73,10 +73,7 @@ class WallConductor:
 
     def run(self) -> Trace:
         """Run the plan to its end and return the trace."""
-        self._started = time.monotonic_ns()
-        for student in self._students:
-            if student.name not in self._starts_ns:
-                student.tell({"now_ns": 0, "free_until_ns": 0})
+        self._begin()
         self._run_on(0)
         self._look_at_graph(self._end_ns)
         self._tape.look_back(self._end_ns)
@@ -88,11 +85,22 @@ class WallConductor:
             clock=ClockKind.WALL,
             stop_ns=self._stop_ns,
             clock_reason="it was asked for",
-            observations=tuple(self._tape.observations),
+            observations=self._observations(),
             notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
             harness_problem=self._slip(),
         )
+
+    def _observations(self) -> tuple[Observation, ...]:
+        """Return what was observed, in order."""
+        return tuple(self._tape.observations)
+
+    def _begin(self) -> None:
+        """Start the clock, and every process that does not start late."""
+        self._started = time.monotonic_ns()
+        for student in self._students:
+            if student.name not in self._starts_ns:
+                student.tell({"now_ns": 0, "free_until_ns": 0})
 
     def _run_on(self, before_ns: int) -> None:
         """Look again and again until the end, or until nothing more can happen."""

@@ -15,7 +15,9 @@ import socket
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,8 @@ from grader.model.errors import HarnessError
 from grader.model.limits import Limits
 from grader.model.quantities import GIB, MIB, NS_PER_S
 from grader.model.trace import FaultKind, Mark, Trace
+from grader.recording.bare_start import bare_arguments
+from grader.recording.bare_student import BareStudent
 from grader.recording.codec import trace_to_json
 from grader.recording.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.recording.guard import Budget, Guard
@@ -73,15 +77,17 @@ class Worker:
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
+        # evidence is written in the form of a trace, and what was reached for is none
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
-        return {"trace": trace_to_json(trace), **cost, "worn": is_worn(trace)}
+        return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
         students: list[Student] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
             for name, file in plan.processes:
-                students.append(self._start(plan, name, file, domain))
+                start = self._start_bare if plan.bare else self._start
+                students.append(start(plan, name, file, domain))
             # rclpy takes long to import: the students' processes start meanwhile.
             from grader.recording.conductor import Conductor  # noqa: PLC0415
             from grader.recording.observer import Observer  # noqa: PLC0415
@@ -91,10 +97,16 @@ class Worker:
             stack.callback(observer.close)
             guard = stack.enter_context(Guard(students, plan.limits, budget))
             stack.callback(self._account, guard)
-            for student in students:
-                _await_ready(student)
-            conductor = WallConductor if plan.clock == "wall" else Conductor
-            return guard.reviewed(conductor(plan, students, observer).run())
+            conductor: Callable[..., Conductor | WallConductor] = WallConductor if plan.clock == "wall" else Conductor
+            if plan.bare:
+                from grader.recording.bare import BareConductor  # noqa: PLC0415 - as above
+
+                conductor = BareConductor
+            else:
+                for student in students:
+                    _await_ready(student)
+            trace = guard.reviewed(conductor(plan, students, observer).run())
+            return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
 
     def _account(self, guard: Guard) -> None:
         self._real_ns += guard.real_ns
@@ -137,6 +149,24 @@ class Worker:
             raise
         finally:
             theirs.close()
+        student.file, student.places = file, Places(Path(plan.root))
+        return student
+
+    def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+        """Start a file with nothing of the grader in its process; see `bare`."""
+        root = self._isolation.submission_seen_at or plan.root
+        command = self._isolation.student_command(
+            StudentProcess(
+                runtime=self._runtime,
+                host_folder=None,
+                submission=Path(plan.root),
+                arguments=bare_arguments(Path(plan.root), root, file),
+                environment={"ROS_DOMAIN_ID": str(domain)},
+                pass_fds=(),
+            ),
+            plan.limits,
+        )
+        student = BareStudent.begin(name, root, command, plan.limits)
         student.file, student.places = file, Places(Path(plan.root))
         return student
 

@@ -182,7 +182,7 @@ class Bubblewrap:
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
-        for folder in (*view.parents(), *parents_of((HOST,))):
+        for folder in (*view.parents(), *parents_of((HOST,) if process.host_folder else ())):
             # Where Python lies below /tmp, these are in the scratch folder, and a user's student owns them.
             options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:
@@ -192,7 +192,7 @@ class Bubblewrap:
         for folder in secrets_within(view.bound, process.runtime):
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
         options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
-        options += ["--ro-bind", str(process.host_folder), str(HOST)]
+        options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
         # bubblewrap's /dev is a tmpfs without limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
 

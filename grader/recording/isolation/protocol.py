@@ -68,7 +68,8 @@ class StudentProcess:
 
     Attributes:
         runtime: Interpreter and ROS.
-        host_folder: The folder of the `host` package; the only part of the grader that the process may read.
+        host_folder: The folder of the `host` package, the only part of the grader that the process may read; None if it
+            is to read nothing of the grader.
         submission: The staged copy; seen read-only by the process at `submission_seen_at`.
         arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/host/launcher.py")`; paths as the process
             sees them.
@@ -77,7 +78,7 @@ class StudentProcess:
     """
 
     runtime: PythonRuntime
-    host_folder: Path
+    host_folder: Path | None
     submission: Path
     arguments: tuple[str, ...]
     environment: Mapping[str, str]

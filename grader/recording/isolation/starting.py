@@ -115,7 +115,8 @@ def walled_command(process: StudentProcess, limits: Limits, ground: Ground) -> C
 
 def _walls(process: StudentProcess, ground: Ground) -> dict[str, object]:
     bound = view_of((*process.runtime.read_paths, process.runtime.executable)).bound
-    own = (process.submission, process.host_folder, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
+    host = (process.host_folder,) if process.host_folder else ()
+    own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
     return {
         "read": [str(path) for path in (*bound, *own)],
         "hidden": [str(path) for path in secrets_within(bound, process.runtime)],

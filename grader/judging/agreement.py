@@ -1,0 +1,322 @@
+"""Whether a program did the same on two clocks: the same plan recorded in virtual time and on the wall clock; pure.
+
+The wall clock's recording is shorter, loses what is sent before anybody listens, and comes from a machine that others
+use as well. What may differ for these reasons, by chance or with the time of day, is no difference: rates and counts
+have wide bands, numbers that vary are not compared, and what happened near an edge of the window is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from grader.judging.silence import faults_before_stop
+from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds, within
+from grader.model.trace import Delivery, Fault, LogRecord, Message, Request, Response, Trace
+
+#: Rates and counts agree within this share, and so many more or fewer.
+SHARE, COUNT = 0.3, 4
+#: Fewer messages or records than this say nothing.
+FEW = 4
+#: What begins, ends or changes nearer to an edge of the window than this may fall on its other side.
+EDGE_NS = 2 * NS_PER_S
+#: Numbers that never vary agree within this share of them, and so much more.
+NUMBER_SHARE, NUMBER_SLACK = 0.3, 0.01
+#: So large a share of messages may hold another number than all others: the first or last of a program.
+ODD_SHARE = 0.2
+#: A value has to be held for so long before what a program makes of it is compared, so long before the next one.
+HELD_NS, BEFORE_NEXT_NS = NS_PER_S, 50 * NS_PER_MS
+#: More different numbers than this are not a decision.
+DECISIONS = 3
+#: Numbers under these names tell the time.
+CLOCK_FIELDS = frozenset({"stamp", "sec", "nanosec", "time", "duration"})
+#: Fields of one message that are compared at most.
+FIELDS = 64
+
+
+class Aspect(str, Enum):
+    """In what two recordings differ."""
+
+    SILENT = "silent"
+    RATE = "rate"
+    VALUE = "value"
+    CONSTANT = "constant"
+    ANSWER = "answer"
+    LOGS = "logs"
+    ENDPOINT = "endpoint"
+    CALLS = "calls"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One thing that a program did on one clock only.
+
+    Attributes:
+        aspect: What it is.
+        name: Topic, field, service or file.
+        virtual: How it was in virtual time: a rate in Hz, a number, a count, a word.
+        wall: How it was on the wall clock.
+    """
+
+    aspect: Aspect
+    name: str
+    virtual: float | str
+    wall: float | str
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """The part of a recording that both have."""
+
+    trace: Trace
+    start_ns: int
+    stop_ns: int
+
+    def holds(self, t_ns: int) -> bool:
+        return self.start_ns <= t_ns < self.stop_ns
+
+    def messages(self, topic: str) -> list[Message]:
+        return [m for m in self.trace.messages(topic) if self.holds(m.t_ns)]
+
+
+def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tuple[Difference, ...]:
+    """Return what a program did on one clock only, the plainest first; empty if the recordings agree.
+
+    Args:
+        virtual: The whole recording in virtual time.
+        wall: The beginning of the same plan on the wall clock, by a machine that kept up.
+        first_message_on: The topic whose first message begins the observation; empty if it begins at once.
+    """
+    span_ns = wall.stop_ns - _start(wall, first_message_on)
+    windows = [_Window(t, start, start + span_ns) for t in (virtual, wall) for start in [_start(t, first_message_on)]]
+    pair = (windows[0], windows[1])
+    ends = tuple(_ends(*pair))
+    return (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
+
+
+def sentence(difference: Difference) -> str:
+    """Say how the clocks disagree, for the reason of a clock."""
+    name = difference.name[:200]
+    virtual, wall = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
+    what = {
+        Aspect.SILENT: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.RATE: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.VALUE: f"{name} was {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.CONSTANT: f"{name} varied in virtual time and was always {wall} on the wall clock",
+        Aspect.ANSWER: f"{name} was {virtual} in virtual time and {wall} on the wall clock for the same input",
+        Aspect.LOGS: f"{name} logged {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.ENDPOINT: f"{name} was {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.CALLS: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
+        Aspect.END: f"{name} {virtual} in virtual time and {wall} on the wall clock",
+    }
+    return f"the node behaved differently on the wall clock: {what[difference.aspect]}"
+
+
+def _shown(value: float | str, aspect: Aspect) -> str:
+    if isinstance(value, str):
+        return value
+    if aspect is Aspect.RATE:
+        return f"{value:.1f} Hz"
+    unit = {Aspect.SILENT: " messages", Aspect.LOGS: " records", Aspect.CALLS: " messages"}.get(aspect, "")
+    return f"{value:.6g}{unit}"
+
+
+def _start(trace: Trace, first_message_on: str) -> int:
+    messages = trace.messages(first_message_on) if first_message_on else ()
+    return messages[0].t_ns if messages else 0
+
+
+# --- topics ---
+
+
+def _traffic(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    for topic in sorted({m.topic for m in (*virtual.trace.messages(), *wall.trace.messages())}):
+        before, after = virtual.messages(topic), wall.messages(topic)
+        lasting = any(m.t_ns >= virtual.start_ns + EDGE_NS for m in before)
+        if len(before) >= FEW and lasting and not after:
+            yield Difference(Aspect.SILENT, topic, len(before), 0)
+        elif len(after) >= FEW and not virtual.trace.messages(topic):
+            yield Difference(Aspect.SILENT, topic, 0, len(after))
+        elif differ_in_count(len(before), len(after)) or _differ_in_rate(before, after):
+            yield Difference(Aspect.RATE, topic, *_rates(virtual, wall, before, after))
+        elif min(len(before), len(after)) >= FEW:
+            yield from _values(topic, before, after)
+
+
+def differ_in_count(one: int, other: int) -> bool:
+    """Return whether two counts are further apart than chance, jitter and a late start explain."""
+    return abs(one - other) > COUNT + SHARE * max(one, other)
+
+
+def _differ_in_rate(before: Sequence[Message], after: Sequence[Message]) -> bool:
+    if min(len(before), len(after)) < 2 * FEW:
+        return False
+    one, other = _rate(before), _rate(after)
+    return abs(one - other) > SHARE * max(one, other)
+
+
+def _rate(messages: Sequence[Message]) -> float:
+    span_ns = messages[-1].t_ns - messages[0].t_ns
+    return (len(messages) - 1) / seconds(span_ns) if span_ns > 0 else float("inf")
+
+
+def _rates(virtual: _Window, wall: _Window, before: Sequence[Message], after: Sequence[Message]) -> tuple[float, float]:
+    """Return both rates over the whole window, so that pauses count."""
+    return tuple(  # type: ignore[return-value]
+        len(found) / max(seconds(window.stop_ns - window.start_ns), 1e-9)
+        for window, found in ((virtual, before), (wall, after))
+    )
+
+
+def _values(topic: str, before: Sequence[Message], after: Sequence[Message]) -> Iterator[Difference]:
+    one, other = _columns(before), _columns(after)
+    for path in sorted(one.keys() & other.keys()):
+        first, second = one[path], other[path]
+        if len(set(first)) == 1:
+            odd = [value for value in second if not _alike(first[0], value)]
+            if len(odd) > ODD_SHARE * len(second) + 1:
+                yield Difference(Aspect.VALUE, f"{topic} {path}", first[0], odd[0])
+                return
+        elif len(set(second)) == 1 and len(second) >= 2 * FEW and len(set(first[: len(second)])) > DECISIONS:
+            yield Difference(Aspect.CONSTANT, f"{topic} {path}", "", second[0])
+            return
+
+
+def _alike(want: float, got: float) -> bool:
+    same = want == got or (want != want and got != got)  # noqa: PLR0124 - NaN
+    return same or within(got, want, NUMBER_SHARE * abs(want) + NUMBER_SLACK)
+
+
+def _columns(messages: Sequence[Message]) -> dict[str, list[float]]:
+    """Return the numbers of each field that every message has, by its path."""
+    columns: dict[str, list[float]] = {}
+    for message in messages:
+        for path, number in _numbers(message.value):
+            columns.setdefault(path, []).append(number)
+    return {path: column for path, column in columns.items() if len(column) == len(messages)}
+
+
+def _numbers(value: Mapping[str, Any], above: str = "") -> list[tuple[str, float]]:
+    found: list[tuple[str, float]] = []
+    for name, part in value.items():
+        if name in CLOCK_FIELDS or len(found) >= FIELDS:
+            continue
+        if isinstance(part, Mapping):
+            found += _numbers(part, f"{above}{name}.")
+        elif isinstance(part, (int, float)):
+            found.append((f"{above}{name}", float(part)))
+    return found[:FIELDS]
+
+
+# --- what a program makes of what it is told ---
+
+
+def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    inputs = sorted({d.topic for d in virtual.trace.of(Delivery)})
+    outputs = sorted({m.topic for m in virtual.trace.messages()})
+    for output in outputs:
+        for given in inputs:
+            one, other = _decided(virtual, given, output), _decided(wall, given, output)
+            wrong = [number for number in sorted(one.keys() & other.keys()) if not _alike(one[number], other[number])]
+            if wrong and _are_decisions(virtual, output):
+                yield Difference(Aspect.ANSWER, output, one[wrong[0]], other[wrong[0]])
+                return
+
+
+def _are_decisions(window: _Window, topic: str) -> bool:
+    return len({n for m in window.trace.messages(topic) for _, n in _numbers(m.value)}) <= DECISIONS
+
+
+def _decided(window: _Window, given: str, output: str) -> dict[int, float]:
+    """Return what a program published last while each value was held, by the value's number; only where it stood."""
+    messages = window.trace.messages(output)
+    found: dict[int, float] = {}
+    for number, (start_ns, stop_ns) in enumerate(_held(window, given)):
+        if stop_ns - start_ns < HELD_NS:
+            continue
+        late_ns = start_ns + (stop_ns - start_ns) // 2
+        settled = {n for m in messages if late_ns <= m.t_ns < stop_ns for _, n in _numbers(m.value)[:1]}
+        before = [n for m in messages if start_ns <= m.t_ns < late_ns for _, n in _numbers(m.value)[:1]]
+        if len(settled) == 1:
+            found[number] = settled.pop()
+        elif not settled and before:
+            found[number] = before[-1]
+    return found
+
+
+def _held(window: _Window, topic: str) -> list[tuple[int, int]]:
+    """Return when each value of a stimulus began and ended, inside the window."""
+    spans: list[tuple[int, int]] = []
+    last: Mapping[str, Any] | None = None
+    for delivery in window.trace.deliveries(topic):
+        if not window.holds(delivery.t_ns):
+            continue
+        if delivery.value != last:
+            spans.append((delivery.t_ns, delivery.t_ns))
+            last = delivery.value
+        spans[-1] = (spans[-1][0], delivery.t_ns)
+    return [(start, stop - BEFORE_NEXT_NS) for start, stop in spans]
+
+
+# --- services, logs, endpoints, ends ---
+
+
+def _exchanges(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    for kind in (Request, Response):
+        counts = [_sent(window, kind) for window in (virtual, wall)]
+        for service in sorted(counts[0].keys() | counts[1].keys()):
+            one, other = (count.get(service, 0) for count in counts)
+            if differ_in_count(one, other):
+                yield Difference(Aspect.CALLS, service, one, other)
+
+
+def _sent(window: _Window, kind: type[Request] | type[Response]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for one in window.trace.of(kind):
+        if one.sender == "student" and window.holds(one.t_ns):
+            counts[one.service] = counts.get(one.service, 0) + 1
+    return counts
+
+
+def _logs(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    for process in sorted({r.process for r in (*virtual.trace.records(), *wall.trace.records())}):
+        one, other = (_logged(window, process) for window in (virtual, wall))
+        if differ_in_count(len(one), len(other)):
+            yield Difference(Aspect.LOGS, process, len(one), len(other))
+
+
+def _logged(window: _Window, process: str) -> list[LogRecord]:
+    return [r for r in window.trace.records(process) if window.holds(r.t_ns)]
+
+
+def _endpoints(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    early = [g for g in virtual.trace.graphs() if g.t_ns < virtual.stop_ns - EDGE_NS]
+    lasting = {key for g in early for key in _keys(g.endpoints, g.services)}
+    ever = {key for g in virtual.trace.graphs() for key in _keys(g.endpoints, g.services)}
+    seen = {key for g in wall.trace.graphs() for key in _keys(g.endpoints, g.services)}
+    for kind, name, type_ in sorted(lasting - seen):
+        yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "there", "not there")
+    for kind, name, type_ in sorted(seen - ever):
+        yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "not there", "there")
+
+
+def _keys(endpoints: Sequence[Any], services: Sequence[Any]) -> Iterator[tuple[str, str, str]]:
+    yield from ((e.kind, e.topic, e.type) for e in endpoints)
+    yield from ((s.kind, s.service, s.type) for s in services)
+
+
+def _ends(virtual: _Window, wall: _Window) -> Iterator[Difference]:
+    for process in sorted({f.process for w in (virtual, wall) for f in w.trace.faults()}):
+        one, other = (_first(window, process) for window in (virtual, wall))
+        if one is not None and one.t_ns < virtual.stop_ns - EDGE_NS and other is None:
+            yield Difference(Aspect.END, process, "failed", "went on")
+        elif other is not None and other.t_ns < wall.stop_ns and not faults_before_stop(virtual.trace, process):
+            yield Difference(Aspect.END, process, "went on", "failed")
+
+
+def _first(window: _Window, process: str) -> Fault | None:
+    found = [f for f in faults_before_stop(window.trace, process) if f.t_ns <= window.stop_ns]
+    return min(found, key=lambda f: f.t_ns, default=None)

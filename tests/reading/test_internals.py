@@ -1,0 +1,73 @@
+"""What reaches for the insides of its process: attacks do, and ordinary programs do not."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.reading.internals import LONG, reaching
+from grader.reading.sources import read_reaches
+
+ROOT = Path(__file__).resolve().parents[2]
+SUSPICIOUS = {
+    "garbage collector": "import gc\ngc.get_objects()",
+    "an alias": "from ctypes import CDLL as C\nC(None)",
+    "frames": "import sys\nsys._getframe(1)",
+    "modules": "import sys\n'_x' in sys.modules",
+    "closures": "def f(g):\n    return g.__closure__[0].cell_contents",
+    "code": "import time\ntime.sleep.__code__",
+    "what replaced a function": "import time\nprint(type(time.sleep))",
+    "an import by a text": "__import__('g' + 'c')",
+    "evaluated text": "eval('1')",
+    "an attribute by a text": "import os\ngetattr(os, 'ti' + 'mes')()",
+    "processor time": "import time\ntime.process_time()",
+    "file times": "import os\nos.stat('/tmp').st_mtime",
+    "processes": "open('/proc/self/status')",
+    "children": "import subprocess\nsubprocess.run(['date'])",
+    "the environment": "import os\nprint(dict(os.environ))",
+    "two clocks": "import time\ntime.time() - time.monotonic()",
+    "a loop that counts": "import time\nn = 0\nend = time.time() + 1\nwhile time.time() < end:\n    n += 1",
+    "a date": "import time\nx = time.time() < 1767229200",
+    "a calendar": "from datetime import datetime\nx = datetime.now().year == 2026",
+    "rclpy's inside": "from rclpy.impl.implementation_singleton import rclpy_implementation",
+    "the grader": "import _grader_host",
+    "a long file": "x = 1\n" * 60_000,
+}
+ORDINARY = {
+    "a counter": "class A:\n    def tick(self):\n        self.n += 1",
+    "an elapsed time": "import time\nstart = time.time()\nwhile time.time() - start < 1:\n    time.sleep(0.1)",
+    "an argument": "import sys\nprint(sys.argv[1:])",
+    "a variable": "import os\nos.environ.get('ROS_DOMAIN_ID')",
+    "kinds": "def f(x):\n    return isinstance(x, float) and type(x) is not int and str(x)",
+    "no Python": "def f(:",
+}
+
+
+@pytest.mark.parametrize("text", SUSPICIOUS.values(), ids=SUSPICIOUS)
+def test_what_looks_at_its_process_is_found(text):
+    """Under any name that it was imported as."""
+    assert reaching(text) != ()
+
+
+@pytest.mark.parametrize("text", ORDINARY.values(), ids=ORDINARY)
+def test_what_students_write_is_not(text):
+    """Ordinary programs cost nothing more."""
+    assert reaching(text) == ()
+
+
+def test_few_right_programs_are_suspected():
+    """Of the programs with full marks, at most one in twenty is recorded twice."""
+    folders = [f for group in ("correct", "threads") for f in (ROOT / "tests/submissions" / group).iterdir()]
+    suspected = [f.name for f in folders if f.is_dir() and read_reaches(f)]
+    assert len(suspected) <= len(folders) / 20
+
+
+def test_every_file_of_a_submission_counts(tmp_path):
+    """A helper module is part of the program, and one without source is not looked through."""
+    (tmp_path / "node.py").write_text("import helper\n")
+    assert read_reaches(tmp_path) == ()
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "helper.py").write_text("import gc\n")
+    (tmp_path / "fast.so").write_bytes(b"\x7fELF")
+    assert read_reaches(tmp_path) == ("a .so file", "gc")
+    (tmp_path / "zz.py").write_text("x = 1\n" * 900_000)
+    assert read_reaches(tmp_path)[-1] == LONG

@@ -1,0 +1,166 @@
+"""Spot checks: who is checked, what a disagreement leads to, and programs that are right only in virtual time."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from grader.model.report import Report
+from grader.model.trace import ClockKind, Trace
+from grader.recording.plan import Plan
+from grader.recording.recorder import Job
+from grader.session import Request, grade
+from grader.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.testing import TraceBuilder
+
+HERE = Path(__file__).parent / "spot_checks"
+FLOAT = "std_msgs/msg/Float32"
+S = 1_000_000_000
+
+
+def job(scenario="alone", **fields):
+    return Job(scenario, Plan(scenario, (), "/", "00", 10 * S, "/x", 60 * S, (), (), "virtual", **fields))
+
+
+def trace(clock=ClockKind.VIRTUAL, *, rate_hz=20.0, **fields):
+    made = TraceBuilder("a.py", clock=clock).messages("/x", FLOAT, {"data": 1.0}, rate_hz=rate_hz).trace()
+    return replace(made, scenario="alone", **fields)
+
+
+class Recorder:
+    """Gives traces of the wall clock in order, and remembers the plans."""
+
+    def __init__(self, *traces):
+        self.traces, self.plans = list(traces), []
+
+    def __call__(self, planned: Job) -> Trace:
+        self.plans.append(planned.plan)
+        return self.traces.pop(0)
+
+
+def checked(recorder, *, reaches=("gc",), share=0.0, virtual=None, **fields):
+    heard = []
+    checks = SpotChecks(share, 1, "sha256:0", reaches)
+    jobs = {("one", "alone"): job(**fields)}
+    traces = {("one", "alone"): virtual or trace()}
+    found = check(checks, jobs, traces, recorder, lambda key, t: heard.append((key, t)))
+    assert heard == [(key, found[key]) for key in found] or not recorder.plans
+    return found["one", "alone"]
+
+
+SAME, OTHER = trace(ClockKind.WALL), trace(ClockKind.WALL, rate_hz=1.0)
+BUSY = replace(SAME, harness_problem="the machine was too busy")
+
+
+def test_who_is_neither_drawn_nor_suspected_is_not_checked():
+    """Nothing is recorded twice."""
+    recorder = Recorder()
+    assert checked(recorder, reaches=()).clock is ClockKind.VIRTUAL
+    assert recorder.plans == []
+
+
+def test_where_the_clocks_agree_virtual_time_counts():
+    """One short recording, with nothing of the grader in the process."""
+    recorder = Recorder(SAME)
+    assert checked(recorder) == trace()
+    (plan,) = recorder.plans
+    assert (plan.clock, plan.bare, plan.duration_ns) == ("wall", True, 6 * S)
+
+
+def test_where_they_disagree_the_wall_clock_decides():
+    """Seen twice, then everything is recorded in full, and the reason says how they differ."""
+    recorder = Recorder(OTHER, OTHER, OTHER)
+    decided = checked(recorder)
+    assert decided.clock is ClockKind.WALL
+    assert decided.clock_reason.endswith("/x had 20.0 Hz in virtual time and 1.0 Hz on the wall clock")
+    assert [plan.duration_ns for plan in recorder.plans] == [6 * S, 6 * S, 10 * S]
+
+
+def test_a_disagreement_that_does_not_come_again_is_none():
+    """It was the machine."""
+    assert checked(Recorder(OTHER, SAME)) == trace()
+
+
+def test_a_busy_machine_is_nobodys_mark():
+    """Of a drawn submission virtual time counts, with a note; of one that a check is about nothing is decided."""
+    drawn = checked(Recorder(BUSY), reaches=(), share=1.0)
+    assert drawn.harness_problem == ""
+    assert drawn.notes[-1].startswith("the machine was too busy for a check on the wall clock")
+    assert checked(Recorder(BUSY)).harness_problem.startswith("the machine was too busy")
+
+
+def test_what_a_process_reached_for_is_enough():
+    """The names in its files may hide it."""
+    recorder = Recorder(OTHER, OTHER, OTHER)
+    assert checked(recorder, reaches=(), virtual=trace(reached=("gc.get_objects",))).clock is ClockKind.WALL
+
+
+@pytest.mark.parametrize("virtual", [trace(clock_reason="busy"), trace(harness_problem="lost"), SAME])
+def test_what_virtual_time_does_not_decide_is_not_checked(virtual):
+    """The wall clock has it already, or nobody."""
+    recorder = Recorder()
+    assert checked(recorder, virtual=virtual) == virtual
+    assert recorder.plans == []
+
+
+def test_a_slow_start_is_waited_for():
+    """As long as in virtual time, and some more."""
+    late = TraceBuilder("a.py").messages("/x", FLOAT, {"data": 1.0}, start_s=8.0, rate_hz=20.0).trace()
+    assert shortened(job().plan, late).wait_at_most_ns == 18 * S
+
+
+def test_the_draw_repeats_and_has_the_share_asked_for():
+    """It follows from the seed, which only the key tells, and the digest."""
+    digests = [f"sha256:{n}" for n in range(2000)]
+    drawn = [d for d in digests if is_drawn(0.05, 7, d)]
+    assert drawn == [d for d in digests if is_drawn(0.05, 7, d)]
+    assert 60 < len(drawn) < 140
+    assert drawn != [d for d in digests if is_drawn(0.05, 8, d)]
+    assert not any(is_drawn(0.0, 7, d) for d in digests)
+    assert all(is_drawn(1.0, 7, d) for d in digests)
+
+
+# --- for real ---
+
+
+def graded(tmp_path: Path, file: Path, **options: object) -> Report:
+    """Grade a file as a velocity publisher that is watched for three seconds."""
+    folder = tmp_path / "submission"
+    folder.mkdir(exist_ok=True)
+    shutil.copy(file, folder / "velocity_publisher.py")
+    rubric = tmp_path / "rubric.yaml"
+    text = (HERE.parents[1] / "rubrics" / "exercise_1.yaml").read_text(encoding="utf-8")
+    rubric.write_text(text.replace("10 s", "3 s").replace("60 s", "3 s"), encoding="utf-8")
+    return grade(Request(str(folder), rubrics=(rubric,), **options), lambda step: None, pictures=False)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("file", sorted((HERE / "cheats").glob("*.py")), ids=lambda file: file.stem)
+def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path, file):
+    """Whatever it tells the clocks apart by; what no file shows is found where it is drawn."""
+    assert graded(tmp_path, file, clock="virtual").score == 30
+    report = graded(tmp_path, file, spot_checks=1.0 if file.stem.startswith("drawn_") else 0.0)
+    (exercise,) = report.exercises
+    assert report.score <= 20
+    assert report.final
+    assert exercise.clock is ClockKind.WALL
+    assert exercise.clock_reason.startswith("the node behaved differently on the wall clock: ")
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("file", sorted((HERE / "honest").glob("*.py")), ids=lambda file: file.stem)
+def test_an_honest_program_keeps_its_marks(tmp_path, file):
+    """It looks suspicious, and is the same on both clocks."""
+    assert graded(tmp_path, file).score == 30
+
+
+@pytest.mark.ros
+def test_a_checked_process_holds_nothing_of_the_grader(tmp_path):
+    """Neither a module, a path, a variable, an argument nor a descriptor; nothing is replaced, and chance is real."""
+    (exercise,) = graded(tmp_path, HERE / "looks_around.py").exercises
+    assert exercise.clock is ClockKind.WALL
+    told = next(v for v in exercise.verdicts if v.id == "logging").evidence
+    assert "found: nothing" in str(told), told
