@@ -107,6 +107,7 @@ class WorkerProcess:
         request = json.dumps({"plan": plan_to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         try:
+            self._line.settimeout(MARGIN_S)  # a plan with a recording in it is more than the line holds at once
             self._line.sendall(request.encode())
             tries = 1 + (plan.clock == ClockKind.WALL.value)
             seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S

@@ -25,7 +25,7 @@ RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
 
 #: Stands in for the worker: each start takes the next behaviour from a folder, and writes down that it lived.
 WORKER = """
-import ctypes, json, os, signal, socket, sys
+import ctypes, json, os, signal, socket, sys, time
 ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # as the tiers of isolation do: it ends with the thread that started it
 folder, request = sys.argv[1], json.loads(sys.argv[2])
 for number in range(1000):
@@ -44,7 +44,7 @@ def trace(plan, note):
             "stop_ns": plan["duration_ns"], "notes": [note], "harness_problem": "", "observations": []}
 for command in line.makefile("r"):
     asked = json.loads(command)
-    if behaviour == "answers":
+    if behaviour in ("answers", "rests"):
         said = json.dumps({"trace": trace(asked["plan"], f"worker {number}, domain {asked['domain']}")}).encode()
     elif behaviour.startswith("tells of"):
         told = behaviour[9:].split("|")
@@ -78,6 +78,8 @@ for command in line.makefile("r"):
     else:
         said = behaviour.encode()
     line.sendall(said + b"\\n")
+    if behaviour == "rests":
+        time.sleep(0.5)
 """
 
 
@@ -135,6 +137,15 @@ def note(trace):
 
 def nothing(step: str) -> None:
     """Hear a step, and do nothing."""
+
+
+def test_a_worker_may_take_its_time_to_read_a_plan(make):
+    """A plan with a recording in it is more than the line holds at once."""
+    recorder, stage = make("rests")
+    large = replace(plan("large"), root="x" * 4_000_000)
+    traces = recorder.record([*jobs("small"), Job("large", large)], nothing)
+    assert [trace.harness_problem for trace in traces] == ["", ""]
+    assert len(stage.pids()) == 1
 
 
 def test_traces_come_back_in_the_order_of_the_jobs(make):
