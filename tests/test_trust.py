@@ -28,7 +28,6 @@ PENDING = {
     "speaks_for_its_host",
     "counts_messages",
     "right_for_ten_seconds",
-    "locks_a_shared_file",
     "init_for_each_question",
 }
 

@@ -14,15 +14,19 @@ class VelocityPublisher(Node):
         super().__init__("velocity_publisher")
         self.publisher = self.create_publisher(Twist, "/cmd_vel", 10)
         self.create_timer(0.05, self.tick)
-        self.held = []
+        self.held, made = [], 0
         for path in (fcntl.__file__, json.__file__, rclpy.__file__, sys.executable):
             try:
-                file = open(path, "rb")
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                first, second = open(path, "rb"), open(path, "rb")
+                self.held += [first, second]
+                fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 continue
-            self.held.append(file)
-        self.get_logger().info(f"locks held: {len(self.held)}")
+            try:
+                fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                made += 1
+        self.get_logger().info(f"locks made: {made}")
 
     def drive(self):
         message = Twist()
