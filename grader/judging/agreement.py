@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 from typing import Any
 
 from grader.judging.silence import faults_before_stop
@@ -28,6 +29,8 @@ NUMBER_SHARE, NUMBER_SLACK = 0.3, 0.01
 ODD_SHARE = 0.2
 #: A value has to be held for so long before what a program makes of it is compared, so long before the next one.
 HELD_NS, BEFORE_NEXT_NS = NS_PER_S, 50 * NS_PER_MS
+#: Values that end no further apart than this are the same one.
+SAME_NS = 300 * NS_PER_MS
 #: More different numbers than this are not a decision.
 DECISIONS = 3
 #: Numbers under these names tell the time.
@@ -155,7 +158,14 @@ def _differ_in_rate(before: Sequence[Message], after: Sequence[Message]) -> bool
     if min(len(before), len(after)) < 2 * FEW:
         return False
     one, other = _rate(before), _rate(after)
-    return abs(one - other) > SHARE * max(one, other)
+    return _is_regular(before) and abs(one - other) > SHARE * max(one, other)
+
+
+def _is_regular(messages: Sequence[Message]) -> bool:
+    """Return whether messages come from a timer: what follows chance or the input has no rate to compare."""
+    gaps = [after.t_ns - before.t_ns for before, after in pairwise(messages)]
+    mean = sum(gaps) / len(gaps)
+    return all(abs(gap - mean) <= SHARE * mean for gap in gaps)
 
 
 def _rate(messages: Sequence[Message]) -> float:
@@ -217,48 +227,65 @@ def _numbers(value: Mapping[str, Any], above: str = "") -> list[tuple[str, float
 def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     inputs = sorted({d.topic for d in virtual.trace.of(Delivery)})
     outputs = sorted({m.topic for m in virtual.trace.messages()})
-    for output in outputs:
-        for given in inputs:
-            one, other = _decided(virtual, given, output), _decided(wall, given, output)
-            wrong = [number for number in sorted(one.keys() & other.keys()) if not _alike(one[number], other[number])]
-            if wrong and _are_decisions(virtual, output):
-                yield Difference(Aspect.ANSWER, output, one[wrong[0]], other[wrong[0]])
+    for output in outputs if inputs else ():
+        for given in inputs if _are_decisions(virtual, output) else ():
+            pairs = _paired(_decided(virtual, given, output), _decided(wall, given, output))
+            wrong = [(one, other) for one, other in pairs if not _alike(one, other)]
+            if wrong:
+                yield Difference(Aspect.ANSWER, output, *wrong[0])
                 return
+
+
+def _paired(before: Sequence[_Decision], after: Sequence[_Decision]) -> Iterator[tuple[float, float]]:
+    """Yield what was decided on both clocks for the same value, which ends at the same time in both recordings.
+
+    The first value may be sent in another type until the program's own is known.
+    """
+    for one in before:
+        for other in after:
+            if abs(one.stop_ns - other.stop_ns) < SAME_NS and one.given == other.given:
+                yield one.answer, other.answer
 
 
 def _are_decisions(window: _Window, topic: str) -> bool:
     return len({n for m in window.trace.messages(topic) for _, n in _numbers(m.value)}) <= DECISIONS
 
 
-def _decided(window: _Window, given: str, output: str) -> dict[int, float]:
-    """Return what a program published last while each value was held, by the value's number; only where it stood."""
+@dataclass(frozen=True, slots=True)
+class _Decision:
+    """What a program published last while a value was held, and until when since the window began."""
+
+    stop_ns: int
+    given: Mapping[str, Any]
+    answer: float
+
+
+def _decided(window: _Window, given: str, output: str) -> list[_Decision]:
+    """Return what a program made of each value; only where it stood long enough, and the answer stood."""
     messages = window.trace.messages(output)
-    found: dict[int, float] = {}
-    for number, (start_ns, stop_ns) in enumerate(_held(window, given)):
+    found: list[_Decision] = []
+    for start_ns, stop_ns, value in _held(window, given):
         if stop_ns - start_ns < HELD_NS:
             continue
         late_ns = start_ns + (stop_ns - start_ns) // 2
         settled = {n for m in messages if late_ns <= m.t_ns < stop_ns for _, n in _numbers(m.value)[:1]}
         before = [n for m in messages if start_ns <= m.t_ns < late_ns for _, n in _numbers(m.value)[:1]]
-        if len(settled) == 1:
-            found[number] = settled.pop()
-        elif not settled and before:
-            found[number] = before[-1]
+        if len(settled) == 1 or (not settled and before):
+            answer = settled.pop() if settled else before[-1]
+            found.append(_Decision(stop_ns - window.start_ns, value, answer))
     return found
 
 
-def _held(window: _Window, topic: str) -> list[tuple[int, int]]:
+def _held(window: _Window, topic: str) -> list[tuple[int, int, Mapping[str, Any]]]:
     """Return when each value of a stimulus began and ended, inside the window."""
-    spans: list[tuple[int, int]] = []
-    last: Mapping[str, Any] | None = None
+    spans: list[tuple[int, int, Mapping[str, Any]]] = []
     for delivery in window.trace.deliveries(topic):
         if not window.holds(delivery.t_ns):
             continue
-        if delivery.value != last:
-            spans.append((delivery.t_ns, delivery.t_ns))
-            last = delivery.value
-        spans[-1] = (spans[-1][0], delivery.t_ns)
-    return [(start, stop - BEFORE_NEXT_NS) for start, stop in spans]
+        if not spans or delivery.value != spans[-1][2]:
+            spans.append((delivery.t_ns, delivery.t_ns, delivery.value))
+        spans[-1] = (spans[-1][0], delivery.t_ns, delivery.value)
+    return [(start, stop - BEFORE_NEXT_NS, value) for start, stop, value in spans]
 
 
 # --- services, logs, endpoints, ends ---

@@ -109,6 +109,25 @@ def test_answers_to_the_same_input_are_compared():
     assert (found[0].virtual, found[0].wall) in {(0.0, 100.0), (100.0, 0.0)}
 
 
+def test_a_value_in_another_type_is_no_other_input():
+    """Until a program's own type is known, the first value goes out as the rubric's: it shifts no answer."""
+    right = lambda t: 100.0 if t > 25 else 0.0  # noqa: E731
+    one = _controlled(virtual(9.0), right, late_s=0.0)
+    other = _controlled(wall(7.0).delivery(0.3, "/temperature", FLOAT, {"data": 20.3}), right, late_s=0.03)
+    assert aspects(one, other) == []
+
+
+def test_what_comes_by_chance_has_no_rate():
+    """A program that publishes where a random number crosses a limit does so more or less often."""
+    one, other = virtual(), wall()
+    for builder, times in ((one, (0.1, 0.2, 0.9, 1.0, 1.4, 2.0, 2.1, 3.3, 4.0, 4.2, 5.0)), (other, range(6))):
+        for t_s in times:
+            builder.message(float(t_s) + 0.05, "/fan", FLOAT, {"data": 100.0})
+    one.message(1.2, "/fan", FLOAT, {"data": 0.0})
+    other.message(1.2, "/fan", FLOAT, {"data": 0.0}).message(5.5, "/fan", FLOAT, {"data": 0.0})
+    assert aspects(one, other) == []
+
+
 def test_the_first_message_begins_the_window():
     """A slow start moves the window; it changes no count."""
     one = publishing(virtual(18.0), 0.5, start_s=8.0)
