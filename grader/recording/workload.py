@@ -18,8 +18,9 @@ from grader.recording.usage import innermost, starved_ns, thread_starved_ns
 UNEXPLAINED_NS = 2 * NS_PER_MS
 #: How long a step may wait for messages that are on their way to it; more counts as the process's own waiting.
 ARRIVAL_NS = 20 * NS_PER_MS
-#: A wake-up is late when the work before it would have held it up by more than this, or took longer than that itself.
-LATE_NS, SLOW_NS = 10 * NS_PER_MS, 50 * NS_PER_MS
+#: A wake-up is late when the work before it would have held it up by more than this, or took longer than that itself:
+#: making a node takes up to 100 ms, and checks wait 250 ms for an answer.
+LATE_NS, SLOW_NS = 40 * NS_PER_MS, 200 * NS_PER_MS
 #: Virtual time hides too much when more than this share of the wake-ups are late, and more than so many.
 LATE_SHARE, LATE_AT_LEAST = 0.05, 3
 #: Beyond this delay there is no need to go on in virtual time.

@@ -481,9 +481,8 @@ def test_any_archive_is_staged_exactly_or_refused(tmp_path_factory, members, as_
     except SubmissionError:
         assert not list((tmp_path / "place/staging/into").iterdir())
         return
-    counted = {
-        n: c for n, c, kind in members if kind == "file" and not any(p.startswith(".") for p in n.split("/")[:-1])
-    }
+    files = {"/".join(p for p in n.split("/") if p != "."): c for n, c, kind in members if kind == "file"}
+    counted = {n: c for n, c in files.items() if not any(p.startswith(".") for p in n.split("/")[:-1])}
     counted = {n: c for n, c in counted.items() if not n.split("/")[-1].startswith("._") and not n.endswith("/")}
     names = {n.replace("\\", "/") if as_zip else n: c for n, c in counted.items()}
     assert staged(submission.root) == {n: c for n, c in names.items() if n != ".DS_Store"}

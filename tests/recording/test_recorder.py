@@ -94,7 +94,7 @@ class Stage:
         self._folder = folder
         (folder / "behaviours.json").write_text(json.dumps(behaviours), encoding="utf-8")
 
-    def worker_command(self, argv, environment, pass_fds):
+    def worker_command(self, argv, environment, pass_fds, view=None):
         command = (sys.executable, "-I", "-S", "-c", WORKER, str(self._folder), argv[-1])
         return Command(command, dict(environment), tuple(pass_fds))
 

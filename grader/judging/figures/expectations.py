@@ -46,7 +46,7 @@ def _subscribes(check: Subscribes) -> str:
 
 
 def _rate(check: TopicRate) -> str:
-    over = "over all that is observed" if check.window is None else f"over {span(check.window)}"
+    over = "over the whole observation" if check.window is None else f"over {span(check.window)}"
     said = f"{check.topic} at {number(check.rate)} ± {number(check.tolerance)} Hz on average {over}"
     if check.partly_tolerance is not None:
         said += f"; half the points at {number(check.rate)} ± {number(check.partly_tolerance)} Hz"
