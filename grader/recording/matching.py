@@ -15,6 +15,8 @@ from grader.recording.patience import Patience
 from grader.recording.student import Student
 from grader.recording.tape import NAME_CHARACTERS, Tape
 
+#: How long, in real time, something that has gone is waited for to leave the graph.
+DEPARTURE_S = 2.0
 #: Looking at the graph costs much: not so often that it holds up what is looked for.
 GRAPH_PAUSE_S = 0.003
 #: A process that names more than this as unmatched does not talk like the host.
@@ -56,6 +58,7 @@ class Matching:
         self._desk = desk
         self._bury = bury
         self.patience = Patience()
+        self._departures = Patience(DEPARTURE_S)
         self._served: set[tuple[str, str]] = set()
         self._known: set[Key] = set()
         self._strangers: Counter[Key] = Counter()
@@ -66,8 +69,10 @@ class Matching:
     def match(self, now_ns: int) -> None:
         """Wait until the graph holds what the processes have and nothing that has gone, and all of it is matched."""
         claims = self._claims()
-        if not self.patience.wait(lambda: self._agrees(now_ns, claims), pause_s=GRAPH_PAUSE_S):
-            self._accept(now_ns, claims)
+        if not self.patience.wait(lambda: self._holds(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._tape.note("an endpoint that a node created was not seen in the graph")
+        if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._strangers = self._strangers + self._surplus(now_ns, claims)
         self.look(now_ns)
         unknown = self._observer.watch(self._tape.graph)
         self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
@@ -121,17 +126,20 @@ class Matching:
             if not student.ended and (student.claims or student.told):
                 self._tell_matches(student, claims)
 
-    def _agrees(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
-        """Return whether the graph holds what the processes claim, and no more of it but for known strangers."""
-        wanted = Counter(_key(c) for c in claims if c["kind"] != "parameter")
+    def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
+        """Return whether the graph holds what the processes claim."""
+        wanted = _wanted(claims)
         self._known |= wanted.keys()
         graph = self._graph_at(now_ns)
         found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        return exchanging <= offered and all(
-            wanted[key] <= found[key] <= wanted[key] + self._strangers[key] for key in self._known
-        )
+        return exchanging <= offered and all(found[key] >= count for key, count in wanted.items())
+
+    def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:
+        """Count what the graph still holds of what has gone, but for what is known to stay."""
+        wanted, found = _wanted(claims), self._found(self._graph_at(now_ns))
+        return +Counter({key: found[key] - wanted[key] - self._strangers[key] for key in self._known})
 
     def _found(self, graph: GraphSnapshot) -> Counter[Key]:
         """Count in the graph whatever a process has ever claimed."""
@@ -141,14 +149,6 @@ class Matching:
             if kind in ("service", "client"):
                 found[kind, name, ""] = self._observer.ends_of(kind, name) - self._desk.ends_of(kind, name)
         return found
-
-    def _accept(self, now_ns: int, claims: list[dict[str, Any]]) -> None:
-        """Take the graph as it is where waiting did not help: what is missing is noted, what is left over is known."""
-        wanted = Counter(_key(c) for c in claims if c["kind"] != "parameter")
-        found = self._found(self._graph_at(now_ns))
-        if any(found[key] < count for key, count in wanted.items()):
-            self._tape.note("an endpoint that a node created was not seen in the graph")
-        self._strangers = Counter({key: found[key] - wanted[key] for key in self._known if found[key] > wanted[key]})
 
     def _graph_at(self, now_ns: int) -> GraphSnapshot:
         """Return the live graph, with services where a process has said that it has any."""
@@ -226,6 +226,10 @@ class Matching:
     def look(self, now_ns: int) -> None:
         """Take down the graph where it has changed."""
         self._tape.look(self._graph_at(now_ns), self._observer.participants())
+
+
+def _wanted(claims: list[dict[str, Any]]) -> Counter[Key]:
+    return Counter(_key(c) for c in claims if c["kind"] != "parameter")
 
 
 def _key(claim: dict[str, Any]) -> Key:

@@ -17,15 +17,20 @@ LOSSES, BRIEF_S = 3, 0.05
 
 
 class Patience:
-    """The patience of one recording, whatever is waited for."""
+    """The patience of one recording.
 
-    def __init__(self) -> None:
+    Args:
+        full_s: How long a wait may take at first.
+    """
+
+    def __init__(self, full_s: float = SETTLE_S) -> None:
+        self._full_s = full_s
         self._losses = 0
 
     @property
     def wait_s(self) -> float:
         """How long the next wait may take."""
-        return SETTLE_S if self._losses < LOSSES else BRIEF_S
+        return self._full_s if self._losses < LOSSES else BRIEF_S
 
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
         """Wait until a condition holds; return whether it came to."""
