@@ -55,5 +55,5 @@ def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(tmp_
     assert (before["score"], before["max_score"]) == (25, 25)
     assert "angular_velocity" not in json.dumps(before)
     jsonschema.validate(before, report_schema())
-    assert before["exercises"][0]["notes"][0].startswith("graded by the variant of ada: rate")
+    assert any(note.startswith("graded by the variant of ada: rate") for note in before["exercises"][0]["notes"])
     assert after == report

@@ -161,7 +161,7 @@ def test_bytes_that_are_no_message_have_no_content(run):
 def test_garbage_on_the_ports_disturbs_nobody(run):
     """Random bytes, some with the beginning of RTPS, as fast as a process can send them."""
     harm = """
-        import subprocess
+        import ctypes
         code = '''
 import os, socket
 sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -172,7 +172,13 @@ while True:
             try: sender.sendto(head + os.urandom(60), ("127.0.0.1", port))
             except OSError: pass
 '''
-        self.flood = subprocess.Popen([sys.executable, "-I", "-S", "-c", code], env=dict(os.environ))
+        words = [sys.executable, "-I", "-S", "-c", code]
+        arguments = (ctypes.c_char_p * 6)(*[word.encode() for word in words], None)
+        variables = [f"{name}={value}".encode() for name, value in os.environ.items()]
+        environment = (ctypes.c_char_p * (len(variables) + 1))(*variables, None)
+        pid = ctypes.c_int()
+        ctypes.CDLL(None).posix_spawn(ctypes.byref(pid), words[0].encode(), None, None, arguments, environment)
+        assert pid.value
     """
     assert len(run(hostile(harm=harm)).messages("/cmd_vel")) == 199
 
@@ -206,14 +212,14 @@ def test_the_graders_node_offers_nothing_to_call(run):
                 if name != "velocity_publisher":
                     print(name[:9], self.get_service_names_and_types_by_node(name, space), flush=True)
     """
-    assert [line.text for line in run(hostile(later=later)).lines()] == ["_observer []"]
+    assert [line.text for line in run(hostile(later=later)).lines()] == ["_ros2cli_ []"]
 
 
 def test_the_graders_name_gives_no_power(run):
     """A node of the same name hides from the graph, which helps nobody; its messages count as everybody's."""
     later = """
         if self.count == 20:
-            (name,) = [n for n in self.get_node_names() if n.startswith("_observer")]
+            (name,) = [n for n in self.get_node_names() if n.startswith("_ros2cli")]
             self.twin = Node(name)
             self.second = self.twin.create_publisher(Twist, "/cmd_vel", 10)
         if self.count > 20:
