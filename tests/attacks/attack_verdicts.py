@@ -14,7 +14,8 @@ EARNS: Mapping[str, Mapping[str, frozenset[str]]] = {
     "honest": {"topic": MET, "rate": MET, "speed": MET, "log": MET},
     # It publishes at a quarter of the rate; the attack must not make up for that.
     "slow": {"topic": MET, "rate": NOT_MET, "speed": ANYTHING, "log": MET},
-    "wrong_speed": {"topic": MET, "rate": ANYTHING, "speed": NOT_MET, "log": MET},
+    # A message class that checks its fields may refuse the number, which stops the node.
+    "wrong_speed": {"topic": ANYTHING, "rate": ANYTHING, "speed": NOT_MET, "log": MET},
     # It dies or falls silent half-way: what it earned before is its own, the full rate is not.
     "stops": {"topic": MET, "rate": NOT_MET, "speed": ANYTHING, "log": MET},
     "nothing": {"topic": NOT_MET, "rate": NOT_MET, "speed": NOT_MET, "log": ANYTHING},

@@ -85,7 +85,12 @@ def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: Cl
 def _judged(texts: Sequence[Text], track: Track, *, decimal_comma: bool) -> Analysis:
     groups = tuple(matched(g, track) for g in grouped(texts, decimal_comma=decimal_comma))
     chosen = [g for g in groups if g.right and g.share >= _POSITION_SHARE]
-    if chosen and track.moves and len(groups) > _FEW_WORDINGS and sum(_luck(g, track) for g in groups) > _LUCK * len(chosen):
+    if (
+        chosen
+        and track.moves
+        and len(groups) > _FEW_WORDINGS
+        and sum(_luck(g, track) for g in groups) > _LUCK * len(chosen)
+    ):
         return Analysis(groups, needed=_needed(track), by_chance=True)
     entries = sorted((e for g in chosen for e in g.entries), key=lambda e: e.t_ns)
     settled_ns = track.times_ns[0] + STALE_NS

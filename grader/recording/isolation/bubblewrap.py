@@ -117,6 +117,10 @@ class Bubblewrap:
             options += ["--symlink", target, str(where)]
         for folder in view.hidden:
             options += ["--perms", "0755", "--tmpfs", str(folder)]
+        for folder in parents_of(own.bound):
+            # Where bubblewrap makes a parent by itself, another user's student cannot pass through it.
+            if not any(folder.is_relative_to(path) for path in read.bound):
+                options += ["--perms", "0755", "--dir", str(folder)]
         for path in own.bound:
             options += ["--ro-bind", str(path), str(path)]
         for folder in view.hidden:
