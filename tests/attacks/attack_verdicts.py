@@ -19,13 +19,15 @@ EARNS: Mapping[str, Mapping[str, frozenset[str]]] = {
     # It dies or falls silent half-way: what it earned before is its own, the full rate is not.
     "stops": {"topic": MET, "rate": NOT_MET, "speed": ANYTHING, "log": MET},
     "nothing": {"topic": NOT_MET, "rate": NOT_MET, "speed": NOT_MET, "log": ANYTHING},
+    # As slow, but its attack may hold up its own recording until its time is over.
+    "slow_or_stopped": {"topic": ANYTHING, "rate": NOT_MET, "speed": ANYTHING, "log": ANYTHING},
     # Being stopped at a limit is right, and so is going on within it.
     "whatever": {"topic": ANYTHING, "rate": ANYTHING, "speed": ANYTHING, "log": ANYTHING},
     "guesses": {"on": NOT_MET, "off": NOT_MET, "log": MET},
     "never_on": {"on": NOT_MET, "off": ANYTHING, "log": MET},
 }
 #: Kinds of node that say nothing about attempts: they are gone, or are stopped before they can.
-SILENT = ("nothing", "whatever")
+SILENT = ("nothing", "whatever", "slow_or_stopped")
 _SAID = re.compile(r"([0-9]+) attempts, escaped: (.*)")
 
 
