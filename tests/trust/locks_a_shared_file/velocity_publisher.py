@@ -1,6 +1,7 @@
 """Tries to lock a file of a library that the submissions of a class share, as a channel between them."""
 
 import fcntl
+import os
 import json
 import sys
 
@@ -15,7 +16,7 @@ class VelocityPublisher(Node):
         self.publisher = self.create_publisher(Twist, "/cmd_vel", 10)
         self.create_timer(0.05, self.tick)
         self.held, made = [], 0
-        for path in (fcntl.__file__, json.__file__, rclpy.__file__, sys.executable):
+        for path in (os.__file__, json.__file__, rclpy.__file__, sys.executable):
             try:
                 first, second = open(path, "rb"), open(path, "rb")
                 self.held += [first, second]
