@@ -23,6 +23,9 @@ EVENTS = (
 FOLDERS = ("/proc", "/sys", "/dev/fd", "/dev/shm")  # noqa: S108 - looked for in what is opened
 #: Events of looking into folders and files.
 LOOKS = ("open", "os.listdir", "os.scandir")
+#: Modules of the standard library that make code of their own for whoever defines a class, and the events of that.
+MAKERS = ("collections/__init__.py", "dataclasses.py", "enum.py", "typing.py")
+MAKING = ("compile", "exec", "sys._", "object.__", "function.__new__", "code.__new__")
 #: The student's code is looked for so many callers above the event, as long as these are of the standard library.
 CALLERS = 12
 #: So many different things are told of one process.
@@ -42,6 +45,7 @@ class Watch:
         self._root = os.path.join(root, "")
         self._library = os.path.dirname(os.__file__)
         self._packages = os.path.join(self._library, "site-packages")
+        self._makers = frozenset(os.path.join(self._library, maker) for maker in MAKERS)
         self._told: set[str] = set()
         self._inside = False
 
@@ -54,7 +58,7 @@ class Watch:
             return
         self._inside = True
         try:
-            if len(self._told) < MOST and self._by_student(sys._getframe(1)) and self._link.is_free():
+            if len(self._told) < MOST and self._by_student(sys._getframe(1), event) and self._link.is_free():
                 self._told.add(event)
                 self._link.send({"kind": "reached", "what": event})
         except Exception:  # noqa: S110 - whatever is wrong with the arguments must not change what the program does
@@ -68,7 +72,7 @@ class Watch:
             return type(place) is str and place.startswith(FOLDERS)
         return event.startswith(EVENTS)
 
-    def _by_student(self, frame: FrameType | None) -> bool:
+    def _by_student(self, frame: FrameType | None, event: str) -> bool:
         for _ in range(CALLERS):
             if frame is None:
                 return False
@@ -79,5 +83,7 @@ class Watch:
                 return False
             if file.startswith("<frozen importlib"):
                 return False  # what a module does while it is imported
+            if file in self._makers and event.startswith(MAKING):
+                return False
             frame = frame.f_back
         return False
