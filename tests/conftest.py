@@ -10,3 +10,16 @@ settings.load_profile("unhurried")
 # What a shell runs in the background ignores interrupts, and so would every program that is interrupted here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_addoption(parser):
+    """Add the option of the nightly run."""
+    parser.addoption("--everything", action="store_true", help="run the tests that are left to the nightly run as well")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out what is marked for the nightly run, unless everything is asked for."""
+    left_out = [] if config.getoption("--everything") else [i for i in items if i.get_closest_marker("nightly")]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("nightly")]

@@ -1,3 +1,5 @@
+"""A right publisher that defines classes in every way the standard library has."""
+
 import dataclasses
 import enum
 from collections import namedtuple
@@ -6,8 +8,8 @@ from typing import NamedTuple
 import rclpy
 from geometry_msgs.msg import Twist
 
-Speeds = namedtuple('Speeds', 'linear angular')
-Mode = enum.Enum('Mode', 'STOP GO')
+Speeds = namedtuple("Speeds", "linear angular")
+Mode = enum.Enum("Mode", "STOP GO")
 
 
 class Bounds(NamedTuple):
@@ -18,7 +20,7 @@ class Bounds(NamedTuple):
 @dataclasses.dataclass(frozen=True, order=True)
 class Command:
     speeds: Speeds
-    bounds: Bounds = Bounds(-1.0, 1.0)
+    bounds: Bounds
 
     def message(self):
         msg = Twist()
@@ -28,13 +30,13 @@ class Command:
 
 def main():
     rclpy.init()
-    node = rclpy.create_node('velocity_publisher')
-    publisher = node.create_publisher(Twist, '/cmd_vel', 10)
-    command = Command(Speeds(0.5, 0.1))
+    node = rclpy.create_node("velocity_publisher")
+    publisher = node.create_publisher(Twist, "/cmd_vel", 10)
+    command = Command(Speeds(0.5, 0.1), Bounds(-1.0, 1.0))
     node.create_timer(0.05, lambda: publisher.publish(command.message()))
-    node.get_logger().info(f'{Mode.GO.name}: {command}')
+    node.get_logger().info(f"{Mode.GO.name}: {command}")
     rclpy.spin(node)
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

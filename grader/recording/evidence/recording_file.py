@@ -117,7 +117,7 @@ def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
     Raises:
         EvidenceError: This is no recording with a trace in it.
     """
-    data = _unpressed_trace(recording)
+    data = packed_trace(recording)
     if not wire:
         return unpack(data)
     with _reading():
@@ -126,7 +126,8 @@ def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
     return unpack_exactly(data, cdrs[1:])
 
 
-def _unpressed_trace(recording: bytes) -> bytes:
+def packed_trace(recording: bytes) -> bytes:
+    """Return the trace that a recording holds as `pack` made it; raises EvidenceError if there is none."""
     with _reading():
         attachments = make_reader(io.BytesIO(recording)).iter_attachments()
         packed = next((a.data for a in attachments if a.name == TRACE), None)

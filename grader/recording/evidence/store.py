@@ -131,6 +131,17 @@ def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = 
         for recording in exercise.recordings
         if recording.digest is not None
     }
+    return run_from(manifest, exercises, traces)
+
+
+def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Mapping[tuple[str, str], Trace]) -> Run:
+    """Return the run that a manifest tells of.
+
+    Args:
+        manifest: What was handed in, and with what it was recorded.
+        exercises: What is asked now.
+        traces: What was recorded, by exercise and scenario.
+    """
     return Run(
         submission=_submission(manifest),
         traces=traces,

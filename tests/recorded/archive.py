@@ -1,0 +1,139 @@
+"""The recordings of all test submissions in one archive: what judging needs of each, and the report that it gave."""
+
+from __future__ import annotations
+
+import io
+import tarfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from grader.judging.whole import judge_run
+from grader.keeping import request_of
+from grader.model.exercise import Exercise
+from grader.model.report import Report
+from grader.reading.builtin_rubrics import builtin_rubrics
+from grader.reading.rubric_file import read_rubric
+from grader.recording.evidence import manifest as kept
+from grader.recording.evidence.packed import unpack
+from grader.recording.evidence.recording_file import packed_trace
+from grader.recording.evidence.store import run_from
+from grader.reproducing import command_words
+
+ARCHIVE = Path(__file__).with_name("recorded.tar.xz")
+SUBMISSIONS = Path(__file__).resolve().parents[1] / "submissions"
+#: The seed of all recordings and golden texts.
+SEED = 1
+MANIFEST, REPORT, TRACE_ENDING = "evidence.json", "report.json", ".trace.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was recorded of one submission.
+
+    Attributes:
+        manifest: The manifest of its evidence, as JSON.
+        report: The report, as JSON.
+        traces: Packed traces by `EXERCISE.SCENARIO`.
+    """
+
+    manifest: bytes
+    report: bytes
+    traces: Mapping[str, bytes]
+
+
+@lru_cache(maxsize=1)
+def read_archive(path: Path = ARCHIVE) -> dict[str, Recorded]:
+    """Return what was recorded, by folder."""
+    files: dict[str, dict[str, bytes]] = {}
+    with tarfile.open(path, "r:xz") as archive:
+        for member in archive:
+            folder, _, name = member.name.rpartition("/")
+            stream = archive.extractfile(member)
+            assert stream is not None
+            files.setdefault(folder, {})[name] = stream.read()
+    return {folder: _recorded(found) for folder, found in files.items()}
+
+
+def _recorded(files: dict[str, bytes]) -> Recorded:
+    traces = {n.removesuffix(TRACE_ENDING): data for n, data in files.items() if n.endswith(TRACE_ENDING)}
+    return Recorded(files[MANIFEST], files[REPORT], traces)
+
+
+def recorded_in(folder: Path) -> Recorded:
+    """Return what evidence in a folder holds of a recording."""
+    files = {MANIFEST: (folder / MANIFEST).read_bytes(), REPORT: (folder / REPORT).read_bytes()}
+    for recording in folder.glob("*/*.mcap"):
+        files[f"{recording.parent.name}{TRACE_ENDING}"] = packed_trace(recording.read_bytes())
+    return _recorded(files)
+
+
+def write_archive(recorded: Mapping[str, Recorded], path: Path = ARCHIVE) -> None:
+    """Write what was recorded; the same recordings give the same bytes, and like ones are packed side by side."""
+    with tarfile.open(path, "w:xz", preset=9, format=tarfile.PAX_FORMAT) as archive:
+        members = [
+            (name.partition(".")[::-1], folder, f"{name}{TRACE_ENDING}", data)
+            for folder, one in recorded.items()
+            for name, data in one.traces.items()
+        ]
+        for folder, one in recorded.items():
+            members += [(("", ""), folder, MANIFEST, one.manifest), (("", ""), folder, REPORT, one.report)]
+        for _, folder, name, data in sorted(members):
+            member = tarfile.TarInfo(f"{folder}/{name}")
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+
+
+@lru_cache(maxsize=1)
+def builtin_exercises() -> dict[str, Exercise]:
+    """Return the exercises of the built-in rubrics by id."""
+    return {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}
+
+
+def outdated(recorded: Recorded) -> list[str]:
+    """Return the scenarios that the rubrics describe otherwise than when they were recorded."""
+    exercises = builtin_exercises()
+    return [
+        f"{exercise.id}.{recording.scenario}"
+        for exercise in kept.parse(recorded.manifest).exercises
+        for recording in exercise.recordings
+        if recording.asked
+        not in [kept.scenario_digest(s) for s in exercises[exercise.id].scenarios if s.id == recording.scenario]
+    ]
+
+
+def judged(recorded: Recorded) -> Report:
+    """Judge a recording as `grade rejudge` does, by the built-in rubrics."""
+    manifest = kept.parse(recorded.manifest)
+    exercises = [builtin_exercises()[exercise.id] for exercise in manifest.exercises]
+    traces = {
+        (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
+        for exercise in manifest.exercises
+        for recording in exercise.recordings
+        if recording.digest is not None
+    }
+    run = run_from(manifest, exercises, traces)
+    request = request_of(manifest.run.request, submission=manifest.run.path, seed=manifest.run.seed, rubrics=())
+    again = replace(run.reproduce, command=command_words(request, manifest.run.seed))
+    return judge_run(exercises, replace(run, reproduce=again))
+
+
+def outcomes(report: Report) -> dict[str, str]:
+    """Return the outcome of every criterion that is not met."""
+    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
+    return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}
+
+
+def told(report: Report) -> dict[str, dict[str, str]]:
+    """Return reason, hint and place of every criterion that lost points by a fault of its own."""
+    return {
+        verdict.id: {
+            "reason": verdict.reason,
+            "hint": verdict.hint,
+            "at": f"{verdict.location.file}:{verdict.location.line}" if verdict.location else "",
+        }
+        for exercise in report.exercises
+        for verdict in exercise.verdicts
+        if verdict.outcome.value in ("not_met", "partly")
+    }
