@@ -1,6 +1,6 @@
 """Grades short-lived and re-connecting programs again and again, and compares the reports byte by byte.
 
-Usage: python benchmarks/short_lived.py [RUNS] [--load] [NAME...]
+Usage: python benchmarks/short_lived.py [--load] [--jobs N] [RUNS [NAME...]]
 
 RUNS (20) of each program; with --load two busy loops per core run during the second half. A rubric beside the files of
 a program is used, and otherwise the exercise that the files belong to.
@@ -8,22 +8,20 @@ a program is used, and otherwise the exercise that the files belong to.
 
 from __future__ import annotations
 
+import argparse
 import collections
 import hashlib
 import json
 import multiprocessing
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+from agreement import busy
 
 HERE = Path(__file__).resolve().parent
 GRADE = str(Path(sys.executable).with_name("grade"))
-
-
-def burn() -> None:
-    """Use a processor for ever."""
-    while True:
-        pass
 
 
 def outcome(folder: Path) -> str:
@@ -41,21 +39,21 @@ def outcome(folder: Path) -> str:
 
 def main() -> None:
     """Print one row for each program: how often each report came."""
-    numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
-    names = [word for word in sys.argv[1:] if not word.isdecimal() and word != "--load"]
-    runs = numbers[0] if numbers else 20
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="?", type=int, default=20, metavar="RUNS")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--load", action="store_true")
+    parser.add_argument("--jobs", type=int, default=1)
+    arguments = parser.parse_args()
+    runs, names = arguments.runs, arguments.names
     folders = sorted(f for f in (HERE / "short_lived").iterdir() if f.is_dir() and (not names or f.name in names))
     seen: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    loops = [multiprocessing.Process(target=burn, daemon=True) for _ in range(2 * multiprocessing.cpu_count())]
-    for run in range(runs):
-        if "--load" in sys.argv and run == runs // 2:
-            for loop in loops:
-                loop.start()
-        for folder in folders:
-            seen[folder.name][outcome(folder)] += 1
-    for loop in loops:
-        if loop.is_alive():
-            loop.kill()
+    quiet = runs - runs // 2 if arguments.load else runs
+    for count, load in ((quiet, False), (runs - quiet, True)):
+        with busy(2 * multiprocessing.cpu_count() if load else 0), ThreadPoolExecutor(arguments.jobs) as pool:
+            several = folders * count
+            for folder, found in zip(several, pool.map(outcome, several), strict=True):
+                seen[folder.name][found] += 1
     for name, found in seen.items():
         print(f"{name:28} {'identical' if len(found) == 1 else 'DIFFERENT'} {dict(found)}", flush=True)
 
