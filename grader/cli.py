@@ -167,10 +167,11 @@ def _grade(  # noqa: PLR0913  one parameter an option
     for_whom = readers(audience, as_of)
     from grader import keeping, session  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
     from grader.reports.audience import told  # noqa: PLC0415  as above
+    from grader.request import Request  # noqa: PLC0415  as above
     from grader.seeding import PRACTICE  # noqa: PLC0415  as above
 
     key = drawn_with(seed, seed_key)
-    request = session.Request(
+    request = Request(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
         every=every,

@@ -34,7 +34,8 @@ from grader.reading.manuals import Manual, manual_of
 from grader.reading.rubric_file import own_checks
 from grader.reading.units import format_quantity
 from grader.reading.variants import First
-from grader.session import Request, read_exercises
+from grader.request import Request
+from grader.session import read_exercises
 
 #: Names offered where none is known.
 OFFERED = 3

@@ -13,7 +13,7 @@ from grader.model.variant import Drawn
 from grader.reading.variants import Recorded
 from grader.recording.evidence.store import check_place, keep
 from grader.reports.json_report import dumps
-from grader.session import Request
+from grader.request import Request
 
 
 class Keeper:

@@ -29,7 +29,8 @@ from grader.reports.json_report import dumps, report_to_json
 from grader.reports.readers import ANYBODY, Readers
 from grader.reports.rejudged import Result
 from grader.reproducing import command_words
-from grader.session import Request, read_exercises
+from grader.request import Request
+from grader.session import read_exercises
 
 #: File name endings of reports, one file a submission.
 ENDINGS = {"json": ".json", "html": ".html", "markdown": ".md", "junit": ".xml", "text": ".txt", "github": ".txt"}

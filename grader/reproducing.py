@@ -5,15 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from grader.model.exercise import Exercise
 from grader.model.limits import TIME_BUDGET_S
 from grader.model.report import Reproduction
 from grader.recording.bag import Odometry
-
-if TYPE_CHECKING:
-    from grader.session import Request
+from grader.request import Request
 
 
 def reproduction(request: Request, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int) -> Reproduction:

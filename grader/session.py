@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -15,73 +15,29 @@ from grader.early import EarlyReports
 from grader.judging.whole import judge_run
 from grader.model.errors import SubmissionError
 from grader.model.exercise import Exercise, exercise_name
-from grader.model.limits import TIME_BUDGET_S
 from grader.model.report import Environment, Report
 from grader.model.run import Run
 from grader.model.scenario import OdometryStream
 from grader.model.submission import Submission
 from grader.model.trace import Trace
 from grader.reading.builtin_rubrics import builtin_headers, require_exercises
-from grader.reading.collected import Collected
 from grader.reading.quoting import listed, shown
 from grader.reading.rubric_file import read_rubric
 from grader.reading.shipped import builtin_odometry
 from grader.reading.sources import read_reaches, read_sources
 from grader.reading.submission import stage_collected, stage_submission
-from grader.reading.variants import Draw
 from grader.recording.bag import Odometry, read_odometry
 from grader.recording.budget import RealTimeBudget
 from grader.recording.plan import plan_scenario
 from grader.recording.recorder import Job
 from grader.recording.studio import AUTO, NO_ISOLATION, Studio, open_studio, planned_clock
 from grader.reproducing import reproduction
-from grader.seeding import PRACTICE, PRACTICE_NOTE, SeedKey
+from grader.request import Request
+from grader.seeding import PRACTICE_NOTE
 from grader.spot_checks import SpotChecks, check
 
 #: ROS releases that the test suite passes on.
 TRIED_ON = ("jazzy", "kilted")
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What is to be graded, and how.
-
-    Attributes:
-        submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all of the rubrics, of the built-in ones for those that are not
-            only graded by request.
-        every: Whether to grade every exercise of which the submission has a file, and no other.
-        rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of every drawn value; None derives it from the submission and the seed key.
-        seed_key: The key for that.
-        odom_bag: An /odom recording to play instead of the project's own.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto`, `none` or the name of a tier.
-        time_budget_s: Real time that all recordings may take together.
-        workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
-        collected: What was read of the submission before, perhaps elsewhere; None to read it now.
-        student: Id of the student whose variants are graded; empty where nothing varies.
-        variant_key: File with the course key, as the user typed it; None if nobody did.
-        spot_checks: Share of submissions, from 0 to 1, that are drawn to be recorded on the wall clock as well.
-        draw: What variants come to; None if nobody says, and then a rubric that has some is refused.
-    """
-
-    submission: str
-    exercises: tuple[str, ...] = ()
-    every: bool = False
-    rubrics: tuple[Path, ...] = ()
-    seed: int | None = None
-    seed_key: SeedKey = PRACTICE
-    odom_bag: Path | None = None
-    clock: str = "auto"
-    isolation: str = "auto"
-    time_budget_s: float = TIME_BUDGET_S
-    workers: int | None = None
-    spot_checks: float = 0.0
-    collected: Collected | None = None
-    student: str = ""
-    variant_key: Path | None = None
-    draw: Draw | None = None
 
 
 class Progress(Protocol):

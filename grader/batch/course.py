@@ -39,8 +39,9 @@ from grader.model.exercise import Exercise
 from grader.reading.variants import First
 from grader.recording.leftovers import scratch_folder
 from grader.reproducing import recording_digest
+from grader.request import Request
 from grader.seeding import kept_key
-from grader.session import Request, read_exercises, read_recording
+from grader.session import read_exercises, read_recording
 
 
 def grade_class(

@@ -8,8 +8,8 @@ from pathlib import Path
 from grader.batch.choosing import CHANGED
 from grader.batch.layouts import AUTO
 from grader.batch.outputs import Platforms
+from grader.request import Request
 from grader.seeding import SeedKey
-from grader.session import Request
 from grader.similarity.contents import Program
 
 _GRADING = Request("")

@@ -30,7 +30,8 @@ from grader.reports.destination import write_whole
 from grader.reports.gradescope import render_gradescope
 from grader.reports.html.render import render_html
 from grader.reports.json_report import dumps
-from grader.session import Progress, Request, grade
+from grader.request import Request
+from grader.session import Progress, grade
 
 REPORT, PAGE, EVIDENCE = "report.json", "report.html", "evidence"
 #: What students may be given: what the rubric lets them see on the day of grading.

@@ -125,7 +125,7 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.batch.request import Course  # noqa: PLC0415  as above
     from grader.batch.watching import shown_watcher  # noqa: PLC0415  as above
     from grader.reading.shipped import shipped_templates  # noqa: PLC0415  as above
-    from grader.session import Request  # noqa: PLC0415  as above
+    from grader.request import Request  # noqa: PLC0415  as above
     from grader.similarity.reading import read_given  # noqa: PLC0415  as above
 
     if canvas_gradebook is not None and canvas is None:

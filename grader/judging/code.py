@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from grader.judging.diagnosis.source import Function, Source, chain, last_name, subtree
+from grader.judging.source import Function, Source, chain, last_name, subtree
 
 #: Calls that take a function to be called back.
 _TAKE_CALLBACKS = frozenset(

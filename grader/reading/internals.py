@@ -9,7 +9,7 @@ import ast
 from collections.abc import Iterator, Sequence
 
 from grader.judging.code import Code, code_of
-from grader.judging.diagnosis.source import LONGEST_SOURCE, chain, read
+from grader.judging.source import LONGEST_SOURCE, chain, read
 
 
 def _words(text: str) -> frozenset[str]:

@@ -22,8 +22,8 @@ from typing import Any
 
 from grader.model.checkup import Fact
 from grader.recording.isolation.environment import PACKAGE, worker_environment
-from grader.recording.isolation.protocol import PythonRuntime
 from grader.recording.ros_installation import MESSAGE_PACKAGES
+from grader.recording.runtime import PythonRuntime
 
 #: What a node and the process around it import; what these import in turn comes with them.
 LOADED = ("rclpy", "rclpy.action", "rclpy.executors", "time_machine", *(f"{name}.msg" for name in MESSAGE_PACKAGES))

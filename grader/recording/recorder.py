@@ -30,8 +30,9 @@ from grader.recording.codec import trace_from_json
 from grader.recording.ending import is_unexplained
 from grader.recording.isolation.environment import worker_environment
 from grader.recording.isolation.exposure import worker_view
-from grader.recording.isolation.protocol import Isolation, PythonRuntime, runtime_to_json
+from grader.recording.isolation.protocol import Isolation
 from grader.recording.plan import Plan, plan_to_json
+from grader.recording.runtime import PythonRuntime, runtime_to_json
 from grader.recording.usage import families, usage
 
 #: A worker that has not answered after the real time of a scenario and this many seconds is taken for lost: its guard

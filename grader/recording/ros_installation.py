@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from grader.model.errors import EnvironmentFault
-from grader.recording.isolation.protocol import PythonRuntime
+from grader.recording.runtime import PythonRuntime
 
 MESSAGE_PACKAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
 MIDDLEWARE = "librmw_fastrtps_cpp.so"

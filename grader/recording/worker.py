@@ -31,10 +31,11 @@ from grader.recording.codec import trace_to_json
 from grader.recording.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.recording.guard import Budget, Guard
 from grader.recording.isolation.environment import quick_discovery
-from grader.recording.isolation.protocol import Isolation, PythonRuntime, StudentProcess, runtime_from_json
+from grader.recording.isolation.protocol import Isolation, StudentProcess
 from grader.recording.isolation.tiers import isolation_from_name
 from grader.recording.places import Places
 from grader.recording.plan import Plan, plan_from_json
+from grader.recording.runtime import PythonRuntime, runtime_from_json
 from grader.recording.student import LOG_FORMAT, Student
 from grader.recording.usage import usage
 

@@ -16,8 +16,9 @@ from grader.reading.sources import read_sources
 from grader.recording.bag import Odometry
 from grader.recording.recorder import Job
 from grader.recording.studio import Studio
+from grader.request import Request
 from grader.selftest.results import Standing, standing_of
-from grader.session import Progress, Request, plan_jobs
+from grader.session import Progress, plan_jobs
 
 #: So many programs for each worker are recorded before any is judged: traces are large.
 _AT_ONCE = 6

@@ -19,6 +19,7 @@ from grader.model.submission import Submission
 from grader.reading.sources import read_sources
 from grader.reading.submission import stage_submission
 from grader.recording.studio import Studio, open_studio
+from grader.request import Request
 from grader.seeding import PRACTICE
 from grader.selftest.bench import Bench, Candidate
 from grader.selftest.explained import Explained, Explanation, beside, idle, read_explained
@@ -26,7 +27,7 @@ from grader.selftest.mutating.mutants import mutants_of
 from grader.selftest.mutating.program import Program
 from grader.selftest.mutating.variants import variants_of
 from grader.selftest.results import Fate, Result, Standing, Trial, one_line_change
-from grader.session import Progress, Request, read_exercises, read_recording
+from grader.session import Progress, read_exercises, read_recording
 
 #: A sample holds a variant for so many mutants.
 _MUTANTS_A_VARIANT = 4

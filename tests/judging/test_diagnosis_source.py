@@ -18,8 +18,8 @@ from grader.judging.diagnosis import diagnose as room
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.notes import placed
-from grader.judging.diagnosis.source import LONGEST_SOURCE, chain, last_line, read
 from grader.judging.diagnosis.wiring import goes_to, made
+from grader.judging.source import LONGEST_SOURCE, chain, last_line, read
 from grader.model.submission import StudentFile, Submission
 from grader.model.trace import FaultKind, Trace
 from grader.reading.sources import MAX_SOURCE_BYTES, read_sources

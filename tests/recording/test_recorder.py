@@ -17,9 +17,10 @@ from grader.model.limits import Limits
 from grader.model.trace import ClockKind
 from grader.recording import recorder as module
 from grader.recording.budget import RealTimeBudget
-from grader.recording.isolation.protocol import Command, PythonRuntime
+from grader.recording.isolation.protocol import Command
 from grader.recording.plan import Plan
 from grader.recording.recorder import Job, Recorder
+from grader.recording.runtime import PythonRuntime
 
 RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
 

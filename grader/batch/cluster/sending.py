@@ -28,7 +28,8 @@ from grader.model.errors import HarnessError, RecordingError, RubricError, Submi
 from grader.reading.rubric_file import own_check_files
 from grader.reading.submission import collect_submission
 from grader.reading.variants import First
-from grader.session import Request, read_exercises, wanted_files
+from grader.request import Request
+from grader.session import read_exercises, wanted_files
 
 AGAIN = "run the same command again"
 _PARTS = frozenset(PARTS)

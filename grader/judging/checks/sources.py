@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from grader.judging.code import Code, code_of
-from grader.judging.diagnosis.source import read, subtree
 from grader.judging.findings import met, not_met
 from grader.judging.silence import fault_hint, first_fault
+from grader.judging.source import read, subtree
 from grader.judging.wording import counted, fault_sentence, listed, quote
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding, Location

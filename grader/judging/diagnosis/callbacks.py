@@ -6,8 +6,8 @@ import ast
 import re
 
 from grader.judging.diagnosis.case import Case, Cause, Clue, frames
-from grader.judging.diagnosis.source import Function, Source, argument, chain, covers, first_line, last_name, parameters
 from grader.judging.diagnosis.wiring import made
+from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters
 
 
 def _callback_called(case: Case) -> Clue | None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from grader.judging.diagnosis.source import Source, first_line
+from grader.judging.source import Source, first_line
 from grader.model.exercise import Check, Criterion, Location
 from grader.model.report import Verdict
 from grader.model.trace import Fault, FaultKind, Trace

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.source import Source, last_name, subtree, text_of
 from grader.judging.diagnosis.wiring import made_for, reached, roots, text
+from grader.judging.source import Source, last_name, subtree, text_of
 from grader.judging.wording import number
 
 _MEANS = ("mean", "fmean", "average", "median", "nanmean")

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from grader.judging.diagnosis.source import Source, argument, chain, last_name, parameters, text_of
+from grader.judging.source import Source, argument, chain, last_name, parameters, text_of
 
 _DEEPEST = 12
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {

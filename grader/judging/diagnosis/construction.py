@@ -6,8 +6,8 @@ import ast
 
 from grader.judging.diagnosis.case import Case, Cause, Clue, frames, lines_of
 from grader.judging.diagnosis.names import NODE_PROPERTIES, closest
-from grader.judging.diagnosis.source import Source, chain, covers, first_line, last_name
 from grader.judging.diagnosis.wiring import Made, made
+from grader.judging.source import Source, chain, covers, first_line, last_name
 from grader.model.trace import Fault
 
 

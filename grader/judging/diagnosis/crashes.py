@@ -6,8 +6,8 @@ import ast
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
-from grader.judging.diagnosis.source import Source, chain, last_name, subtree
 from grader.judging.diagnosis.wiring import made, target_of
+from grader.judging.source import Source, chain, last_name, subtree
 
 
 def _wrong_field_type(case: Case) -> Clue | None:

@@ -27,10 +27,10 @@ from grader.judging.diagnosis.rates import RATES
 from grader.judging.diagnosis.sensor import SENSOR
 from grader.judging.diagnosis.services import SERVICES
 from grader.judging.diagnosis.silence import SILENCE
-from grader.judging.diagnosis.source import Source, read
 from grader.judging.diagnosis.syntax import SYNTAX
 from grader.judging.diagnosis.waiting import WAITING
 from grader.judging.findings import FAULT_KEY
+from grader.judging.source import Source, read
 from grader.model.exercise import Check, Criterion, Exercise, Outcome
 from grader.model.report import Verdict
 from grader.model.submission import Submission

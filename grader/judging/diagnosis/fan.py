@@ -12,8 +12,8 @@ from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.diagnosis.silence import silent_topic, timer_code
-from grader.judging.diagnosis.source import Source, chain, last_name, subtree
 from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for, publish_calls, reached, roots
+from grader.judging.source import Source, chain, last_name, subtree
 from grader.judging.values import published, published_numbers
 from grader.judging.wording import number
 from grader.model.quantities import within

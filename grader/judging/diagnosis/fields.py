@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import Constant, constant
-from grader.judging.diagnosis.source import Source, chain, first_line, last_name
 from grader.judging.diagnosis.wiring import made_for
+from grader.judging.source import Source, chain, first_line, last_name
 from grader.judging.values import field, leaves, published
 from grader.judging.wording import moment, number
 from grader.model.trace import Message

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.fields import given_leaf
-from grader.judging.diagnosis.source import Source, chain, first_line
+from grader.judging.source import Source, chain, first_line
 
 _START = re.compile(r"a count that starts at (-?\d+)")
 

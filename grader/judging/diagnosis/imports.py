@@ -7,7 +7,7 @@ import re
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
-from grader.judging.diagnosis.source import Function, Source, chain, covers, last_name, parameters
+from grader.judging.source import Function, Source, chain, covers, last_name, parameters
 
 _MESSAGE_ENDINGS = ("_msgs", "_msg", "_interfaces", "_interface", "_srvs", "_srv", "_actions")
 

@@ -8,8 +8,8 @@ from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
-from grader.judging.diagnosis.source import Source, chain, first_line, last_name, subtree
 from grader.judging.diagnosis.wiring import made_for, reached, roots
+from grader.judging.source import Source, chain, first_line, last_name, subtree
 from grader.judging.wording import number
 
 #: Answers put off by no more than this are prompt enough.

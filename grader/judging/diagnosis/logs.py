@@ -12,9 +12,9 @@ from grader.judging.checks.sensor import LogsReceived
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant, number_at
 from grader.judging.diagnosis.silence import timer_code
-from grader.judging.diagnosis.source import Source, argument, chain, last_name, text_of
 from grader.judging.diagnosis.wiring import Made, is_flag, is_log, made, made_for, python_loggers, reached, roots
 from grader.judging.output import printed_lines, student_records
+from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
 from grader.model.exercise import Location, Outcome
 from grader.model.quantities import seconds

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 
-from grader.judging.diagnosis.source import Source, first_line, last_name, read, text_of
+from grader.judging.source import Source, first_line, last_name, read, text_of
 from grader.model.submission import Submission
 
 _UNCALLED = ": nothing calls main()"

@@ -8,8 +8,8 @@ from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.source import Source, argument, chain, first_line, last_name, parameters, subtree
 from grader.judging.diagnosis.wiring import is_flag, made, reached, roots
+from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 from grader.model.exercise import Outcome
 
 _POSITION = "msg.pose.pose.position"

@@ -12,7 +12,6 @@ from grader.judging.diagnosis.case import Case, Cause, Clue, lines_of
 from grader.judging.diagnosis.constants import Constant, constant
 from grader.judging.diagnosis.endings import head_of
 from grader.judging.diagnosis.silence import silent_topic, timer_code
-from grader.judging.diagnosis.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.diagnosis.wiring import (
     Made,
     called_only,
@@ -24,6 +23,7 @@ from grader.judging.diagnosis.wiring import (
     reached,
     roots,
 )
+from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
 
 #: How far the rate that the text gives may lie from the measured one.

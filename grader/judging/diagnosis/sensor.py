@@ -9,8 +9,8 @@ from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.fields import given_leaf
-from grader.judging.diagnosis.source import Source, chain, last_name
 from grader.judging.diagnosis.wiring import made, made_for, reached, roots
+from grader.judging.source import Source, chain, last_name
 from grader.judging.values import published_numbers
 from grader.judging.wording import number
 

@@ -7,7 +7,7 @@ import ast
 from grader.judging.checks.clients import ServiceCalls
 from grader.judging.checks.decisions import ReactsToResponses
 from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.source import Source, last_name
+from grader.judging.source import Source, last_name
 
 
 def _shared_group(case: Case) -> Clue | None:

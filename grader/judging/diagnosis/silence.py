@@ -16,10 +16,10 @@ from grader.judging.checks.topics import Publishes, Subscribes
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.endings import head_of, node_made, spins, variable_of
-from grader.judging.diagnosis.source import Function, Source, argument, chain, covers, last_name
 from grader.judging.diagnosis.wiring import MOST_MADE, Made, is_log, made, made_for, publish_calls, reached, roots, used
 from grader.judging.output import student_records
 from grader.judging.silence import student_endpoints
+from grader.judging.source import Function, Source, argument, chain, covers, last_name
 from grader.judging.values import carries_number, published
 from grader.judging.wording import quote
 from grader.model.exercise import Location, Outcome

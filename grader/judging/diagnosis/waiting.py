@@ -6,8 +6,8 @@ import ast
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.silence import silent_topic, speaker
-from grader.judging.diagnosis.source import Source, chain
 from grader.judging.diagnosis.wiring import Made, conditions, is_flag, made, made_for, publish_calls, reached, roots
+from grader.judging.source import Source, chain
 from grader.judging.wording import quote
 
 

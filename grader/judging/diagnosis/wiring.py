@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from grader.judging.diagnosis.constants import bindings
-from grader.judging.diagnosis.source import Function, Source, argument, chain, first_line, last_name, subtree, text_of
+from grader.judging.source import Function, Source, argument, chain, first_line, last_name, subtree, text_of
 
 #: More publishers, subscriptions or timers than this are not looked at, of each kind.
 MOST_MADE = 20

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import grader
-from grader.recording.isolation.protocol import PythonRuntime, StudentProcess
+from grader.recording.isolation.protocol import StudentProcess
+from grader.recording.runtime import PythonRuntime
 
 PACKAGE = Path(grader.__file__).resolve().parent
 

@@ -14,8 +14,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import grader
-from grader.recording.isolation.protocol import PythonRuntime, WorkerView
+from grader.recording.isolation.protocol import WorkerView
 from grader.recording.isolation.view import view_of
+from grader.recording.runtime import PythonRuntime
 
 # Where there is no user namespace, the kernel counts processes by user: students who run at the same time on one
 # machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since

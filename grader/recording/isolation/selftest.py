@@ -22,9 +22,10 @@ from grader.recording.domains import private_domains, shared_domains
 from grader.recording.isolation.environment import PACKAGE, worker_environment
 from grader.recording.isolation.exposure import worker_view
 from grader.recording.isolation.mechanisms import mechanism
-from grader.recording.isolation.protocol import Isolation, runtime_to_json
+from grader.recording.isolation.protocol import Isolation
 from grader.recording.isolation.trial import EXCHANGE, NO_EXCHANGE
 from grader.recording.ros_installation import RosInstallation
+from grader.recording.runtime import runtime_to_json
 
 TRIAL_S = 45.0
 STAGED = "probe.txt"

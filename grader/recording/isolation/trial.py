@@ -21,10 +21,11 @@ from typing import Any
 from grader.model.limits import Limits
 from grader.recording.isolation import probe
 from grader.recording.isolation.environment import quick_discovery
-from grader.recording.isolation.protocol import Command, StudentProcess, runtime_from_json
+from grader.recording.isolation.protocol import Command, StudentProcess
 from grader.recording.isolation.start import SPARE
 from grader.recording.isolation.starting import HOST
 from grader.recording.isolation.tiers import isolation_from_name
+from grader.recording.runtime import runtime_from_json
 
 #: Seconds in which a message must have come back, and between two attempts to send it.
 EXCHANGE_S, AGAIN_S = 15.0, 0.03
