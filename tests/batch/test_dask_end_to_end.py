@@ -70,6 +70,7 @@ def results(folder):
     return {name: re.sub(rb'"usage": \{[^}]*\}', b"", content) for name, content in found.items()}
 
 
+@pytest.mark.nightly
 def test_a_class_survives_the_loss_of_a_worker(class_, cluster, tmp_path):
     """Every result arrives once, and is what this machine makes of the submission."""
     address, workers = cluster

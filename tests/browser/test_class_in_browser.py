@@ -8,6 +8,8 @@ from urllib.parse import unquote, urlparse
 import made_class
 import pytest
 
+pytestmark = pytest.mark.browser
+
 COUNT = 300
 
 

@@ -10,6 +10,8 @@ from grader.judging.checks.rate import TopicRate
 from grader.judging.figures.rates import rate_chart
 from grader.reports.html.render import render_html
 
+pytestmark = pytest.mark.browser
+
 CHECK = TopicRate("/cmd_vel", rate=20.0, tolerance=1.0, window=10_000_000_000, partly_tolerance=2.0)
 
 BOXES = """() => [...document.querySelectorAll(".drawing svg text")]

@@ -8,6 +8,8 @@ import pytest
 from grader.reports.html.bundle import shared_assets
 from grader.reports.html.render import render_html
 
+pytestmark = pytest.mark.browser
+
 MADE = {"perfect": graded.perfect, "wrong": graded.wrong, "crashed": graded.crashed}
 ATTACKS = (
     "<img src=//198.51.100.1/x onerror=document.title='owned'>{{constructor.constructor('owned')()}}",

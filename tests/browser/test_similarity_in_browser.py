@@ -4,6 +4,8 @@ import copies
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in
 
+pytestmark = pytest.mark.browser
+
 TEXT = "import rclpy\n\n\nclass Pub:\n" + "".join(
     f"    def step_{k}(self, a, b):\n        self.x_{k} = [a * {k}, b % {k + 2}]\n        return self.x_{k}[a > {k}]\n"
     for k in range(12)

@@ -17,6 +17,8 @@ from grader.selftest.running import Options, _sampled, _sources, selftest
 #: Mutants of each of our rubrics in this test; `grade selftest rubrics/*.yaml` by hand runs them all. Of a rubric with
 #: many scenarios fewer are tried, for each is recorded in most of them.
 SAMPLE, SAMPLE_OF_MANY, MANY = 4, 3, 4
+#: The rubrics that are not left to the nightly run.
+USUAL = ("velocity_publisher", "joint_subscriber")
 
 
 def candidates():
@@ -83,7 +85,13 @@ def test_notes_are_no_rubrics():
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=builtin_rubrics())
+@pytest.mark.parametrize(
+    "rubric",
+    [
+        pytest.param(path, id=exercise, marks=[] if exercise in USUAL else pytest.mark.nightly)
+        for exercise, path in builtin_rubrics().items()
+    ],
+)
 def test_our_rubrics_notice_what_students_do_wrong(rubric):
     """No survivor of the sample is unexplained, no variant is marked down, the template has its baseline."""
     sample = SAMPLE if len(read_rubric(rubric).scenarios) < MANY else SAMPLE_OF_MANY
