@@ -36,7 +36,7 @@ from grader.options import (
 from grader.progress import shown_progress
 from grader.reports.delivery import Output, deliver, early_delivery, prepared
 from grader.reports.escape import encoded, shown
-from grader.reports.formats import FORMATS, ILLUSTRATED
+from grader.reports.formats import FORMATS
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -189,7 +189,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     keeper = keeping.Keeper(folders, request)
-    pictures = any(output.format in ILLUSTRATED for output in wanted)
+    pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
         report = session.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):

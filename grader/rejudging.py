@@ -24,7 +24,7 @@ from grader.reports.audience import told
 from grader.reports.changes import Change, change
 from grader.reports.delivery import Output
 from grader.reports.destination import write_whole
-from grader.reports.formats import Layout, rendered
+from grader.reports.formats import FORMATS, Layout, rendered
 from grader.reports.json_report import dumps, report_to_json
 from grader.reports.readers import ANYBODY, Readers
 from grader.reports.rejudged import Result
@@ -32,8 +32,6 @@ from grader.reproducing import command_words
 from grader.request import Request
 from grader.session import read_exercises
 
-#: File name endings of reports, one file a submission.
-ENDINGS = {"json": ".json", "html": ".html", "markdown": ".md", "junit": ".xml", "text": ".txt", "github": ".txt"}
 #: Fewer submissions than this are judged in this process.
 WORTH_A_POOL = 16
 #: Thresholds of Python's collector while many recordings are read.
@@ -203,7 +201,7 @@ def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Result:
 def _write(name: str, report: Report, wanted: Wanted) -> None:
     for output in wanted.files:
         if output.path is not None:
-            path = output.path / f"{name}{ENDINGS.get(output.format, '.json')}"
+            path = output.path / f"{name}{FORMATS[output.format].suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
             text = rendered(output.format, report, Layout(_WIDTH, colour=False), wanted.readers)
             write_whole(path, text.encode())

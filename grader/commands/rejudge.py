@@ -10,7 +10,7 @@ import click
 
 from grader.options import EVIDENCE, PATH, audience_options, exit_code, parse_outputs, parse_percent, readers
 from grader.reports.delivery import Output, deliver, prepared, show
-from grader.reports.formats import FORMATS, ILLUSTRATED
+from grader.reports.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,7 +76,7 @@ def command(  # noqa: PLR0913  one parameter an option
     how = rejudging.judgement(
         tuple(dict.fromkeys(exercises)),
         rubrics,
-        pictures=any(output.format in ILLUSTRATED for output in outputs),
+        pictures=any(FORMATS[output.format].illustrated for output in outputs),
         verify=verify,
     )
     one = len(evidence) == 1 and is_evidence(evidence[0])

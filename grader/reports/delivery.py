@@ -15,7 +15,7 @@ from grader.model.errors import GraderError
 from grader.model.report import Report
 from grader.reports.destination import check_writable, write_whole
 from grader.reports.escape import encoded
-from grader.reports.formats import WRITTEN_EARLY, Layout, check_surroundings, rendered
+from grader.reports.formats import FORMATS, Layout, check_surroundings, rendered
 from grader.reports.readers import ANYBODY, Readers
 
 _FILE_WIDTH = 100
@@ -73,7 +73,7 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
 
     A report that cannot be written is passed over: the whole one will say why.
     """
-    files = [output for output in outputs if output.path is not None and output.format in WRITTEN_EARLY]
+    files = [output for output in outputs if output.path is not None and FORMATS[output.format].written_early]
 
     def write(report: Report) -> None:
         with suppress(GraderError):

@@ -1,10 +1,12 @@
-"""The formats that a report can be delivered in; each is imported when it is first used."""
+"""The formats that a report can be delivered in, one row each; what renders one is imported when it is first used."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 from grader.model.feedback import Audience
 from grader.model.report import Report
@@ -19,130 +21,102 @@ class Layout:
     colour: bool
 
 
-def _json(report: Report, layout: Layout) -> str:
-    from grader.reports.json_report import dumps  # noqa: PLC0415  only after a run, not for --help
+def _nothing(report: Report, layout: Layout) -> Mapping[str, Any]:
+    del report, layout
+    return {}
+
+
+def _layout(report: Report, layout: Layout) -> Mapping[str, Any]:
+    del report
+    return {"width": layout.width, "colour": layout.colour}
+
+
+def _folder(report: Report, layout: Layout) -> Mapping[str, Any]:
+    from grader.reports.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
 
     del layout
-    return dumps(report)
+    return {"folder": repository_folder(report.path, os.environ)}
 
 
-def _text(report: Report, layout: Layout) -> str:
-    from grader.reports.text import render_text  # noqa: PLC0415  rich costs more than all the rest of the start
-
-    return render_text(report, width=layout.width, colour=layout.colour)
-
-
-def _markdown(report: Report, layout: Layout) -> str:
-    from grader.reports.markdown import render_markdown  # noqa: PLC0415  as above
-
-    del layout
-    return render_markdown(report)
-
-
-def _html(report: Report, layout: Layout) -> str:
-    from grader.reports.html.render import render_html  # noqa: PLC0415  as above
-
-    del layout
-    return render_html(report)
-
-
-def _junit(report: Report, layout: Layout) -> str:
-    from grader.reports.junit import render_junit  # noqa: PLC0415  as above
-
-    del layout
-    return render_junit(report, folder=_folder(report))
-
-
-def _github(report: Report, layout: Layout) -> str:
-    from grader.reports.github import render_github  # noqa: PLC0415  as above
-
-    del layout
-    return render_github(report, folder=_folder(report))
-
-
-def _gradescope(report: Report, layout: Layout) -> str:
-    from grader.reports.gradescope import render_gradescope  # noqa: PLC0415  as above
-
-    del layout
-    return render_gradescope(report)
-
-
-def _prairielearn(report: Report, layout: Layout) -> str:
-    from grader.reports.prairielearn import render_prairielearn  # noqa: PLC0415  as above
-
-    del layout
-    return render_prairielearn(report)
-
-
-def _classroom50(report: Report, layout: Layout) -> str:
-    from grader.reports.classroom50 import render_classroom50  # noqa: PLC0415  as above
+def _handed_in(report: Report, layout: Layout) -> Mapping[str, Any]:
     from grader.reports.surroundings import handed_in  # noqa: PLC0415  as above
 
-    del layout
-    return render_classroom50(report, handed_in(os.environ))
+    del report, layout
+    return {"handed_in": handed_in(os.environ)}
 
 
-def _classroom(report: Report, layout: Layout) -> str:
-    from grader.reports.classroom import render_classroom  # noqa: PLC0415  as above
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format that a report can be delivered in.
 
-    del layout
-    return render_classroom(report)
+    Attributes:
+        renderer: What makes the text of a report: `module:function` in `grader.reports`.
+        suffix: How the name of a file in this format ends.
+        usual: Who reads it unless somebody is named: students, where a platform shows it to them.
+        arguments: What the renderer is given besides the report.
+        withholds: Whether it leaves out by itself what students must not see yet: its platform shows that later.
+        illustrated: Whether it shows pictures, which take about as long to draw as judging takes.
+        written_early: Whether its platform ends a run that takes too long, and then takes what is there.
+    """
+
+    renderer: str
+    suffix: str
+    usual: Audience
+    arguments: Callable[[Report, Layout], Mapping[str, Any]] = _nothing
+    withholds: bool = False
+    illustrated: bool = False
+    written_early: bool = False
+
+    def __call__(self, report: Report, layout: Layout, **arguments: Any) -> str:
+        """Return the text of a report."""
+        module, _, function = self.renderer.partition(":")
+        text: str = getattr(import_module(f"grader.reports.{module}"), function)(
+            report, **self.arguments(report, layout), **arguments
+        )
+        return text
 
 
-def _folder(report: Report) -> str | None:
-    from grader.reports.surroundings import repository_folder  # noqa: PLC0415  as above
+#: Every format that a report can be delivered in.
+FORMATS: dict[str, Format] = {
+    "json": Format("json_report:dumps", ".json", Audience.INSTRUCTOR),
+    "text": Format("text:render_text", ".txt", Audience.INSTRUCTOR, _layout),
+    "html": Format("html.render:render_html", ".html", Audience.INSTRUCTOR, illustrated=True),
+    "markdown": Format("markdown:render_markdown", ".md", Audience.INSTRUCTOR),
+    "junit": Format("junit:render_junit", ".xml", Audience.INSTRUCTOR, _folder),
+    "github": Format("github:render_github", ".txt", Audience.STUDENT, _folder),
+    "gradescope": Format("gradescope:render_gradescope", ".json", Audience.STUDENT, withholds=True, written_early=True),
+    "prairielearn": Format("prairielearn:render_prairielearn", ".json", Audience.STUDENT),
+    "classroom50": Format("classroom50:render_classroom50", ".json", Audience.STUDENT, _handed_in),
+    "classroom": Format("classroom:render_classroom", ".json", Audience.STUDENT),
+}
 
-    return repository_folder(report.path, os.environ)
 
-
-def check_surroundings(format_: str) -> None:
+def check_surroundings(name: str) -> None:
     """Make sure that the environment tells what a format needs and a report does not know.
 
     Raises:
         GraderError: It does not.
     """
-    if format_ == "classroom50":
+    if FORMATS[name].arguments is _handed_in:
         from grader.reports.surroundings import handed_in  # noqa: PLC0415  as above
 
         handed_in(os.environ)
 
 
-#: Every format that a report can be delivered in.
-FORMATS: dict[str, Callable[[Report, Layout], str]] = {
-    "json": _json,
-    "text": _text,
-    "html": _html,
-    "markdown": _markdown,
-    "junit": _junit,
-    "github": _github,
-    "gradescope": _gradescope,
-    "prairielearn": _prairielearn,
-    "classroom50": _classroom50,
-    "classroom": _classroom,
-}
-
-
-def rendered(format_: str, report: Report, layout: Layout, readers: Readers = ANYBODY) -> str:
+def rendered(name: str, report: Report, layout: Layout, readers: Readers = ANYBODY) -> str:
     """Return a report in a format, with what its reader may see of it.
 
     Args:
-        format_: One of `FORMATS`.
+        name: One of `FORMATS`.
         report: The whole of it.
         layout: How a text is laid out.
         readers: Who reads it, and when.
     """
-    if readers.of(format_) is Audience.INSTRUCTOR:
-        return FORMATS[format_](report, layout)
-    if format_ == "gradescope":  # the platform itself hides tests, and shows some of them later
-        from grader.reports.gradescope import render_gradescope  # noqa: PLC0415  as above
-
-        return render_gradescope(report, day=readers.day)
+    format_ = FORMATS[name]
+    if readers.of(format_.usual) is Audience.INSTRUCTOR:
+        return format_(report, layout)
+    if format_.withholds:
+        return format_(report, layout, day=readers.day)
     from grader.reports.audience import for_student  # noqa: PLC0415  as above
 
-    return FORMATS[format_](for_student(report, readers.day), layout)
-
-
-#: Formats that show pictures, which take about as long to draw as judging takes.
-ILLUSTRATED = frozenset({"html"})
-#: Formats whose platform ends a run that takes too long, and then takes what is there.
-WRITTEN_EARLY = frozenset({"gradescope"})
+    return format_(for_student(report, readers.day), layout)

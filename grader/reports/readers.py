@@ -1,13 +1,10 @@
-"""Who reads the reports of a run, by format."""
+"""Who reads the reports of a run, and when."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from grader.model.feedback import Audience
-
-#: Formats for platforms that show them to students.
-READ_BY_STUDENTS = frozenset({"github", "gradescope", "prairielearn", "classroom50", "classroom"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +19,8 @@ class Readers:
     audience: Audience | None = None
     day: str = ""
 
-    def of(self, format_: str) -> Audience:
-        """Return who reads a format."""
-        usual = Audience.STUDENT if format_ in READ_BY_STUDENTS else Audience.INSTRUCTOR
+    def of(self, usual: Audience) -> Audience:
+        """Return who reads a format that is usually read by some."""
         return self.audience or usual
 
     @property

@@ -9,7 +9,7 @@ from report_samples import hostile, middling, partial
 from grader.model.errors import GraderError
 from grader.reports import delivery
 from grader.reports.delivery import Output, deliver, early_delivery, prepared
-from grader.reports.formats import FORMATS, WRITTEN_EARLY
+from grader.reports.formats import FORMATS
 from grader.reports.surroundings import VARIABLES
 
 HANDED_IN = {
@@ -56,7 +56,8 @@ def test_a_format_that_lacks_its_surroundings_is_refused_before_grading(monkeypa
 
 def test_only_platforms_that_end_runs_get_partial_reports(tmp_path):
     """A file that others read is never a partial one."""
-    assert early_delivery([Output(name, tmp_path / name) for name in FORMATS if name not in WRITTEN_EARLY]) is None
+    others = [Output(name, tmp_path / name) for name, format_ in FORMATS.items() if not format_.written_early]
+    assert early_delivery(others) is None
     assert early_delivery([Output("gradescope")]) is None  # what is printed cannot be taken back
     path = tmp_path / "results.json"
     write = early_delivery([Output("gradescope", path), Output("json", tmp_path / "r.json")])
