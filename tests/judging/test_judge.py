@@ -266,8 +266,8 @@ def test_a_right_node_gets_everything() -> None:
 )
 def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, said: str) -> None:
     """One cause, one red line, with its place; the rest is blocked by it."""
-    rec = Recording(0.0, process=FILE).fault(0.0, kind, text, 12)
-    report = graded_1(rec)
+    code = 3 if kind is FaultKind.EXITED else None
+    report = graded_1(Recording(0.0, process=FILE).fault(0.0, kind, text, 12, exit_code=code))
     assert outcomes(report) == {
         "publishes_twist": "not_met",
         "rate": "blocked",

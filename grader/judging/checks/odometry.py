@@ -238,7 +238,7 @@ class WaitsGracefully:
         early = not deliveries or fault.t_ns < deliveries[0].t_ns
         when = f"while nothing was published on {self.topic}" if early else f"after messages came on {self.topic}"
         hint = fault_hint(fault)
-        if "NoneType" in fault.text:
+        if fault.said("NoneType"):
             hint = "start with None and return early as long as no message has come"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
 

@@ -72,8 +72,8 @@ class Case:
 
     def said(self, pattern: str) -> re.Match[str] | None:
         """Return how an exception's text matches a pattern."""
-        exception = self.fault is not None and self.fault.kind is FaultKind.EXCEPTION
-        return re.search(pattern, self.fault.text) if exception and self.fault is not None else None
+        fault = self.fault
+        return fault.said(pattern) if fault is not None and fault.kind is FaultKind.EXCEPTION else None
 
     def evidence(self, key: str) -> object:
         """Return a piece of the verdict's evidence, None if there is none of that name."""
