@@ -15,6 +15,8 @@ from grader.model.trace import ClockKind, GraphSnapshot, Start
 from grader.model.variant import Variant
 
 SCHEMA = "grader/report/v1"
+#: How the reason of a criterion begins that waits for another one.
+NOT_JUDGED = "not judged: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,9 @@ class Verdict:
         hint: One thing to do; empty if there is none.
         location: Place in the student's file.
         evidence: Plain JSON values.
+        blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
+        missing_file: The missing file that both need, where that is why; empty otherwise.
+        same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
     """
 
     id: str
@@ -42,6 +47,9 @@ class Verdict:
     hint: str = ""
     location: Location | None = None
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    blocked_by: str = ""
+    missing_file: str = ""
+    same_cause_as: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,13 +121,13 @@ class _Said:
         if verdict.outcome is Outcome.NOT_MET:
             self.lost[criterion.id] = criterion.check
         if found is None:
-            return replace(verdict, hint=_same_as(earlier)) if earlier else verdict
+            return _same_as(earlier, verdict) if earlier else verdict
         id_, clue = found
         key = clue.key or f"{id_}:{clue.location}"
         earlier = self.owner.setdefault(key, criterion.id)
-        hint = clue.hint if earlier == criterion.id else _same_as(earlier)
         evidence = {**verdict.evidence, CAUSE_KEY: id_}
-        return replace(verdict, hint=hint, location=clue.location or verdict.location, evidence=evidence)
+        placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
+        return placed if earlier == criterion.id else _same_as(earlier, placed)
 
     def _case(self, verdict: Verdict, criterion: Criterion, trace: Trace, sources: Mapping[str, Source]) -> Case:
         scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
@@ -152,8 +152,9 @@ class _Said:
         return ""
 
 
-def _same_as(criterion: str) -> str:
-    return f"this has the same cause as {criterion}: mend that first"
+def _same_as(criterion: str, verdict: Verdict) -> Verdict:
+    hint = f"this has the same cause as {criterion}: mend that first"
+    return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
 def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
