@@ -147,6 +147,7 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
         hint=hint,
         location=finding.location,
         evidence=finding.evidence,
+        problem=finding.problem,
     )
 
 

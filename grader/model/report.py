@@ -11,6 +11,7 @@ from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
 from grader.model.feedback import Feedback
 from grader.model.figure import Excerpt, Figure
+from grader.model.problem import Problem
 from grader.model.trace import ClockKind, GraphSnapshot, Start
 from grader.model.variant import Variant
 
@@ -36,6 +37,7 @@ class Verdict:
         blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
         missing_file: The missing file that both need, where that is why; empty otherwise.
         same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
+        problem: What its check found wrong, for diagnosis; no report shows this.
     """
 
     id: str
@@ -50,6 +52,7 @@ class Verdict:
     blocked_by: str = ""
     missing_file: str = ""
     same_cause_as: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)

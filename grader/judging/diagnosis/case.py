@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from grader.judging.diagnosis.source import Source, first_line
 from grader.model.exercise import Check, Criterion, Location
+from grader.model.problem import ProblemKind
 from grader.model.report import Verdict
 from grader.model.trace import Fault, FaultKind, Trace
 
@@ -69,6 +70,15 @@ class Case:
         if self.fault is None or self.source is None:
             return None
         return (self.fault, self.source) if self.fault.file in ("", self.source.file) else None
+
+    def is_about(self, kind: ProblemKind) -> bool:
+        """Return whether the check found a problem of a kind."""
+        return self.verdict.problem is not None and self.verdict.problem.kind is kind
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics that the problem is about."""
+        return self.verdict.problem.topics if self.verdict.problem is not None else ()
 
     def said(self, pattern: str) -> re.Match[str] | None:
         """Return how an exception's text matches a pattern."""

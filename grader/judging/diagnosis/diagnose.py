@@ -32,6 +32,7 @@ from grader.judging.diagnosis.syntax import SYNTAX
 from grader.judging.diagnosis.waiting import WAITING
 from grader.judging.findings import FAULT_KEY
 from grader.model.exercise import Check, Criterion, Exercise, Outcome
+from grader.model.problem import ProblemKind
 from grader.model.report import Verdict
 from grader.model.submission import Submission
 from grader.model.trace import Fault, Trace
@@ -137,17 +138,18 @@ class _Said:
 
     def _follows(self, check: Check, verdict: Verdict) -> str:
         """Return the criterion whose loss explains that two nodes do not work together; empty if none surely does."""
-        if not isinstance(check, AnswersTogether):
+        problem = verdict.problem
+        if not isinstance(check, AnswersTogether) or problem is None:
             return ""
-        reason = verdict.reason
-        fixed = "never changes, because" in reason
-        stopped = reason.startswith(f"{check.input}: nothing ")
-        answered = " for " in reason or "answers fit" in reason or reason.startswith(f"{check.output}: n")
+        quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
+        fixed = problem.kind is ProblemKind.NEVER_CHANGES
+        stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
+        answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
         for id_, other in self.lost.items():
             controller = isinstance(other, ThresholdResponse) and other.output == check.output
             sensor = isinstance(other, RandomInRange) and other.topic == check.input
             pace = isinstance(other, TopicRate) and other.topic == check.input
-            if (controller and answered and not fixed) or (sensor and fixed) or (pace and stopped):
+            if (controller and answered) or (sensor and fixed) or (pace and stopped):
                 return id_
         return ""
 
