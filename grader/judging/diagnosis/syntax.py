@@ -68,10 +68,10 @@ def _other_language(fault: Fault, row: str) -> Clue | None:
 
 
 def _said(fault: Fault, row: str) -> Clue | None:
-    hint = next((hint for pattern, hint in _SAYINGS if fault.said(pattern)), None)
-    if hint is None or ("{code}" in hint and not row.strip()):
+    template = next((template for pattern, template in _SAYINGS if fault.said(pattern)), None)
+    if template is None or ("{code}" in template and not row.strip()):
         return None
-    return Clue(hint.format(code=quote(row, 60), indent=_indent(row)))
+    return Clue(template.format(code=quote(row, 60), indent=_indent(row)))
 
 
 def _indent(row: str) -> str:
