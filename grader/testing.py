@@ -152,6 +152,11 @@ class TraceBuilder:
         """Add the end of the process: an exception, or another kind of fault, in a line of its file."""
         return self.add(Fault(nanoseconds(t_s), self.process, kind, text, self.process if line else "", line))
 
+    def exited(self, t_s: float, code: int = 0) -> TraceBuilder:
+        """Add the end of the process by itself, with an exit code."""
+        text = f"exited with code {code}"
+        return self.add(Fault(nanoseconds(t_s), self.process, FaultKind.EXITED, text, exit_code=code))
+
     def publisher(self, topic: str, type_: str, **attributes: Any) -> TraceBuilder:
         """Add a publisher of the node to the graph; attributes are those of an Endpoint, such as `reliability`."""
         return self._end("publisher", topic, type_, attributes)

@@ -37,6 +37,101 @@ def imports_of(path):
             yield "." * node.level + (node.module or "")
 
 
+#: Texts for people: nothing is decided by what they say.
+FOR_PEOPLE = {"reason", "hint", "note", "sentence"}
+TEXT_METHODS = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition", "find", "index"}
+TEXT_METHODS |= {"split", "rsplit", "rfind", "rindex", "count"}
+PATTERN_METHODS = {"search", "match", "fullmatch", "finditer", "findall", "split", "sub", "subn"}
+#: What has a text that is not for people but from a program or a rubric; any other text may be that of a fault.
+OF_PROGRAMS = r"o|t|side\.program|log|line|lines\[n\]|output|record|episode|value|self"
+#: Modules that look into such texts all the same, and why.
+READS_TEXT = {
+    "reports/audience.py": "takes the parts with numbers out of what a student sees",
+    "reports/class_page/causes.py": "reports of earlier versions name another criterion in their sentences only",
+    "reports/class_page/kinds.py": "puts reasons together that differ in numbers and names only",
+    "reports/text.py": "does not name a place twice",
+    "reports/wording.py": "leaves out how every reason of a blocked criterion begins",
+}
+
+
+def is_for_people(node):
+    """Return whether an expression is a reason, a hint, a note, or the text of a fault, by its name or its key."""
+    if isinstance(node, ast.Call):
+        called = node.func
+        if isinstance(called, ast.Attribute) and called.attr == "get":
+            return any(isinstance(argument, ast.Constant) and argument.value in FOR_PEOPLE for argument in node.args)
+        of_str = isinstance(called, ast.Name) and called.id == "str"
+        inner = node.args[:1] if of_str else [called.value] if isinstance(called, ast.Attribute) else []
+        return any(map(is_for_people, inner))
+    if isinstance(node, ast.Subscript):
+        key = node.slice.value if isinstance(node.slice, ast.Constant) else None
+        return key in FOR_PEOPLE or is_for_people(node.value)
+    if isinstance(node, ast.BoolOp):
+        return any(map(is_for_people, node.values))
+    if isinstance(node, ast.Attribute) and node.attr == "text":
+        return re.fullmatch(OF_PROGRAMS, ast.unparse(node.value)) is None
+    name = node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return name in FOR_PEOPLE
+
+
+def reads_text(node):
+    """Return whether an expression decides or takes something by what a text for people says."""
+    if isinstance(node, ast.Compare):
+        pairs = zip(node.ops, node.comparators, strict=True)
+        return any(isinstance(op, ast.In | ast.NotIn) and is_for_people(side) for op, side in pairs)
+    if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+        return False
+    own = node.func.attr in TEXT_METHODS and node.args and is_for_people(node.func.value)
+    return own or (node.func.attr in PATTERN_METHODS and any(map(is_for_people, node.args)))
+
+
+def text_readers(package):
+    """Return the places that read texts for people, as `module:line`."""
+    return [
+        f"{path.relative_to(package).as_posix()}:{node.lineno}"
+        for path in sorted(package.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if reads_text(node)
+    ]
+
+
+def test_nothing_is_read_out_of_texts_for_people():
+    """What a program has to know is a field of its own, so that sentences can be worded anew."""
+    found = text_readers(PACKAGE)
+    assert [place for place in found if place.partition(":")[0] not in READS_TEXT] == []
+    assert READS_TEXT.keys() == {place.partition(":")[0] for place in found}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "'bursts' in case.verdict.reason",
+        "'code 0' not in fault.text",
+        "found[0].fault.text.rstrip('.').endswith('code 0')",
+        "f.text.startswith('EOFError')",
+        "'code 2' not in found[0].text",
+        "re.search('code', case.fault.text)",
+        "PATTERN.fullmatch(str(criterion['hint'] or ''))",
+        "PATTERN.fullmatch(str(criterion['hint']))",
+        "PATTERN.sub('', verdict.reason)",
+        "criterion.get('reason', '').split(';')",
+        "note.startswith('x')",
+        "'x' in str(verdict.hint)[:9]",
+    ],
+)
+def test_a_planted_reader_of_texts_is_found(line, tmp_path):
+    """The rule can fail."""
+    (tmp_path / "bad.py").write_text(f"def f(case, fault):\n    return {line}\n")
+    assert text_readers(tmp_path) == ["bad.py:2"]
+
+
+@pytest.mark.parametrize("line", ["fault.said('x')", "'x' in record.text", "case.reason == other", "reason in known"])
+def test_what_is_no_reading_is_let_be(line, tmp_path):
+    """What a student's program wrote is no text of ours, and texts may be compared whole."""
+    (tmp_path / "good.py").write_text(f"def f(case, fault):\n    return {line}\n")
+    assert text_readers(tmp_path) == []
+
+
 #: Packages that are pure.
 PURE = ("model", "judging", "reports", "selftest/mutating")
 

@@ -176,6 +176,5 @@ def _unmet(draft: Draft, trace: Trace) -> str:
 def _refuse_broken(trace: Trace, files: Iterable[str]) -> None:
     """Raise SubmissionError if a process ended otherwise than with code 0."""
     for fault in trace.faults():
-        if fault.kind is FaultKind.EXITED and fault.text.endswith("code 0"):
-            continue
-        raise SubmissionError(f"{', '.join(files)}: expected a reference that runs, found {fault_sentence(fault)}")
+        if fault.exit_code != 0:
+            raise SubmissionError(f"{', '.join(files)}: expected a reference that runs, found {fault_sentence(fault)}")

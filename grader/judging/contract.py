@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from grader.model.exercise import Finding, Location
+from grader.model.problem import Problem
 
 #: Deepest nesting of evidence.
 _DEEPEST = 12
@@ -22,6 +23,8 @@ def breach(finding: object) -> str:
     texts = (finding.reason, finding.hint, finding.blocked_by or "")
     if not all(isinstance(text, str) for text in texts) or not isinstance(finding.location, (Location, type(None))):
         return "gave a reason, hint or location of another type than a Finding has"
+    if not isinstance(finding.problem, (Problem, type(None))):
+        return f"gave a problem of type {type(finding.problem).__name__}, expected a Problem"
     plain = isinstance(finding.evidence, Mapping) and _is_plain(finding.evidence, _DEEPEST)
     return "" if plain else "gave evidence that holds more than plain JSON values"
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from grader.model.exercise import Finding, Location
+from grader.model.problem import Problem
 from grader.model.quantities import seconds
 from grader.model.trace import Fault
 
@@ -26,13 +27,14 @@ def partly(reason: str, evidence: Mapping[str, Any] | None = None, *, hint: str 
     return Finding(HALF, reason, evidence or {}, hint=hint)
 
 
-def not_met(
+def not_met(  # noqa: PLR0913  each is a field of the finding
     reason: str,
     evidence: Mapping[str, Any] | None = None,
     *,
     hint: str = "",
     fault: Fault | None = None,
     blocked_by: str | None = None,
+    problem: Problem | None = None,
 ) -> Finding:
     """Return no credit.
 
@@ -42,12 +44,13 @@ def not_met(
         hint: One thing to do.
         fault: The fault that explains it; becomes the location and part of the evidence.
         blocked_by: Criterion id, or name of a check in the same scenario, without which this cannot be asked.
+        problem: What is wrong, where diagnosis can say more about it.
     """
     known = dict(evidence or {})
     if fault is not None:
         known[FAULT_KEY] = fault_evidence(fault)
     location = fault_location(fault) if fault is not None else None
-    return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by)
+    return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=problem)
 
 
 def fault_location(fault: Fault) -> Location | None:

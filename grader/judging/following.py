@@ -40,10 +40,17 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """What the values follow, as a clause, and what to do about it; both may be empty."""
+    """What the values follow, as a clause, and what to do about it; both may be empty.
+
+    Attributes:
+        said: The clause.
+        hint: What to do.
+        start: The number that the count starts at, if that is all that differs.
+    """
 
     said: str = ""
     hint: str = ""
+    start: int | None = None
 
 
 _Wanted = Callable[[Sample], float]
@@ -88,7 +95,7 @@ def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
     """Yield what students do instead, the commonest first."""
     for start in (s for near in range(1, _FURTHEST_START + 1) for s in (near, -near)):
         said = f"the values are right for a count that starts at {start}"
-        yield Instead(said, _FIRST_HINT if start == 1 else ""), partial(_at, wanted, start=start)
+        yield Instead(said, _FIRST_HINT if start == 1 else "", start), partial(_at, wanted, start=start)
     for degrees in (_DEGREES, 1 / _DEGREES):
         said = "the angle is converted between degrees and radians before the formula"
         yield Instead(said, _RADIAN_HINT), partial(_at, wanted, pace=degrees)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from grader.judging.silence import AT_ONCE_NS, first_fault
-from grader.model.trace import FaultKind, LogRecord, OutputLine, Trace
+from grader.model.trace import LogRecord, OutputLine, Trace
 
 #: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
@@ -73,7 +73,7 @@ def written(trace: Trace, process: str) -> tuple[LogRecord | OutputLine, ...]:
 
 def _without_prompt(trace: Trace, process: str, lines: list[OutputLine]) -> list[OutputLine]:
     """Return the lines without the prompt of an `input()` at which the process ended: there is no keyboard."""
-    ends = [f for f in trace.faults(process) if f.kind is FaultKind.EXCEPTION and f.text.startswith("EOFError")]
+    ends = [f for f in trace.faults(process) if f.said("^EOFError")]
     prompt = next((o for o in reversed(lines) if ends and o.t_ns <= ends[0].t_ns), None)
     return [o for o in lines if o is not prompt]
 

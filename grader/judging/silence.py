@@ -41,7 +41,7 @@ def faults_before_stop(trace: Trace, process: str | None = None) -> list[Fault]:
 
 def fault_hint(fault: Fault) -> str:
     """Return what to do about a fault where that is plain; empty otherwise."""
-    if fault.kind is not FaultKind.EXITED or not fault.text.rstrip(".").endswith("code 0"):
+    if fault.exit_code != 0:
         return ""
     return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +11,7 @@ from grader.judging.asking import Answer, check_name
 from grader.judging.findings import FAULT_KEY
 from grader.judging.wording import listed, quote
 from grader.model.exercise import Criterion, Exercise, Finding, Outcome
-from grader.model.report import Verdict
+from grader.model.report import NOT_JUDGED, Verdict
 from grader.model.submission import Submission
 
 _EARNED = (Outcome.MET, Outcome.PARTLY)
@@ -30,7 +30,7 @@ class Bench:
     answers: Mapping[str, Answer]
     submission: Submission
     done: dict[str, Verdict] = field(default_factory=dict)
-    missing_named: set[str] = field(default_factory=set)
+    missing_owner: dict[str, str] = field(default_factory=dict)
     fault_owner: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -107,16 +107,17 @@ class Bench:
         return next((s.processes for s in self.exercise.scenarios if s.id == criterion.scenario), ())
 
     def _blocked(self, criterion: Criterion, needed: str, outcome: Outcome) -> Verdict:
-        reason = f"not judged: needs {needed} ({_SAID.get(outcome, 'not met')})"
+        reason = f"{NOT_JUDGED}needs {needed} ({_SAID.get(outcome, 'not met')})"
         kind = Outcome.UNDECIDED if outcome is Outcome.UNDECIDED else Outcome.BLOCKED
-        return _without_points(criterion, kind, reason)
+        return replace(_without_points(criterion, kind, reason), blocked_by=needed)
 
     def _missing(self, criterion: Criterion, files: tuple[str, ...]) -> Verdict:
-        unnamed = next((f for f in files if f not in self.missing_named), None)
+        unnamed = next((f for f in files if f not in self.missing_owner), None)
         if unnamed is None:
-            reason = f"not judged: needs {files[0]}, which is missing"
-            return _without_points(criterion, Outcome.BLOCKED, reason)
-        self.missing_named.add(unnamed)
+            file = files[0]
+            verdict = _without_points(criterion, Outcome.BLOCKED, f"{NOT_JUDGED}needs {file}, which is missing")
+            return replace(verdict, blocked_by=self.missing_owner[file], missing_file=file)
+        self.missing_owner[unnamed] = criterion.id
         similar = self.submission.files[unnamed].similar
         reason = f"{unnamed}: not in the submission"
         reason += f"; found {listed(similar)} instead" if similar else ""
@@ -146,6 +147,7 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
         hint=hint,
         location=finding.location,
         evidence=finding.evidence,
+        problem=finding.problem,
     )
 
 

@@ -75,9 +75,8 @@ def listed(items: Sequence[str], limit: int = 4) -> str:
 def fault_sentence(fault: Fault) -> str:
     """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
     if fault.kind is FaultKind.EXITED:
-        tail = quote(fault.text)
-        tail = tail.removeprefix("exited") if tail.startswith("exited") else f" ({tail})" if tail else ""
-        return f"{fault.process} exited after {span(fault.t_ns)}{tail}"
+        code = "?" if fault.exit_code is None else fault.exit_code
+        return f"{fault.process} exited after {span(fault.t_ns)} with code {code}"
     place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
     return f"{place}: {_own_words(fault)}"
 

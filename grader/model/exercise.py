@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any, Protocol, runtime_checkable
 
 from grader.model.feedback import OPEN, Feedback
+from grader.model.problem import Problem
 from grader.model.scenario import Scenario
 from grader.model.trace import Trace
 from grader.model.variant import Variant
@@ -48,6 +49,7 @@ class Finding:
         location: Place in the student's file, if the trace names one.
         hint: One thing to do; empty if nothing is very likely right.
         blocked_by: Id of the criterion without which this question cannot be asked; credit is then 0.
+        problem: What is wrong, where diagnosis can say more about it; no report shows this.
     """
 
     credit: Fraction
@@ -56,6 +58,7 @@ class Finding:
     location: Location | None = None
     hint: str = ""
     blocked_by: str | None = None
+    problem: Problem | None = None
 
 
 class Check(Protocol):

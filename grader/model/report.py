@@ -11,10 +11,13 @@ from grader.model.containment import Property
 from grader.model.exercise import Location, Outcome
 from grader.model.feedback import Feedback
 from grader.model.figure import Excerpt, Figure
+from grader.model.problem import Problem
 from grader.model.trace import ClockKind, GraphSnapshot, Start
 from grader.model.variant import Variant
 
 SCHEMA = "grader/report/v1"
+#: How the reason of a criterion begins that waits for another one.
+NOT_JUDGED = "not judged: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +34,10 @@ class Verdict:
         hint: One thing to do; empty if there is none.
         location: Place in the student's file.
         evidence: Plain JSON values.
+        blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
+        missing_file: The missing file that both need, where that is why; empty otherwise.
+        same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
+        problem: What its check found wrong, for diagnosis; no report shows this.
     """
 
     id: str
@@ -42,6 +49,10 @@ class Verdict:
     hint: str = ""
     location: Location | None = None
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    blocked_by: str = ""
+    missing_file: str = ""
+    same_cause_as: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)

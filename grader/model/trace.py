@@ -6,6 +6,7 @@ Times are integer nanoseconds since the scenario started. Within one instant obs
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -240,6 +241,10 @@ class Fault:
         file: File of the innermost frame that is the student's own, relative to the submission; empty if unknown.
         line: Its line, from 1; 0 if unknown.
         frames: The student's own frames, outermost first, as `file:line in function`.
+        exit_code: The exit code of a process that ended by itself; None for any other fault, or if it is not known.
+        signal: Name of the signal that ended the process, e.g. `SIGSEGV`; empty if there was none, or a limit explains
+            it.
+        python: Version of the Python that could not compile the file, e.g. `(3, 12)`; None for any other fault.
     """
 
     t_ns: int
@@ -249,6 +254,14 @@ class Fault:
     file: str = ""
     line: int = 0
     frames: tuple[str, ...] = ()
+    exit_code: int | None = None
+    signal: str = ""
+    python: tuple[int, int] | None = None
+
+    def said(self, pattern: str) -> re.Match[str] | None:
+        """Return how Python's own words for an exception or a syntax error match a pattern; None for other faults."""
+        by_python = self.kind in (FaultKind.EXCEPTION, FaultKind.SYNTAX_ERROR)
+        return re.search(pattern, self.text) if by_python else None
 
 
 @dataclass(frozen=True, slots=True)

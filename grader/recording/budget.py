@@ -34,9 +34,13 @@ class RealTimeBudget:
         return max(0, self._total_ns - (time.monotonic_ns() - self._started_ns))
 
     @property
+    def _exceeded(self) -> str:
+        return f"the recordings of this submission took more than {duration(self._total_ns)} of real time"
+
+    @property
     def words(self) -> str:
         """Why a recording is ended, or not begun, when the time is used up; the same in every run."""
-        return f"stopped: the recordings of this submission took more than {duration(self._total_ns)} of real time"
+        return f"stopped: {self._exceeded}"
 
     def charge(self, real_ns: int, starved_ns: int) -> None:
         """Take note of a recording.
@@ -53,7 +57,7 @@ class RealTimeBudget:
         """Return the trace of a scenario for which no time is left: the nodes' fault, or the machine's."""
         clock = ClockKind(plan.clock)
         if self._starved_ns > STARVED_SHARE * self._real_ns:
-            problem = f"the machine was too busy: {self.words.removeprefix('stopped: ')}"
+            problem = f"the machine was too busy: {self._exceeded}"
             return Trace(plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
         faults = tuple(Fault(0, name, FaultKind.KILLED, self.words) for name, _ in plan.processes)
         return Trace(plan.scenario, clock, stop_ns=plan.duration_ns, observations=faults)

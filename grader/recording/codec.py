@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 from grader.model.errors import HarnessError
 from grader.model.trace import (
@@ -30,6 +31,12 @@ from grader.model.trace import (
 )
 
 FORMAT = "grader/trace/v1"
+#: Exit code, signal and Python version of a fault, as `Fault` has them.
+FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
+# The words of faults in recordings that lack these details.
+_EXITED = re.compile(r"exited with code (-?\d{1,9})")
+_KILLED = re.compile(r"ended by (SIG[A-Z0-9]+|signal \d+)")
+_PYTHON = re.compile(r"\(read by Python (\d{1,3})\.(\d{1,3})\)")
 SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
@@ -68,7 +75,9 @@ def observation_to_json(observation: Observation) -> list[Any]:
         return [kind, *fields, plain(value), base64.b64encode(cdr).decode()]
     if isinstance(observation, Fault):
         fields = [getattr(observation, name) for name in Fault.__slots__]
-        return ["fault", *fields[:2], observation.kind.value, *fields[3:6], list(observation.frames)]
+        python = list(observation.python) if observation.python else None
+        details = [observation.exit_code, observation.signal, python]
+        return ["fault", *fields[:2], observation.kind.value, *fields[3:6], list(observation.frames), details]
     kinds = {LogRecord: "log", OutputLine: "line", Offer: "offer", Mark: "mark"}
     return [kinds[type(observation)], *(getattr(observation, name) for name in type(observation).__slots__)]
 
@@ -186,15 +195,33 @@ def _endpoint(fields: list[Any]) -> Endpoint:
 
 
 def _fault(fields: list[Any]) -> Fault:
-    t_ns, process, kind, text, file, line, frames = fields
-    return Fault(
-        _whole(t_ns),
-        _text(process),
-        FaultKind(kind),
-        _text(text),
-        _text(file),
-        _whole(line),
-        tuple(map(_text, _list(frames))),
+    t_ns, process, kind, text, file, line, frames, *rest = fields
+    kind, text = FaultKind(kind), _text(text)
+    details = _fault_details(*rest) if rest else details_from_text(kind, text)
+    frames = tuple(map(_text, _list(frames)))
+    return Fault(_whole(t_ns), _text(process), kind, text, _text(file), _whole(line), frames, *details)
+
+
+def _fault_details(details: list[Any]) -> FaultDetails:
+    exit_code, signal, python = _list(details)
+    if python is not None:
+        major, minor = map(_whole, _list(python))
+        python = major, minor
+    return exit_code if exit_code is None else _whole(exit_code), _text(signal), python
+
+
+def details_from_text(kind: FaultKind, text: str) -> FaultDetails:
+    """Return exit code, signal and Python version of a fault whose recording has only the text.
+
+    Early recordings of version 1 tell these three only in the words of that time. Nothing else reads them from text.
+    """
+    exited = _EXITED.fullmatch(text) if kind is FaultKind.EXITED else None
+    killed = _KILLED.fullmatch(text) if kind is FaultKind.KILLED else None
+    version = _PYTHON.search(text) if kind is FaultKind.SYNTAX_ERROR else None
+    return (
+        int(exited[1]) if exited else None,
+        killed[1] if killed else "",
+        (int(version[1]), int(version[2])) if version else None,
     )
 
 

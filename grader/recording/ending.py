@@ -34,7 +34,6 @@ _TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")
 _FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dictcomp|genexpr)>|[^\W\d]\w*)")
 #: What C++ writes before it ends a process that found no memory.
 NO_MEMORY = b"std::bad_alloc"
-_UNEXPLAINED = re.compile("ended by SIG[A-Z0-9]+")
 #: A process that had this share of the threads it may have, and then failed, wanted more.
 NEARLY_ALL = 0.9
 #: The exit code of a program that Ctrl-C has ended, and the exceptions that ROS programs end with then.
@@ -57,8 +56,9 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
     hung = _HUNG.get(code) if isinstance(code, str) else None
     kind = FaultKind.SYNTAX_ERROR if code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
     text = hung or _own_words(data)
-    if kind is FaultKind.SYNTAX_ERROR:
-        text += f" (read by Python {sys.version_info[0]}.{sys.version_info[1]})"
+    python = sys.version_info[:2] if kind is FaultKind.SYNTAX_ERROR else None
+    if python is not None:
+        text += f" (read by Python {python[0]}.{python[1]})"
     behind = next((words for error, words in _errors(limits).items() if error in text), "")
     file, line = _place(data, places, kind)
     return Fault(
@@ -69,6 +69,7 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
         file=file,
         line=line,
         frames=_frames(data.get("frames"), places),
+        python=python,
     )
 
 
@@ -104,7 +105,18 @@ def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Lim
     if isinstance(report.get("fault"), dict):
         return reported_fault(process, t_ns, report["fault"], limits, places)
     code = report.get("code")
-    return Fault(t_ns, process, FaultKind.EXITED, f"exited with code {code if type(code) is int else '?'}")
+    return exited(process, t_ns, code if type(code) is int else None)
+
+
+def exited(process: str, t_ns: int, code: int | None) -> Fault:
+    """Return the fault of a process that ended by itself; the code is None if it is not known."""
+    text = f"exited with code {'?' if code is None else code}"
+    return Fault(t_ns, process, FaultKind.EXITED, text, exit_code=code)
+
+
+def ended_by(process: str, t_ns: int, signal: str) -> Fault:
+    """Return the fault of a process that a signal ended without a limit that explains it."""
+    return Fault(t_ns, process, FaultKind.KILLED, _by(signal), signal=signal)
 
 
 def ending(  # noqa: PLR0913 - each comes from another place
@@ -148,14 +160,8 @@ def never_stopped(process: str, t_ns: int, patience_ns: int) -> Fault:
     return Fault(t_ns, process, FaultKind.HUNG, f"did not end within {duration(patience_ns)} after Ctrl-C")
 
 
-def ended_by(signal: str) -> str:
-    """Return what a fault says where a signal ended a process, and no limit explains it."""
+def _by(signal: str) -> str:
     return f"ended by {signal}"
-
-
-def is_unexplained(fault: Fault) -> bool:
-    """Return whether a signal and no limit ended a process: its own doing, or a machine that was out of threads."""
-    return fault.kind is FaultKind.KILLED and _UNEXPLAINED.fullmatch(fault.text) is not None
 
 
 def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limits) -> str:
@@ -174,9 +180,9 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limi
     if signal == OUTGROWN.name:
         return f"stopped at {size(limits.scratch_bytes)} in one folder"
     if signal == "SIGABRT" and NO_MEMORY in last_words:
-        return f"{ended_by(signal)}: it found no more memory (the limit is {limits.memory_words()})"
+        return f"{_by(signal)}: it found no more memory (the limit is {limits.memory_words()})"
     if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:
-        return f"{ended_by(signal)} (the limit is {limits.processes_words()})"
+        return f"{_by(signal)} (the limit is {limits.processes_words()})"
     return ""
 
 

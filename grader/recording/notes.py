@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from grader.model.notes import main_not_called
 from grader.model.trace import Start, StartWay
 from grader.recording.places import Places
 
@@ -68,8 +69,7 @@ def _is_there(name: object, file: str, places: Places) -> bool:
 
 def _main_not_called(file: str, data: Mapping[str, Any], places: Places) -> str:
     del data, places
-    said = f"{file}: nothing calls main(), so `python3 {file}` would do nothing"
-    return f"{said}; add: if __name__ == '__main__': main()"
+    return main_not_called(file)
 
 
 def _class_not_started(file: str, data: Mapping[str, Any], places: Places) -> str:

@@ -27,7 +27,6 @@ from grader.model.quantities import MIB, NS_PER_S, size
 from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 from grader.recording.budget import RealTimeBudget
 from grader.recording.codec import trace_from_json
-from grader.recording.ending import is_unexplained
 from grader.recording.isolation.environment import worker_environment
 from grader.recording.isolation.exposure import worker_view
 from grader.recording.isolation.protocol import Isolation
@@ -259,7 +258,7 @@ class Recorder:
         """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
         progress(job.title)
         trace = self._recorded(job)
-        return self._recorded(job) if job.budget.left_ns and any(map(is_unexplained, trace.faults())) else trace
+        return self._recorded(job) if job.budget.left_ns and any(f.signal for f in trace.faults()) else trace
 
     def _recorded(self, job: Job) -> Trace:
         problem = ""

@@ -18,7 +18,7 @@ from typing import Any
 from grader.model.limits import Limits
 from grader.model.quantities import size
 from grader.model.trace import Fault, FaultKind, LogRecord, OutputLine, Start
-from grader.recording.ending import ended_by, limit_behind
+from grader.recording.ending import ended_by, exited, limit_behind
 from grader.recording.isolation.protocol import Command
 from grader.recording.notes import hidden_notes, note_of, start_of
 from grader.recording.places import Places
@@ -309,10 +309,10 @@ class Student:
         if not ended:
             return Fault(t_ns, self.name, FaultKind.KILLED, "stopped: it no longer answered the grader")
         if 0 <= code <= 128:
-            return Fault(t_ns, self.name, FaultKind.EXITED, f"exited with code {code}")
+            return exited(self.name, t_ns, code)
         name = _signal_name(-code if code < 0 else code - 128)
         behind = limit_behind(name, self._last, self.most_threads, self.limits)
-        return Fault(t_ns, self.name, FaultKind.KILLED, behind or ended_by(name))
+        return Fault(t_ns, self.name, FaultKind.KILLED, behind) if behind else ended_by(self.name, t_ns, name)
 
     def stop(self, why: str, family: Collection[int] = ()) -> None:
         """End the process at a limit, and what it started; may be called from another thread.

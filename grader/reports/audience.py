@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -10,14 +9,14 @@ from fractions import Fraction
 from grader.model.exercise import Location, Outcome
 from grader.model.feedback import DUE_DATE, OPEN, PUBLISHED, Shows, strictest
 from grader.model.figure import Chart, Excerpt, Figure
-from grader.model.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
+from grader.model.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.model.variant import variant_notes
 from grader.reports.readers import Readers
 from grader.reports.wording import points
 from grader.reports.wordless import without_numbers
 
 _WHEN = {DUE_DATE: " before the due date", PUBLISHED: " before grades are published"}
-_NEEDS = re.compile(r"(not judged: needs )(\S+) \(([a-z ]+)\)")
+_HIDDEN = "a criterion that is not shown"
 _OUTCOME_ONLY = "the reason is not shown"
 _LEFT_OUT = "pictures, the graph and whatever else would show more than the criteria do are left out"
 _CLOCK = "the reason is not shown"
@@ -92,23 +91,30 @@ def _exercise(exercise: ExerciseReport, day: str) -> ExerciseReport:
 def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
     """Return a verdict with as much as is shown of it; a criterion that is not shown has no name either."""
     if shown[verdict.id] is Shows.OUTCOME:
-        return replace(verdict, reason=_OUTCOME_ONLY, hint="", location=None, evidence={})
-    reason = _NEEDS.sub(lambda match: _needed(match, shown), verdict.reason)
+        return replace(
+            verdict, reason=_OUTCOME_ONLY, hint="", location=None, evidence={}, blocked_by="", same_cause_as=""
+        )
+    verdict = _without_hidden(verdict, shown)
     if shown[verdict.id] is Shows.ALL:
-        return replace(verdict, reason=reason)
+        return verdict
     # What is not judged has no numbers of its own, and the ids in it have to stay what they are.
-    said = reason if verdict.outcome is Outcome.BLOCKED else without_numbers(reason)
+    said = verdict.reason if verdict.outcome is Outcome.BLOCKED else without_numbers(verdict.reason)
     return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={})
+
+
+def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
+    """Return a verdict that names no criterion that is not shown; a missing file may be named."""
+    if shown.get(verdict.blocked_by) is Shows.NOTHING:
+        reason = verdict.reason if verdict.missing_file else f"{NOT_JUDGED}needs {_HIDDEN}"
+        verdict = replace(verdict, reason=reason, blocked_by="")
+    if shown.get(verdict.same_cause_as) is Shows.NOTHING:
+        verdict = replace(verdict, hint=f"this has the same cause as {_HIDDEN}", same_cause_as="")
+    return verdict
 
 
 def _hint(hint: str) -> str:
     """Return the parts of a hint that get along without numbers: most others would give the answer away."""
     return "; ".join(part for part in hint.split("; ") if without_numbers(part) == part)
-
-
-def _needed(match: re.Match[str], shown: Mapping[str, Shows]) -> str:
-    hidden = shown.get(match[2]) is Shows.NOTHING
-    return f"{match[1]}a criterion that is not shown" if hidden else match[0]
 
 
 def _said(text: str, worst: Shows, *, otherwise: str) -> str:

@@ -129,6 +129,7 @@ def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
 
 
 def _criterion(verdict: Verdict) -> dict[str, Any]:
+    links = {"blocked_by": verdict.blocked_by, "same_cause_as": verdict.same_cause_as}
     return {
         "id": verdict.id,
         "title": valid_unicode(verdict.title),
@@ -139,6 +140,7 @@ def _criterion(verdict: Verdict) -> dict[str, Any]:
         "hint": valid_unicode(verdict.hint) or None,
         "location": _location(verdict.location),
         "evidence": _plain(verdict.evidence),
+        **{name: id_ for name, id_ in links.items() if id_},
     }
 
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 from grader.model.containment import NO_WALLS, summarised
 from grader.model.exercise import Outcome, exercise_name
 from grader.model.quantities import seconds
-from grader.model.report import ExerciseReport, Report, ReportedFault, Verdict
+from grader.model.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
 from grader.model.trace import ClockKind
 from grader.reports.escape import shown
 from grader.reports.shell import quoted
@@ -84,7 +84,7 @@ def summary(report: Report) -> str:
 
 def reason(verdict: Verdict) -> str:
     """Return a verdict's reason; of a blocked one only what it needs. Not yet safe to show."""
-    return verdict.reason.removeprefix("not judged: ") if verdict.outcome is Outcome.BLOCKED else verdict.reason
+    return verdict.reason.removeprefix(NOT_JUDGED) if verdict.outcome is Outcome.BLOCKED else verdict.reason
 
 
 def explanation(verdict: Verdict) -> list[str]:

@@ -9,7 +9,9 @@ from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 from grader.model.exercise import Finding
+from grader.model.quantities import NS_PER_S
 from grader.model.trace import FaultKind
+from grader.recording.ending import exited
 from grader.testing import TraceBuilder, judge, met
 
 FLOAT = "std_msgs/msg/Float32"
@@ -69,6 +71,12 @@ class Gives:
         return self.finding
 
 
+def test_a_process_that_ends_by_itself_has_an_exit_code():
+    """As one of a recording has."""
+    (fault,) = pump().exited(5, 3).trace().faults()
+    assert fault == exited("pump.py", 5 * NS_PER_S, 3)
+
+
 @pytest.mark.parametrize(
     ("finding", "wrong"),
     [
@@ -78,6 +86,7 @@ class Gives:
         (Finding(Fraction(1), 5), "gave a reason, hint or location of another type"),
         (Finding(Fraction(1), "", {"x": {1, 2}}), "gave evidence that holds more than plain JSON values"),
         (Finding(Fraction(1), "", location=("pump.py", 3)), "gave a reason, hint or location of another type"),
+        (Finding(Fraction(0), "", problem="bursts"), "gave a problem of type str, expected a Problem"),
     ],
 )
 def test_a_finding_that_no_report_could_show_is_refused(finding, wrong):

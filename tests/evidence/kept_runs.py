@@ -81,7 +81,17 @@ OBSERVATIONS: Mapping[type, st.SearchStrategy[Any]] = {
         _several(st.builds(ServiceEnd, _TEXTS, _TEXTS, _TEXTS, _TEXTS)),
     ),
     Fault: st.builds(
-        Fault, _TIMES, _TEXTS, st.sampled_from(FaultKind), _TEXTS, _TEXTS, st.integers(0, 2**40), _several(_TEXTS)
+        Fault,
+        _TIMES,
+        _TEXTS,
+        st.sampled_from(FaultKind),
+        _TEXTS,
+        _TEXTS,
+        st.integers(0, 2**40),
+        _several(_TEXTS),
+        st.none() | st.integers(-(2**70), 2**70),
+        _TEXTS,
+        st.none() | st.tuples(st.integers(0, 9), st.integers(0, 99)),
     ),
     Offer: st.builds(Offer, _TIMES, _TEXTS, _TEXTS, _TEXTS, _TEXTS),
     Mark: st.builds(Mark, _TIMES, _TEXTS, _TEXTS),

@@ -78,10 +78,12 @@ def lost(given: ExerciseReport) -> list[Verdict]:
 
 def crashed(file: str, fault: Mapping[str, Any]) -> Recording:
     """A node that a fault ended at once."""
+    rec = Recording(10.0, process=file)
+    if "exit_code" in fault:
+        return rec.exited(0.1, fault["exit_code"])
     frames = tuple(f"{file}:{frame}" for frame in fault["frames"])
-    return Recording(10.0, process=file).fault(
-        0.1, FaultKind[fault["kind"]], fault["text"], fault["line"], frames=frames
-    )
+    python = tuple(fault["python"]) if "python" in fault else None
+    return rec.fault(0.1, FaultKind[fault["kind"]], fault["text"], fault["line"], frames=frames, python=python)
 
 
 def paced(rate: float) -> Recording:

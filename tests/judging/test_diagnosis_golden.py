@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,8 @@ from diagnosis_samples import (
     spoilt,
 )
 
-from grader.judging.diagnosis.diagnose import CAUSES
+from grader.judging import judge
+from grader.judging.diagnosis.diagnose import CAUSES, diagnose
 from grader.model.exercise import Outcome
 from grader.model.report import ExerciseReport, Verdict
 from grader.model.trace import Start, StartWay, Trace
@@ -88,10 +90,25 @@ def test_diagnosis_changes_neither_outcomes_nor_points_nor_reasons(row: Row) -> 
 def test_a_cause_is_explained_once(row: Row) -> None:
     """A second criterion with the same cause refers to the first."""
     traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
-    hints = [v.hint for v in lost(explained(row, traces))]
-    own = [h for h in hints if "the same cause as" not in h]
+    first, *others = lost(explained(row, traces))
+    own = [v.hint for v in (first, *others) if not v.same_cause_as]
     assert len(own) == len(set(own))
-    assert hints[0] in own
+    assert not first.same_cause_as
+    for verdict in others:
+        assert verdict.same_cause_as in verdict.hint
+
+
+@pytest.mark.parametrize("row", [*CRASHES, *BEHAVIOURS], ids=lambda r: r["name"])
+def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without any reason the hints and places are the same."""
+    traces = crash_traces(row) if "fault" in row else behaviour_traces(row)
+    known = [replace(v, reason="") for v in explained(row, traces).verdicts]
+
+    def without_reasons(verdicts: tuple[Verdict, ...], *others: Any) -> tuple[Verdict, ...]:
+        return diagnose(tuple(replace(v, reason="") for v in verdicts), *others)
+
+    monkeypatch.setattr(judge, "diagnose", without_reasons)
+    assert list(explained(row, traces).verdicts) == known
 
 
 def test_every_cause_is_in_a_table() -> None:

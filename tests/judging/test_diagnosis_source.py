@@ -10,7 +10,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from diagnosis_samples import RECORDINGS, RIGHT, line_of, lost, report, spoilt
+from diagnosis_samples import RECORDINGS, RIGHT, line_of, lost, report, silent, spoilt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,9 +58,9 @@ def wrong_traces() -> list[Trace]:
     ]
     for text in texts:
         frames = (f"{FILE}:1 in <module>", f"{FILE}:9 in __init__", f"{FILE}:15 in tick")
-        recordings.append(RECORDINGS["silent"][1](1.0).fault(0.5, FaultKind.EXCEPTION, text, 15, FILE, frames))
-    for kind, text in ((FaultKind.EXITED, "exited with code 0"), (FaultKind.HUNG, "did not return")):
-        recordings.append(RECORDINGS["silent"][1](1.0).fault(0.5, kind, text, 15, FILE, (f"{FILE}:15 in tick",)))
+        recordings.append(silent(1.0).fault(0.5, FaultKind.EXCEPTION, text, 15, FILE, frames))
+    stuck = (FaultKind.HUNG, "did not return", 15, FILE, (f"{FILE}:15 in tick",))
+    recordings += [silent(1.0).exited(0.5, process=FILE), silent(1.0).fault(0.5, *stuck)]
     return [rec.trace("alone") for rec in recordings]
 
 
@@ -168,7 +168,7 @@ def test_a_cause_that_fails_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_an_empty_file_is_called_empty() -> None:
     """Rather than one whose node does not spin."""
-    rec = RECORDINGS["silent"][1](1.0).fault(0.0, FaultKind.EXITED, "exited with code 0", 0, FILE)
+    rec = silent(1.0).exited(0.0, process=FILE)
     rec.items = rec.items[-1:]
     (verdict,) = lost(report(FILE, {"alone": rec.trace("alone")}, {FILE: "\n\n"}))
     assert (verdict.evidence["diagnosis"], verdict.hint) == (

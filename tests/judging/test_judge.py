@@ -113,6 +113,7 @@ def test_what_needs_an_unmet_criterion_is_blocked() -> None:
     assert [v.outcome.value for v in given.values()] == ["not_met", "partly", "blocked", "met", "blocked"]
     assert given["a"].reason == "not judged: needs bad (not met)"
     assert given["c"].reason == "not judged: needs a (not judged)"
+    assert [v.blocked_by for v in given.values()] == ["", "", "bad", "", "a"]
     assert given["a"].score == given["c"].score == 0
 
 
@@ -202,6 +203,7 @@ def test_a_missing_file_costs_one_line() -> None:
     assert first.reason == "velocity_publisher.py: not in the submission; found velocitypublisher.py instead"
     assert first.hint == "rename velocitypublisher.py to velocity_publisher.py"
     assert second.reason == third.reason == "not judged: needs velocity_publisher.py, which is missing"
+    assert [(v.blocked_by, v.missing_file) for v in report.verdicts] == [("", ""), ("a", FILE), ("a", FILE)]
     assert report.score == 0
 
 
@@ -266,8 +268,8 @@ def test_a_right_node_gets_everything() -> None:
 )
 def test_a_file_that_cannot_start_costs_one_line(kind: FaultKind, text: str, said: str) -> None:
     """One cause, one red line, with its place; the rest is blocked by it."""
-    rec = Recording(0.0, process=FILE).fault(0.0, kind, text, 12)
-    report = graded_1(rec)
+    code = 3 if kind is FaultKind.EXITED else None
+    report = graded_1(Recording(0.0, process=FILE).fault(0.0, kind, text, 12, exit_code=code))
     assert outcomes(report) == {
         "publishes_twist": "not_met",
         "rate": "blocked",

@@ -25,6 +25,7 @@ from grader.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.recording.ending import exited
 
 TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -81,12 +82,15 @@ class Recording:
         line: int = 0,
         process: str | None = None,
         frames: tuple[str, ...] = (),
+        **details: Any,
     ) -> Recording:
+        """Add a fault; details are those of `Fault`, such as `exit_code`."""
         who = process or self.process
-        return self.add(Fault(nanoseconds(t_s), who, kind, text, who if line else "", line, frames))
+        file = who if line else ""
+        return self.add(Fault(nanoseconds(t_s), who, kind, text, file, line, frames, **details))
 
     def exited(self, t_s: float, code: int = 0, process: str | None = None) -> Recording:
-        return self.fault(t_s, FaultKind.EXITED, f"exited with code {code}", process=process)
+        return self.add(exited(process or self.process, nanoseconds(t_s), code))
 
     def crashed(
         self, t_s: float, text: str = "ValueError: no", line: int = 12, process: str | None = None

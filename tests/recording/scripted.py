@@ -6,7 +6,8 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
-from grader.model.trace import Endpoint, Fault, FaultKind, GraphSnapshot, OutputLine
+from grader.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
+from grader.recording.ending import ended_by
 from grader.recording.observer import Taken
 from grader.recording.places import Places
 from grader.recording.plan import Plan, PlannedNumbers
@@ -203,7 +204,7 @@ class ScriptedStudent:
 
     def death(self, t_ns: int) -> Fault:
         """Return the fault of an end without a word."""
-        return Fault(t_ns, self.name, FaultKind.KILLED, "ended by SIGKILL")
+        return ended_by(self.name, t_ns, "SIGKILL")
 
 
 class ScriptedObserver:

@@ -32,6 +32,7 @@ from grader.model.trace import (
     Trace,
 )
 from grader.recording.codec import observation_to_json, trace_from_json, trace_to_json
+from grader.recording.evidence.packed import pack, unpack
 
 TIMES = st.integers(min_value=-(2**70), max_value=2**70)
 # Lone surrogates too: a student's bytes may be decoded to anything.
@@ -62,7 +63,17 @@ OBSERVATIONS = {
     Request: st.builds(Request, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),
     Response: st.builds(Response, TIMES, TEXTS, TEXTS, LINES, TEXTS, LINES, VALUES, st.binary(max_size=16)),
     Fault: st.builds(
-        Fault, TIMES, TEXTS, st.sampled_from(FaultKind), TEXTS, TEXTS, LINES, st.lists(TEXTS, max_size=3).map(tuple)
+        Fault,
+        TIMES,
+        TEXTS,
+        st.sampled_from(FaultKind),
+        TEXTS,
+        TEXTS,
+        LINES,
+        st.lists(TEXTS, max_size=3).map(tuple),
+        st.none() | TIMES,
+        TEXTS,
+        st.none() | st.tuples(LINES, LINES),
     ),
     Offer: st.builds(Offer, TIMES, TEXTS, TEXTS, TEXTS, TEXTS),
     Mark: st.builds(Mark, TIMES, TEXTS, TEXTS),
@@ -147,6 +158,31 @@ def test_a_trace_of_an_earlier_version_says_nothing_of_starts():
     assert trace_to_json(trace_from_json(earlier)) == earlier
 
 
+@pytest.mark.parametrize(
+    ("kind", "text", "details"),
+    [
+        (FaultKind.EXITED, "exited with code 0", (0, "", None)),
+        (FaultKind.EXITED, "exited with code -3", (-3, "", None)),
+        (FaultKind.EXITED, "exited with code ?", (None, "", None)),
+        (FaultKind.EXCEPTION, "ValueError: exited with code 0", (None, "", None)),
+        (FaultKind.KILLED, "ended by SIGSEGV", (None, "SIGSEGV", None)),
+        (FaultKind.KILLED, "ended by signal 72", (None, "signal 72", None)),
+        (FaultKind.KILLED, "ended by SIGABRT (the limit is 50 processes and threads)", (None, "", None)),
+        (FaultKind.KILLED, "stopped at 512 MiB of memory", (None, "", None)),
+        (FaultKind.SYNTAX_ERROR, "SyntaxError: no (read by Python 3.11)", (None, "", (3, 11))),
+        (FaultKind.SYNTAX_ERROR, "SyntaxError: no", (None, "", None)),
+    ],
+)
+def test_a_fault_of_an_earlier_version_has_its_details_in_its_text(kind, text, details):
+    """They are read from it; where a recording has them itself, its text is not asked."""
+    trace = Trace("alone", ClockKind.VIRTUAL, 10, (Fault(1, "a.py", kind, text),))
+    now = trace_to_json(trace)
+    earlier = {**now, "observations": [row[:-1] for row in now["observations"]]}
+    expected = Fault(1, "a.py", kind, text, "", 0, (), *details)
+    assert trace_from_json(earlier).faults() == unpack(json.dumps(earlier).encode()).faults() == (expected,)
+    assert trace_from_json(now).faults() == unpack(pack(trace, [False])).faults() == trace.faults()
+
+
 WRONG = (None, True, 1, 1.5, "x", [], {}, [["x"]], {"x": 1}, "\ud800")
 
 
@@ -214,6 +250,10 @@ def assert_types(trace):
         (("observations", 4, 3), ["abcdefgh"]),
         (("observations", 5, 3), "surprise"),
         (("observations", 5, 7), "abc"),
+        (("observations", 5, 8), None),
+        (("observations", 5, 8), [None, ""]),
+        (("observations", 5, 8), [0.5, "", None]),
+        (("observations", 5, 8), [None, "", [3]]),
         (("observations", 8, 4), "abc"),
         (("observations", 8, 4, 0), ["client", "/s", "t"]),
         (("observations", 9, 4), 1.0),

@@ -1,6 +1,7 @@
 """Reports of a made-up class: what students of this chapter get wrong, in shares as a course has them."""
 
 import random
+from dataclasses import replace
 from fractions import Fraction
 
 from report_samples import exercise as sample
@@ -97,16 +98,16 @@ def _verdict(criterion, before, draw, missing):
         return _lost(criterion, reason, hint, {"missing": missing, "similar": []})
     if missing:
         return Verdict(criterion.id, criterion.title, Outcome.BLOCKED, Fraction(0), points,
-                       f"not judged: needs {missing}, which is missing")  # fmt: skip
+                       f"not judged: needs {missing}, which is missing",
+                       blocked_by=next(iter(before)), missing_file=missing)  # fmt: skip
     needed = next((n for n in criterion.needs if before[n].outcome in (Outcome.NOT_MET, Outcome.BLOCKED)), "")
     if needed:
         return Verdict(criterion.id, criterion.title, Outcome.BLOCKED, Fraction(0), points,
-                       f"not judged: needs {needed} (not met)")  # fmt: skip
+                       f"not judged: needs {needed} (not met)", blocked_by=needed)  # fmt: skip
     owner = next((o for o in FOLLOWS.get(criterion.id, ()) if before[o].outcome is Outcome.NOT_MET), "")
     if owner:
-        return _lost(
-            criterion, "t = 0.2 s, /fan_speed: 0 for 26 °C", f"this has the same cause as {owner}: mend that first", {}
-        )
+        hint = f"this has the same cause as {owner}: mend that first"
+        return replace(_lost(criterion, "t = 0.2 s, /fan_speed: 0 for 26 °C", hint, {}), same_cause_as=owner)
     for percent, cause, reason, hint in MISTAKES.get(criterion.id, ()):
         if draw.random() * 100 < percent:
             values = {

@@ -180,9 +180,9 @@ def middling() -> Report:
                 reason="/odom: no subscription; the nearest is /odometry",
                 hint="subscribe to /odom",
             ),
-            criterion("logs_position", "Logs the position", 10, Outcome.BLOCKED, reason=_needs("subscribes_odom")),
-            criterion("log_period", "Logs once a second", 6, Outcome.BLOCKED, reason=_needs("subscribes_odom")),
-            criterion("waits_gracefully", "Waits for data", 8, Outcome.BLOCKED, reason=_needs("subscribes_odom")),
+            criterion("logs_position", "Logs the position", 10, Outcome.BLOCKED, **_needs("subscribes_odom")),
+            criterion("log_period", "Logs once a second", 6, Outcome.BLOCKED, **_needs("subscribes_odom")),
+            criterion("waits_gracefully", "Waits for data", 8, Outcome.BLOCKED, **_needs("subscribes_odom")),
             clock=ClockKind.WALL,
             clock_reason="odom_subscriber.py spins in a thread that did not settle",
         ),
@@ -221,9 +221,9 @@ def crashed() -> Report:
                 hint="create the publisher before the timer that uses it",
                 location=Location("velocity_publisher.py", 14),
             ),
-            criterion("rate", "Publishes at 20 Hz", 10, Outcome.BLOCKED, reason=needs),
-            criterion("linear_velocity", "Drives forward at 0.5 m/s", 5, Outcome.BLOCKED, reason=needs),
-            criterion("angular_velocity", "Turns at 0.1 rad/s", 5, Outcome.BLOCKED, reason=needs),
+            criterion("rate", "Publishes at 20 Hz", 10, Outcome.BLOCKED, **needs),
+            criterion("linear_velocity", "Drives forward at 0.5 m/s", 5, Outcome.BLOCKED, **needs),
+            criterion("angular_velocity", "Turns at 0.1 rad/s", 5, Outcome.BLOCKED, **needs),
             criterion("logging", "Logs through the node's logger", 4),
             faults=(fault,),
         )
@@ -302,8 +302,8 @@ def hostile() -> Report:
     )
 
 
-def _needs(id_: str) -> str:
-    return f"not judged: needs {id_} (not met)"
+def _needs(id_: str) -> dict[str, str]:
+    return {"reason": f"not judged: needs {id_} (not met)", "blocked_by": id_}
 
 
 SAMPLES = {

@@ -4,7 +4,6 @@ from fractions import Fraction
 
 import pytest
 
-from grader.judging.diagnosis.diagnose import _same_as
 from grader.reports.class_page.causes import causes
 from grader.reports.class_page.kinds import kind_of, skeleton
 
@@ -13,6 +12,11 @@ def criterion(id_="rate", outcome="not_met", points=10, score=0, **changes):
     """Return a criterion as a report has it."""
     values = {"id": id_, "title": id_.title(), "outcome": outcome, "score": score, "max_score": points}
     return {**values, "reason": "slow", "hint": None, "location": None, "evidence": {}, **changes}
+
+
+def same_as(id_):
+    """Return the hint of a criterion that has the same cause as another."""
+    return f"this has the same cause as {id_}: mend that first"
 
 
 def report(*criteria, id_="velocity_publisher"):
@@ -142,6 +146,17 @@ def test_what_is_blocked_counts_with_what_blocks_it():
     assert (cause.criterion, cause.students, cause.points) == ("publishes", (0,), 20)
 
 
+def test_a_link_of_its_own_goes_before_the_words():
+    """Reports of earlier versions have the words alone."""
+    root, other = criterion("publishes", points=6), criterion("linear", points=5)
+    waits = criterion("rate", "blocked", reason="not judged: needs linear (not met)", blocked_by="publishes")
+    last = criterion("angular", hint=same_as("linear"), same_cause_as="publishes")
+    assert {c.criterion: c.points for c in causes([(0, report(root, other, waits, last))])} == {
+        "publishes": 26,
+        "linear": 5,
+    }
+
+
 def test_what_waits_for_a_missing_file_counts_with_it():
     """The criterion that names the file is found by it."""
     root = criterion("publishes", points=6, evidence={"missing": "a.py", "similar": []})
@@ -153,7 +168,7 @@ def test_what_waits_for_a_missing_file_counts_with_it():
 def test_the_same_cause_in_two_criteria_is_one():
     """The diagnosis says so in the very words that are looked for."""
     root = criterion("linear", evidence={"diagnosis": "exchanged"})
-    other = criterion("angular", hint=_same_as("linear"), evidence={"diagnosis": "exchanged"})
+    other = criterion("angular", hint=same_as("linear"), evidence={"diagnosis": "exchanged"})
     (cause,) = causes([(0, report(root, other))])
     assert (cause.criterion, cause.points) == ("linear", 20)
 
@@ -169,8 +184,8 @@ def test_a_cause_that_leads_nowhere_stands_for_itself(hint):
 
 def test_two_that_name_each_other_come_to_an_end():
     """Evidence of somebody else's making may go round in circles."""
-    one = criterion("a", hint=_same_as("b"))
-    other = criterion("b", hint=_same_as("a"))
+    one = criterion("a", hint=same_as("b"))
+    other = criterion("b", hint=same_as("a"))
     assert sum(c.points for c in causes([(0, report(one, other))])) == 20
 
 

@@ -40,6 +40,7 @@ def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
     graph = GraphSnapshot(0, (f"/{SECRET}", "/b"), (endpoint("publisher", f"/{SECRET}_{NUMBER}", f"/{SECRET}"),))
     words = f"/flow: average rate: {NUMBER}.25 Hz, expected {NUMBER} ± 1 Hz over 0.0 to {NUMBER} s"
     secret_id = f"{SECRET}_id" if shown is Shows.NOTHING else "closed"
+    needs = {"reason": f"not judged: needs {secret_id} (not met)", "blocked_by": secret_id}
     told_all = {
         "reason": f"{SECRET}: {NUMBER} Hz",
         "hint": f"{SECRET} {NUMBER}",
@@ -64,7 +65,7 @@ def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
                 evidence={"rate_hz": 7357.25},
             ),
             criterion(secret_id, title, 20, Outcome.NOT_MET, **told_all),
-            criterion("needs", "Needs it", 4, Outcome.BLOCKED, reason=f"not judged: needs {secret_id} (not met)"),
+            criterion("needs", "Needs it", 4, Outcome.BLOCKED, **needs),
             faults=(fault("alone", 3), fault("numbers", 4), fault("nobody", 5)),
             notes=(f"{SECRET}: {NUMBER} messages",),
             clock=clock,
@@ -156,7 +157,30 @@ def test_a_criterion_that_is_not_shown_counts_in_no_sum():
     assert (whole.max_score, seen.max_score) == (40, 20)
     assert [v.id for v in seen.exercises[0].verdicts] == ["open", "numbers", "needs"]
     assert seen.exercises[0].notes[0] == "1 criterion with 20 points is not shown until 2026-12-01 has passed"
-    assert seen.exercises[0].verdicts[2].reason == "not judged: needs a criterion that is not shown"
+    waits = seen.exercises[0].verdicts[2]
+    assert (waits.reason, waits.blocked_by) == ("not judged: needs a criterion that is not shown", "")
+
+
+@pytest.mark.parametrize("shown", [Shows.ALL, Shows.WITHOUT_NUMBERS])
+def test_a_criterion_that_is_not_shown_has_no_name_in_another(shown):
+    """Neither where it explains a cause, nor where it names a file that both miss; the file may be named."""
+    same = {"hint": f"this has the same cause as {SECRET}: mend that first", "same_cause_as": SECRET}
+    missing = {"reason": "not judged: needs a.py, which is missing", "blocked_by": SECRET, "missing_file": "a.py"}
+    whole = report(
+        exercise(
+            "pump",
+            "1",
+            "Pump",
+            criterion(SECRET, "Closed", 4, Outcome.NOT_MET, reason="no"),
+            criterion("same", "Same", 4, Outcome.NOT_MET, reason="no", **same),
+            criterion("missing", "Missing", 4, Outcome.BLOCKED, **missing),
+            feedback={SECRET: Feedback(Shows.NOTHING), "same": Feedback(shown), "missing": Feedback(shown)},
+        )
+    )
+    seen = for_student(whole, BEFORE).exercises[0].verdicts
+    assert SECRET not in repr(seen)
+    assert seen[0].hint == "this has the same cause as a criterion that is not shown"
+    assert seen[1].reason == missing["reason"]
 
 
 def test_an_outcome_alone_has_its_points():

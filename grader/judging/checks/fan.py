@@ -23,6 +23,7 @@ from grader.judging.values import (
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import NS_PER_MS, seconds, within
 from grader.model.trace import ClockKind, Trace
 
@@ -83,7 +84,8 @@ class ThresholdResponse:
         answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
-            return self._once(not_met(f"{self.output}: {quote(type_)} carries no number", {"type": type_}))
+            reason, problem = f"{self.output}: {quote(type_)} carries no number", Problem(ProblemKind.NO_NUMBER)
+            return self._once(not_met(reason, {"type": type_}, problem=problem))
         grace_ns = _grace(answers)
         prompt = answers if _answers_at_once(trace, self.input, answers) else ()
         found = [self._violation(h, every, trace, grace_ns) or self._behind(h, prompt) for h in mine]

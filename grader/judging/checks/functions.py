@@ -15,6 +15,7 @@ from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
 from grader.model.exercise import Finding
 from grader.model.names import Formula
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import SLACK, seconds, within
 from grader.model.trace import Message, Trace
 
@@ -114,4 +115,5 @@ class FieldFunction:
         reason += f"wrong in {len(wrong)} of {counted(len(samples), 'message')}"
         instead = followed_instead(wanted, samples, self.tolerance)
         reason += f"; {instead.said}" if instead.said else ""
-        return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, hint=instead.hint)
+        problem = Problem(ProblemKind.COUNT_START, start=instead.start) if instead.start is not None else None
+        return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, hint=instead.hint, problem=problem)

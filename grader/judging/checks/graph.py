@@ -9,6 +9,7 @@ from grader.judging.findings import met, not_met
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import fault_sentence, moment, quote
 from grader.model.exercise import Finding
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import seconds
 from grader.model.trace import Endpoint, GraphSnapshot, Trace
 
@@ -61,10 +62,11 @@ class BidirectionalGraph:
             reason = (
                 f"{self.forward} and {self.back}: both have an edge, but not between the same two processes at once"
             )
-            return not_met(reason, evidence)
+            return not_met(reason, evidence, problem=Problem(ProblemKind.NO_EDGE, (self.forward, self.back)))
         reason = "; ".join(_gap(topic, endpoints) for topic in broken)
         reason += "; only one direction" if len(broken) == 1 else ""
-        return not_met(reason, evidence, hint=_hint(broken[0], endpoints))
+        problem = Problem(ProblemKind.NO_EDGE, tuple(broken))
+        return not_met(reason, evidence, hint=_hint(broken[0], endpoints), problem=problem)
 
 
 def _edges(snapshot: GraphSnapshot, topic: str) -> list[Pair]:

@@ -18,6 +18,7 @@ from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding, Location
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import DurationNs, seconds, within
 from grader.model.trace import Fault, LogRecord, Trace
 
@@ -161,7 +162,7 @@ class LogPeriod:
             return not_met(only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process))
         average = f"{self.process}: {len(times)} logs, one every {average_ns / 1e9:.3f} s on average"
         if not within(average_ns, self.period, self.tolerance * self.period):
-            return not_met(self._too_many(track, times, average, wanted), evidence, hint=_TIMER_HINT)
+            return self._off(track, times, f"{average}; {wanted}", wanted, evidence)
         gap = self._long_gap(track, times)
         if gap is None:
             return met(f"{average}; {wanted}", evidence)
@@ -171,12 +172,14 @@ class LogPeriod:
             f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}", evidence, fault=fault
         )
 
-    def _too_many(self, track: Track, times: Sequence[int], average: str, wanted: str) -> str:
+    def _off(self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, Any]) -> Finding:
+        """Return that the average is wrong, which `reason` says, or that each message is logged."""
         played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
         if len(times) < _ONE_A_MESSAGE * played:
-            return f"{average}; {wanted}"
+            return not_met(reason, evidence, hint=_TIMER_HINT)
         rate = len(times) / seconds(track.stop_ns - track.start_ns)
-        return f"{self.process}: {rate:.0f} logs a second: one for every message; {wanted}"
+        each = f"{self.process}: {rate:.0f} logs a second: one for every message; {wanted}"
+        return not_met(each, evidence, hint=_TIMER_HINT, problem=Problem(ProblemKind.ONE_PER_MESSAGE))
 
     def _long_gap(self, track: Track, times: Sequence[int]) -> tuple[int, int] | None:
         ends = [track.start_ns, *times, track.stop_ns]
@@ -238,7 +241,7 @@ class WaitsGracefully:
         early = not deliveries or fault.t_ns < deliveries[0].t_ns
         when = f"while nothing was published on {self.topic}" if early else f"after messages came on {self.topic}"
         hint = fault_hint(fault)
-        if "NoneType" in fault.text:
+        if fault.said("NoneType"):
             hint = "start with None and return early as long as no message has come"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
 

@@ -11,6 +11,7 @@ from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
 from grader.model.exercise import Finding
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 
@@ -136,12 +137,14 @@ class TopicRate:
         seen = f"{self.topic}: {found.sentence()}"
         if not found.steady:
             hint = f"publish one message every {self._period_text()} rather than several at once"
-            return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint)
+            problem = Problem(ProblemKind.BURSTS)
+            return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint, problem=problem)
         silence = found.stop_ns - last
         if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
             ended, fault = _ending(trace, first, last)
             hint = fault_hint(fault) if fault else ""
-            return not_met(f"{seen}; {ended}; {self._wanted}", evidence, hint=hint, fault=fault)
+            reason, problem = f"{seen}; {ended}; {self._wanted}", Problem(ProblemKind.STOPPED)
+            return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
         if (
             self.window is not None
             and found.stop_ns - first < self.window - self._period_ns - _END_SLACK_NS[trace.clock]

@@ -25,6 +25,7 @@ from grader.judging.values import Held, Reading, carries_number, held, published
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
 from grader.model.errors import HarnessError
 from grader.model.exercise import Finding
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.model.trace import Endpoint, Trace
 
@@ -102,12 +103,14 @@ class RandomInRange:
                 f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{unit_of(self.topic)}) cannot show chance"
             )
             return not_met(reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate")
+        problem = None
         if pattern == "constant":
             shown = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
+            problem = Problem(ProblemKind.CONSTANT)
         else:
             shown = f"{pattern} ({numbers(got[:5])}, ...)"
         reason = f"{self.topic}: the values are not random but {shown}"
-        return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint)
+        return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint, problem=problem)
 
     def _drawn(self, values: Sequence[Reading]) -> Finding:
         got = [r.value for r in values]

@@ -6,16 +6,17 @@ import statistics
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-from grader.judging.findings import met, not_met
+from grader.judging.findings import FAULT_KEY, met, not_met
 from grader.judging.lateness import steps_behind
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
 from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
 from grader.model.exercise import Finding
+from grader.model.problem import Problem, ProblemKind
 from grader.model.quantities import NS_PER_MS, seconds, within
 from grader.model.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
 
@@ -73,7 +74,8 @@ class AnswersTogether:
             if not messages:
                 return self._silent(trace, topic)
             if len(published_numbers(trace, topic)) < len(messages):
-                return not_met(f"{topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+                type_, problem = messages[0].type, Problem(ProblemKind.NO_NUMBER, (topic,))
+                return not_met(f"{topic}: {quote(type_)} carries no number", {"type": type_}, problem=problem)
         inputs = published_numbers(trace, self.input)
         answers = last_of_instant(published_numbers(trace, self.output))
         evidence = self._evidence(inputs, answers)
@@ -90,6 +92,10 @@ class AnswersTogether:
     def _expected(self, value: float) -> float:
         return self.above if value > self.threshold else self.otherwise
 
+    @property
+    def _wrong(self) -> Problem:
+        return Problem(ProblemKind.WRONG_ANSWER, (self.input, self.output))
+
     def _evidence(self, inputs: Sequence[Reading], answers: Sequence[Reading]) -> dict[str, Any]:
         changes = sum(a.value != b.value for a, b in pairwise(answers))
         return {
@@ -104,7 +110,10 @@ class AnswersTogether:
         apart = _kept_apart(trace, self.input) if topic == self.output else None
         if apart is not None and first_fault(trace) is None:
             return apart
-        return explain_no_message(trace, topic)
+        found = explain_no_message(trace, topic)
+        if FAULT_KEY in found.evidence:
+            return found
+        return replace(found, problem=Problem(ProblemKind.NO_MESSAGE, (topic,)))
 
     def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
         """Return that different answers come at one instant where no input of the moment explains both."""
@@ -120,7 +129,8 @@ class AnswersTogether:
             said = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
             said += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(said, evidence | {"first_wrong_s": seconds(one.t_ns)}, hint=hint)
+            known = evidence | {"first_wrong_s": seconds(one.t_ns)}
+            return not_met(said, known, hint=hint, problem=self._wrong)
         return None
 
     def _wrong_answer(
@@ -147,9 +157,10 @@ class AnswersTogether:
         """Return that an answer is wrong, and how far behind the answers are if that explains them all."""
         behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), _EXACT))
         if not behind:
-            return not_met(reason, evidence)
+            return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers are right for what came {counted(behind, 'message')} before"
-        return not_met(reason, evidence | {"behind": behind}, hint=f"answer what has just come on {self.input}")
+        hint = f"answer what has just come on {self.input}"
+        return not_met(reason, evidence | {"behind": behind}, hint=hint, problem=self._wrong)
 
     def _inconsistent(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
@@ -203,22 +214,24 @@ class AnswersTogether:
     def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, Any]) -> Finding:
         fault = next((f for f in trace.faults() if f.t_ns <= trace.stop_ns), None)
         reason = f"{topic}: nothing after {moment(last_ns)}, expected to go on to {span(trace.stop_ns)}"
-        known = evidence | {"last_s": seconds(last_ns)}
+        known, problem = evidence | {"last_s": seconds(last_ns)}, Problem(ProblemKind.STOPPED, (topic,))
         if fault is None:
-            return not_met(reason, known)
-        return not_met(f"{reason}; {fault_sentence(fault)}", known, hint=fault_hint(fault), fault=fault)
+            return not_met(reason, known, problem=problem)
+        reason += f"; {fault_sentence(fault)}"
+        return not_met(reason, known, hint=fault_hint(fault), fault=fault, problem=problem)
 
     def _one_sided(
         self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
         expected = [self._expected(r.value) for r in inputs]
+        fixed = Problem(ProblemKind.NEVER_CHANGES, (self.input, self.output))
         if len({r.value for r in inputs}) == 1:
             reason = f"{self.output}: never changes, because {self.input} is {number(inputs[0].value)}"
-            return not_met(f"{reason}{unit_of(self.input)} all the time", evidence)
+            return not_met(f"{reason}{unit_of(self.input)} all the time", evidence, problem=fixed)
         if len(set(expected)) == 1 and _stays(inputs):
             low, high = min(r.value for r in inputs), max(r.value for r in inputs)
             reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
-            return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence)
+            return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence, problem=fixed)
         # a timer of 1 s may miss what is rare; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w, count in Counter(expected).items() if count > often}
@@ -227,7 +240,7 @@ class AnswersTogether:
         if not lacking:
             return None
         reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
-        return not_met(f"{reason}{number(self.threshold)}{unit_of(self.input)}", evidence)
+        return not_met(f"{reason}{number(self.threshold)}{unit_of(self.input)}", evidence, problem=self._wrong)
 
     def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]) -> Finding:
         reason = (
@@ -276,14 +289,16 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
         return None
     here, there = (alike or pairs)[0]
     evidence = {"publisher": [here.node, here.type], "subscription": [there.node, there.type]}
+    problem = Problem(ProblemKind.KEPT_APART, (topic,))
     one, other = _speakers(trace, here, there)
     policy = _incompatible(here, there)
     if not alike or policy is None:
         said = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
-        return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint)
+        return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
     said = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
-    return not_met(f"{topic}: {said}: they cannot talk", evidence, hint="pass the queue depth 10 as QoS on both sides")
+    hint = "pass the queue depth 10 as QoS on both sides"
+    return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
 
 
 def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:

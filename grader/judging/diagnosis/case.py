@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from grader.judging.source import Source, first_line
 from grader.model.exercise import Check, Criterion, Location
+from grader.model.problem import ProblemKind
 from grader.model.report import Verdict
 from grader.model.trace import Fault, FaultKind, Trace
 
@@ -70,10 +71,19 @@ class Case:
             return None
         return (self.fault, self.source) if self.fault.file in ("", self.source.file) else None
 
+    def is_about(self, kind: ProblemKind) -> bool:
+        """Return whether the check found a problem of a kind."""
+        return self.verdict.problem is not None and self.verdict.problem.kind is kind
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics that the problem is about."""
+        return self.verdict.problem.topics if self.verdict.problem is not None else ()
+
     def said(self, pattern: str) -> re.Match[str] | None:
         """Return how an exception's text matches a pattern."""
-        exception = self.fault is not None and self.fault.kind is FaultKind.EXCEPTION
-        return re.search(pattern, self.fault.text) if exception and self.fault is not None else None
+        fault = self.fault
+        return fault.said(pattern) if fault is not None and fault.kind is FaultKind.EXCEPTION else None
 
     def evidence(self, key: str) -> object:
         """Return a piece of the verdict's evidence, None if there is none of that name."""

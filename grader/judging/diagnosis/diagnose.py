@@ -32,6 +32,7 @@ from grader.judging.diagnosis.waiting import WAITING
 from grader.judging.findings import FAULT_KEY
 from grader.judging.source import Source, read
 from grader.model.exercise import Check, Criterion, Exercise, Outcome
+from grader.model.problem import ProblemKind
 from grader.model.report import Verdict
 from grader.model.submission import Submission
 from grader.model.trace import Fault, Trace
@@ -121,13 +122,13 @@ class _Said:
         if verdict.outcome is Outcome.NOT_MET:
             self.lost[criterion.id] = criterion.check
         if found is None:
-            return replace(verdict, hint=_same_as(earlier)) if earlier else verdict
+            return _same_as(earlier, verdict) if earlier else verdict
         id_, clue = found
         key = clue.key or f"{id_}:{clue.location}"
         earlier = self.owner.setdefault(key, criterion.id)
-        hint = clue.hint if earlier == criterion.id else _same_as(earlier)
         evidence = {**verdict.evidence, CAUSE_KEY: id_}
-        return replace(verdict, hint=hint, location=clue.location or verdict.location, evidence=evidence)
+        placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
+        return placed if earlier == criterion.id else _same_as(earlier, placed)
 
     def _case(self, verdict: Verdict, criterion: Criterion, trace: Trace, sources: Mapping[str, Source]) -> Case:
         scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
@@ -137,23 +138,25 @@ class _Said:
 
     def _follows(self, check: Check, verdict: Verdict) -> str:
         """Return the criterion whose loss explains that two nodes do not work together; empty if none surely does."""
-        if not isinstance(check, AnswersTogether):
+        problem = verdict.problem
+        if not isinstance(check, AnswersTogether) or problem is None:
             return ""
-        reason = verdict.reason
-        fixed = "never changes, because" in reason
-        stopped = reason.startswith(f"{check.input}: nothing ")
-        answered = " for " in reason or "answers fit" in reason or reason.startswith(f"{check.output}: n")
+        quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
+        fixed = problem.kind is ProblemKind.NEVER_CHANGES
+        stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
+        answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
         for id_, other in self.lost.items():
             controller = isinstance(other, ThresholdResponse) and other.output == check.output
             sensor = isinstance(other, RandomInRange) and other.topic == check.input
             pace = isinstance(other, TopicRate) and other.topic == check.input
-            if (controller and answered and not fixed) or (sensor and fixed) or (pace and stopped):
+            if (controller and answered) or (sensor and fixed) or (pace and stopped):
                 return id_
         return ""
 
 
-def _same_as(criterion: str) -> str:
-    return f"this has the same cause as {criterion}: mend that first"
+def _same_as(criterion: str, verdict: Verdict) -> Verdict:
+    hint = f"this has the same cause as {criterion}: mend that first"
+    return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
 def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:

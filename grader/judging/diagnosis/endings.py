@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 
 from grader.judging.diagnosis.case import Case, Cause, Clue, frames
 from grader.judging.diagnosis.wiring import made, reached
@@ -68,7 +67,7 @@ def _empty_file(case: Case) -> Clue | None:
 
 def _left_by_arguments(case: Case) -> Clue | None:
     found = _of_kind(case, FaultKind.EXITED)
-    if found is None or "code 2" not in found[0].text:
+    if found is None or found[0].exit_code != 2:
         return None
     _, source = found
     for call in source.calls("add_argument"):
@@ -96,8 +95,7 @@ def _left_by_exit(case: Case) -> Clue | None:
     if test:
         hint = f"the file is run without arguments, so '{test}' is true: give the values defaults"
         return Clue(hint, source.place(leaving))
-    code = re.search(r"code (\d+)", fault.text)
-    if code is None or code[1] != _exit_code(leaving):
+    if str(fault.exit_code) != _exit_code(leaving):
         return None
     hint = f"{source.code(leaving, 40)} ends the program: the node must run until it is stopped"
     return Clue(hint, source.place(leaving))
@@ -145,7 +143,7 @@ def _shut_down_in_callback(case: Case) -> Clue | None:
 def _no_spin(case: Case) -> Clue | None:
     """The node is made, and the program ends."""
     found = _of_kind(case, FaultKind.EXITED)
-    if found is None or "code 0" not in found[0].text:
+    if found is None or found[0].exit_code != 0:
         return None
     _, source = found
     node = node_made(source)
@@ -173,7 +171,7 @@ def _publishes(source: Source, loop: ast.AST) -> bool:
 
 def _spins_once(case: Case) -> Clue | None:
     found = _of_kind(case, FaultKind.EXITED)
-    if found is None or "code 0" not in found[0].text:
+    if found is None or found[0].exit_code != 0:
         return None
     _, source = found
     named = spins(source)
@@ -193,7 +191,7 @@ def _gave_up(case: Case) -> Clue | None:
     """A return that leaves main before the node is spun."""
     found = _of_kind(case, FaultKind.EXITED)
     last = list(found[1].calls("spin"))[-1:] if found is not None else []
-    if found is None or not last or "code 0" not in found[0].text:
+    if found is None or not last or found[0].exit_code != 0:
         return None
     source = found[1]
     leaving = [r for r in source.all(ast.Return) if source.function_of(r) is source.function_of(last[0])]

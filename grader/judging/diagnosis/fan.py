@@ -16,6 +16,7 @@ from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for,
 from grader.judging.source import Source, chain, last_name, subtree
 from grader.judging.values import published, published_numbers
 from grader.judging.wording import number
+from grader.model.problem import ProblemKind
 from grader.model.quantities import within
 
 _EXACT = 1e-6
@@ -37,7 +38,7 @@ def _controller(case: Case) -> tuple[Source, ThresholdResponse | AnswersTogether
     check = case.criterion.check
     if not isinstance(check, (ThresholdResponse, AnswersTogether)) or case.fault is not None or silent_topic(case):
         return None
-    if isinstance(check, AnswersTogether) and "never changes, because" in case.verdict.reason:
+    if case.is_about(ProblemKind.NEVER_CHANGES):
         return None
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.output) is not None]
     return (owners[0], check) if len(owners) == 1 else None
@@ -305,7 +306,7 @@ def _asks_none(test: ast.expr, name: str) -> bool:
 def _no_number(case: Case) -> Clue | None:
     """Answers in a type that carries no number."""
     found = _controller(case)
-    if found is None or "carries no number" not in case.verdict.reason:
+    if found is None or not case.is_about(ProblemKind.NO_NUMBER):
         return None
     source, check = found
     item = made_for(source, "publisher", check.output)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator
 
 from grader.judging.checks.functions import FieldFunction
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.fields import given_leaf
 from grader.judging.source import Source, chain, first_line
-
-_START = re.compile(r"a count that starts at (-?\d+)")
 
 
 def _asked(case: Case) -> tuple[Source, FieldFunction] | None:
@@ -69,18 +66,19 @@ def _stuck(case: Case) -> Clue | None:
 def _wrong_start(case: Case) -> Clue | None:
     """The count starts at another number than 0, or is raised before it is used."""
     found = _asked(case)
-    start = _START.search(case.verdict.reason)
-    if found is None or start is None:
+    problem = case.verdict.problem
+    if found is None or problem is None or problem.start is None:
         return None
+    start = str(problem.start)
     source, check = found
     for counter in _counters(source, check.field.rpartition(".")[2]):
         for store in source.stores(counter):
             statement = source.parents.get(store)
             value = getattr(statement, "value", None)
-            if isinstance(statement, ast.Assign) and isinstance(value, ast.Constant) and str(value.value) == start[1]:
-                hint = f"{source.code(statement)} starts the count at {start[1]}: the first message is n = 0"
+            if isinstance(statement, ast.Assign) and isinstance(value, ast.Constant) and str(value.value) == start:
+                hint = f"{source.code(statement)} starts the count at {start}: the first message is n = 0"
                 return Clue(hint, source.place(statement))
-            if isinstance(statement, ast.AugAssign) and start[1] == "1" and _used_later(source, statement, counter):
+            if isinstance(statement, ast.AugAssign) and start == "1" and _used_later(source, statement, counter):
                 hint = f"{source.code(statement)} comes before the value is computed: count after it"
                 return Clue(hint, source.place(statement))
     return None

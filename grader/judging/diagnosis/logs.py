@@ -17,6 +17,7 @@ from grader.judging.output import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
 from grader.model.exercise import Location, Outcome
+from grader.model.problem import ProblemKind
 from grader.model.quantities import seconds
 
 _COMMENTED_LOG = re.compile(r"^\s*#.*get_logger\(\)\.(info|warn|warning|error)\s*\(")
@@ -147,7 +148,7 @@ def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -
     if counted_by is not None:
         hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of {wanted_s} s"
         return Clue(hint, source.place(counted_by), key="log_pace")
-    if "one for every message" not in case.verdict.reason:
+    if not case.is_about(ProblemKind.ONE_PER_MESSAGE):
         return None
     hint = f"this logs every message: give it throttle_duration_sec={wanted_s}, or log from a timer"
     return Clue(hint, source.place(call), key="log_pace")

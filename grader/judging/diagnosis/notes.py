@@ -6,24 +6,19 @@ import ast
 from collections.abc import Mapping
 
 from grader.judging.source import Source, first_line, last_name, read, text_of
+from grader.model.notes import main_not_called
 from grader.model.submission import Submission
-
-_UNCALLED = ": nothing calls main()"
 
 
 def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
     """Return the notes; one that says that nothing calls main() names the line of the guard or of main itself."""
-    if not any(_UNCALLED in note for note in notes):
-        return notes
     files = {submission.files[name].found or name: text for name, text in sources.items()}
-    return tuple(_placed(note, files) for note in notes)
+    uncalled = {main_not_called(file): file for file in files}
+    return tuple(_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes)
 
 
-def _placed(note: str, files: Mapping[str, str]) -> str:
-    file = next((f for f in files if note.startswith(f + _UNCALLED)), None)
-    if file is None:
-        return note
-    source = read(file, files[file])
+def _placed(file: str, text: str) -> str:
+    source = read(file, text)
     guard = _wrong_guard(source)
     if guard is not None:
         said = (
@@ -31,7 +26,7 @@ def _placed(note: str, files: Mapping[str, str]) -> str:
         )
         return f"{said} do nothing; write: if __name__ == '__main__':"
     main = next(iter(source.functions("main")), None)
-    return f"{file}:{first_line(main)}{note[len(file) :]}" if main is not None else note
+    return main_not_called(file, first_line(main) if main is not None else 0)
 
 
 def _wrong_guard(source: Source) -> ast.If | None:

@@ -25,6 +25,7 @@ from grader.judging.diagnosis.wiring import (
 )
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
+from grader.model.problem import ProblemKind
 
 #: How far the rate that the text gives may lie from the measured one.
 _SAME = 0.03
@@ -141,7 +142,7 @@ def _several(case: Case) -> Clue | None:
     """Each round publishes more than once, or several timers publish."""
     paced = _paced(case)
     timers = paced.timers() if paced is not None else []
-    if paced is None or not timers or math.isnan(paced.found_hz) or "bursts" not in case.verdict.reason:
+    if paced is None or not timers or math.isnan(paced.found_hz) or not case.is_about(ProblemKind.BURSTS):
         return None
     source = paced.source
     if len(timers) > 1:
@@ -226,7 +227,7 @@ def _heard(source: Source, item: Made) -> list[ast.AST]:
 def _stopped_itself(case: Case) -> Clue | None:
     """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
     paced = _paced(case)
-    if paced is None or ("stopped" not in case.verdict.reason and paced.count != 1):
+    if paced is None or not (case.is_about(ProblemKind.STOPPED) or paced.count == 1):
         return None
     source = paced.source
     for timer in paced.timers():

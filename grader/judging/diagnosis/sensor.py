@@ -13,6 +13,7 @@ from grader.judging.diagnosis.wiring import made, made_for, reached, roots
 from grader.judging.source import Source, chain, last_name
 from grader.judging.values import published_numbers
 from grader.judging.wording import number
+from grader.model.problem import ProblemKind
 
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
 _DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
@@ -90,7 +91,7 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
 def _drawn_once(case: Case) -> Clue | None:
     """The value is drawn when the node starts and never again, or the seed is set each time."""
     found = _asked(case)
-    if found is None or "constant" not in case.verdict.reason:
+    if found is None or not case.is_about(ProblemKind.CONSTANT):
         return None
     source = found[0]
     for timer in made(source, "timer"):
@@ -116,7 +117,7 @@ def _at_start(source: Source, call: ast.AST) -> bool:
 def _never_crosses(case: Case) -> Clue | None:
     """What is drawn lies on one side of the controller's threshold."""
     check = case.criterion.check
-    if not isinstance(check, AnswersTogether) or "never changes, because" not in case.verdict.reason or case.fault:
+    if not isinstance(check, AnswersTogether) or not case.is_about(ProblemKind.NEVER_CHANGES) or case.fault:
         return None
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
     calls = draws(owners[0]) if len(owners) == 1 else []

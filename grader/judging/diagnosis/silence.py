@@ -149,7 +149,7 @@ def _kept_apart(case: Case) -> Clue | None:
         ends = [e for e in student_endpoints(case.trace) if e.topic == topic]
         here = [e for e in ends if e.kind == "publisher"]
         there = [e for e in ends if e.kind == "subscription"]
-        if len(here) != 1 or len(there) != 1 or case.fault is not None or topic not in case.verdict.reason:
+        if len(here) != 1 or len(there) != 1 or case.fault is not None or topic not in case.topics:
             continue
         talker, hearer = _file_with(case, "publisher", topic), _file_with(case, "subscription", topic)
         if talker is None or hearer is None or talker[0] is hearer[0]:
@@ -406,7 +406,7 @@ def _no_subscription(case: Case) -> Clue | None:
     check = case.criterion.check
     topic = unheard_topic(case)
     if isinstance(check, BidirectionalGraph):
-        topic = next((t for t in (check.back, check.forward) if f"{t}: " in case.verdict.reason), "")
+        topic = next((t for t in (check.back, check.forward) if t in case.topics), "")
         there = [e for e in student_endpoints(case.trace, "subscription") if e.topic == topic]
         topic = "" if there else topic
     source = listener(case, topic) if topic else None
@@ -430,7 +430,7 @@ def _graph_topic(case: Case) -> Clue | None:
         for kind, finder in (("publisher", speaker), ("subscription", listener)):
             source = finder(case, topic)
             ends = student_endpoints(case.trace, kind)
-            if source is None or f"{topic}: " not in case.verdict.reason or any(e.topic == topic for e in ends):
+            if source is None or topic not in case.topics or any(e.topic == topic for e in ends):
                 continue
             items = made(source, kind)
             found = [e.topic for e in ends if items and _same_made(made_for(source, kind, e.topic), items[0])]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.wording import quote
-from grader.model.trace import FaultKind
+from grader.model.trace import Fault, FaultKind
 
 _PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
 _OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))
@@ -34,45 +34,44 @@ _SAYINGS: Sequence[tuple[str, str]] = (
 
 
 def _syntax(case: Case) -> Clue | None:
-    if case.fault is None or case.fault.kind is not FaultKind.SYNTAX_ERROR:
+    fault = case.fault
+    if fault is None or fault.kind is not FaultKind.SYNTAX_ERROR:
         return None
-    row = case.source.line(case.fault.line) if case.source is not None else ""
-    text = case.fault.text
-    return _python_2(text, row) or _newer_f_string(text, row) or _other_language(text, row) or _said(text, row)
+    row = case.source.line(fault.line) if case.source is not None else ""
+    return _python_2(fault, row) or _newer_f_string(fault, row) or _other_language(fault, row) or _said(fault, row)
 
 
-def _python_2(text: str, row: str) -> Clue | None:
-    if "call to 'print'" not in text:
+def _python_2(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("call to 'print'"):
         return None
     found = _PRINT.match(row[:200])
     shown = f"print({found['what'].strip()})" if found else "print(...)"
     return Clue(f"this is Python 2; in Python 3 print is a function: {quote(shown, 70)}", key="python_2")
 
 
-def _newer_f_string(text: str, row: str) -> Clue | None:
-    version = re.search(r"read by Python 3\.(\d+)", text)
-    if "f-string" not in text or version is None or int(version[1]) >= 12:
+def _newer_f_string(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("f-string") or fault.python is None or fault.python >= (3, 12):
         return None
     nested = re.search(r"""[fF](['"])[^'"]*\{[^}'"]*\1""", row[:500])
     if nested is None:
         return None
     other = '"' if nested[1] == "'" else "'"
-    hint = f"Python 3.{version[1]}, which reads the file here, wants other quotation marks inside the braces"
+    hint = f"Python 3.{fault.python[1]}, which reads the file here, wants other quotation marks inside the braces"
     return Clue(f"{hint} than around them: {other}")
 
 
-def _other_language(text: str, row: str) -> Clue | None:
-    if "invalid syntax" not in text:
+def _other_language(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("invalid syntax"):
         return None
     right = next((word for pattern, word in _OPERATORS if re.search(pattern, row[:500])), None)
     return Clue(f"in Python this is written {right}: {quote(row, 60)}") if right else None
 
 
-def _said(text: str, row: str) -> Clue | None:
-    hint = next((hint for pattern, hint in _SAYINGS if re.search(pattern, text)), None)
-    if hint is None or ("{code}" in hint and not row.strip()):
+def _said(fault: Fault, row: str) -> Clue | None:
+    template = next((template for pattern, template in _SAYINGS if fault.said(pattern)), None)
+    if template is None or ("{code}" in template and not row.strip()):
         return None
-    return Clue(hint.format(code=quote(row, 60), indent=_indent(row)))
+    return Clue(template.format(code=quote(row, 60), indent=_indent(row)))
 
 
 def _indent(row: str) -> str:
@@ -83,15 +82,14 @@ def _indent(row: str) -> str:
 
 
 def _encoding(case: Case) -> Clue | None:
-    if case.fault is None or case.fault.kind is not FaultKind.SYNTAX_ERROR:
+    fault = case.fault
+    if fault is None or fault.kind is not FaultKind.SYNTAX_ERROR or not fault.said("encoding|codec can't decode"):
         return None
-    if "encoding" in case.fault.text or "codec can't decode" in case.fault.text:
-        return Clue("save the file as UTF-8")
-    return None
+    return Clue("save the file as UTF-8")
 
 
 def _null_bytes(case: Case) -> Clue | None:
-    if case.fault is None or "null bytes" not in case.fault.text:
+    if case.fault is None or not case.fault.said("null bytes"):
         return None
     return Clue("the file holds bytes that are no text: save it as UTF-8 in a text editor")
 

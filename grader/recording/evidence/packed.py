@@ -34,7 +34,7 @@ from grader.model.trace import (
     StartWay,
     Trace,
 )
-from grader.recording.codec import FORMAT, lively, trace_from_json, trace_to_json
+from grader.recording.codec import FORMAT, FaultDetails, details_from_text, lively, trace_from_json, trace_to_json
 from grader.recording.evidence.fields import fields_of
 
 #: Stands for bytes that are a message of the recording itself.
@@ -128,6 +128,7 @@ class _Fault(_Row, tag="fault"):
     file: str
     line: int
     frames: tuple[str, ...]
+    details: FaultDetails | msgspec.UnsetType = msgspec.UNSET
 
 
 class _Offer(_Row, tag="offer"):
@@ -167,6 +168,11 @@ def _graph(row: _Graph) -> GraphSnapshot:
     return GraphSnapshot(row.t_ns, tuple(row.nodes), tuple(Endpoint(*_fields(end)) for end in row.endpoints), services)
 
 
+def _fault(row: _Fault) -> Fault:
+    *fields, details = _fields(row)
+    return Fault(*fields, *(details_from_text(row.kind, row.text) if details is msgspec.UNSET else details))
+
+
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
     blank = kind.__new__
     # the __init__ of a frozen dataclass takes twice as long, and there are a thousand messages
@@ -196,7 +202,7 @@ _MAKERS: Mapping[type[_Row], Callable[[Any], Observation]] = {
     _Log: lambda row: LogRecord(*_fields(row)),
     _Line: lambda row: OutputLine(*_fields(row)),
     _Graph: _graph,
-    _Fault: lambda row: Fault(*_fields(row)),
+    _Fault: _fault,
     _Offer: lambda row: Offer(*_fields(row)),
     _Mark: lambda row: Mark(*_fields(row)),
 }

@@ -15,6 +15,7 @@ from grader.reports.class_page.kinds import Kind, kind_of, skeleton
 
 #: More forms of one cause than this are not told apart.
 MOST_FORMS = 3
+# The words of reports that have no `blocked_by` and no `same_cause_as`.
 _SAME = re.compile(r"this has the same cause as (?P<id>\S{1,200}): mend that first")
 _NEEDS = re.compile(r"not judged: needs (?P<what>.{1,400}?)(?: \(.{1,40}\)|, which is missing)", re.DOTALL)
 
@@ -106,6 +107,12 @@ def _roots(by_id: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[Mapping[str
 
 def _before(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the criterion that must be mended before another one; None if there is none."""
+    known = criterion.get("blocked_by") or criterion.get("same_cause_as")
+    return by_id.get(known) if known else _before_by_text(criterion, by_id)
+
+
+def _before_by_text(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return the criterion that a report names in its sentences only, as those of earlier versions do."""
     if criterion["outcome"] == Outcome.BLOCKED.value:
         match = _NEEDS.fullmatch(str(criterion["reason"]))
         what = match["what"] if match else ""
