@@ -1,7 +1,9 @@
 """What holds for all tests: a busy machine makes no test fail, and neither does a shell that ignores Ctrl-C."""
 
+import logging
 import signal
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -10,6 +12,25 @@ settings.load_profile("unhurried")
 # What a shell runs in the background ignores interrupts, and so would every program that is interrupted here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+class _Fail(logging.Handler):
+    """Fails where the grader logs a mistake of its own that it gets over."""
+
+    def emit(self, record):
+        raise AssertionError(record.getMessage())
+
+
+@pytest.fixture(autouse=True)
+def strict_log(request):
+    """Let a test fail that logs a mistake, unless it asks for caplog."""
+    if "caplog" in request.fixturenames:
+        yield
+        return
+    handler = _Fail(logging.ERROR)
+    logging.getLogger("grader").addHandler(handler)
+    yield
+    logging.getLogger("grader").removeHandler(handler)
 
 
 def pytest_addoption(parser):

@@ -21,6 +21,7 @@ from diagnosis_samples import (
 )
 
 from grader.judging import judge
+from grader.judging.diagnosis.case import Case, Cause
 from grader.judging.diagnosis.diagnose import CAUSES, diagnose
 from grader.model.exercise import Outcome
 from grader.model.report import ExerciseReport, Verdict
@@ -109,6 +110,19 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
 
     monkeypatch.setattr(judge, "diagnose", without_reasons)
     assert list(explained(row, traces).verdicts) == known
+
+
+def test_a_cause_that_fails_is_logged_and_passed_over(monkeypatch, caplog) -> None:
+    """The others are looked for all the same; elsewhere in these tests the log makes the test fail."""
+
+    def fails(case: Case) -> None:
+        raise ValueError(case.criterion.id)
+
+    row = CRASHES[0]
+    usual = lost(explained(row, crash_traces(row)))
+    monkeypatch.setattr("grader.judging.diagnosis.diagnose.CAUSES", (Cause("fails", fails), *CAUSES))
+    assert lost(explained(row, crash_traces(row))) == usual
+    assert caplog.messages[0] == f"the cause fails failed on the criterion {usual[0].id}"
 
 
 def test_every_cause_is_in_a_table() -> None:

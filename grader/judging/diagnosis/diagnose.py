@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -60,6 +61,7 @@ CAUSES: tuple[Cause, ...] = (
     *SERVICES,
 )
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
+_LOG = logging.getLogger(__name__)
 #: Evidence key that holds the id of the cause.
 CAUSE_KEY = "diagnosis"
 
@@ -91,9 +93,16 @@ def diagnose(
 
 
 def clue_for(case: Case) -> tuple[str, Clue] | None:
-    """Return the first cause that applies to a case, its id and its clue; None if nothing is very likely."""
+    """Return the first cause that applies to a case, its id and its clue; None if nothing is very likely.
+
+    A cause that raises is logged and passed over: a mistake of ours must not keep a student from a report.
+    """
     for cause in CAUSES:
-        clue = cause.applies(case)
+        try:
+            clue = cause.applies(case)
+        except Exception:
+            _LOG.exception("the cause %s failed on the criterion %s", cause.id, case.criterion.id)
+            continue
         if clue is not None:
             return cause.id, clue
     return None
@@ -114,10 +123,7 @@ class _Said:
         trace = traces.get(criterion.scenario)
         if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
             return verdict
-        try:
-            found = clue_for(self._case(verdict, criterion, trace, sources))
-        except Exception:
-            found = None
+        found = clue_for(self._case(verdict, criterion, trace, sources))
         earlier = "" if found is not None else self._follows(criterion.check, verdict)
         if verdict.outcome is Outcome.NOT_MET:
             self.lost[criterion.id] = criterion.check
