@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.judging.diagnosis import diagnose as room
-from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.judging.diagnosis.case import Case, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.notes import placed
 from grader.judging.diagnosis.wiring import goes_to, made
@@ -153,17 +153,6 @@ def test_an_ordinary_file_takes_milliseconds() -> None:
         report(FILE, {"alone": trace}, {FILE: text})
         spent.append(time.process_time() - start - (start - without))
     assert min(spent) < 0.05
-
-
-def test_a_cause_that_fails_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The verdict stays as the check gave it."""
-
-    def fails(case: Case) -> Clue | None:
-        raise ZeroDivisionError(case.process)
-
-    monkeypatch.setattr(room, "CAUSES", (Cause("fails", fails),))
-    trace = silent_trace()
-    assert report(FILE, {"alone": trace}, {FILE: RIGHT[FILE]}) == report(FILE, {"alone": trace}, None)
 
 
 def test_an_empty_file_is_called_empty() -> None:
