@@ -1,4 +1,4 @@
-"""Spot checks: what was recorded in virtual time is recorded once more on the wall clock.
+"""Spot checks: what was recorded with the grader in the student's process is recorded once more on the wall clock.
 
 There, nothing of the grader is in the student's process. Where the two disagree, the wall clock decides.
 """
@@ -86,12 +86,12 @@ class SpotChecks:
         return self.drawn or bool(self.reaches)
 
     def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> list[Key]:
-        """Return what is checked: recordings in virtual time that nothing was wrong with."""
-        reaching = {exercise for (exercise, _), trace in traces.items() if trace.reached}
+        """Return what is checked: recordings that nothing was wrong with; in virtual time, unless it is suspected."""
         return [
             key
             for key, job in jobs.items()
-            if (self.certain or key[0] in reaching) and _can_be_checked(job.plan, traces[key])
+            if (self.drawn or self.suspects(key, traces))
+            and _can_be_checked(job.plan, traces[key], suspect=self.suspects(key, traces))
         ]
 
     def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
@@ -136,10 +136,13 @@ def check(
     return found
 
 
-def _can_be_checked(plan: Plan, trace: Trace) -> bool:
-    """Return whether a recording is one in virtual time, of processes that all start at once."""
-    judged = trace.clock is ClockKind.VIRTUAL and not (trace.clock_reason or trace.harness_problem)
-    return judged and not plan.starts_ns
+def _can_be_checked(plan: Plan, trace: Trace, *, suspect: bool) -> bool:
+    """Return whether a recording is one in virtual time, of processes that all start at once.
+
+    One on the wall clock is, if who suspects it wants to know whether the program finds the grader in its process.
+    """
+    judged = suspect if trace.clock is ClockKind.WALL else not trace.clock_reason
+    return judged and not trace.harness_problem and not plan.starts_ns
 
 
 def _disagreement(job: Job, virtual: Trace, record: Record) -> tuple[Difference | None, bool]:
@@ -174,9 +177,9 @@ def _decided(
     decided = {}
     for key, job in jobs.items():
         virtual = traces[key]
-        if virtual.clock is ClockKind.WALL or virtual.harness_problem:
+        if virtual.harness_problem:
             continue
         plan = replace(bare_plan(job.plan, virtual), bare=not job.plan.starts_ns)
         wall = record(Job(f"{job.title}, on the wall clock", plan))
-        decided[key] = replace(wall, clock_reason=sentence(difference), starts=virtual.starts)
+        decided[key] = replace(wall, clock_reason=sentence(difference, virtual.clock), starts=virtual.starts)
     return decided

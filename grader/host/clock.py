@@ -30,6 +30,8 @@ class VirtualClock:
         self._sent = 0
         self._looked_at = False
         self._was_looked_at = False
+        #: Whether a pause, or a timer's period, has begun at this moment: work before it puts off what comes after it.
+        self.counted = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
 
     def move_to(self, now_ns: int) -> None:
@@ -41,6 +43,7 @@ class VirtualClock:
 
     def end_of(self, pause_ns: int) -> int:
         """Return when a pause that begins now ends."""
+        self.counted |= pause_ns > 0
         return self.now_ns + pause_ns + (LATE_NS if self._was_looked_at and pause_ns > 0 else 0)
 
     def look(self, *, by_library: bool = False) -> int:

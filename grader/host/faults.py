@@ -32,12 +32,26 @@ class Describer:
 
     def exception(self, error: BaseException) -> dict[str, Any]:
         """Return an uncaught exception as a fault."""
-        if isinstance(error, SyntaxError) and self._inside(error.filename or ""):
+        if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
         kind = _name_of(type(error))
         said = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
         return {"code": "exception", "type": kind, "message": _behind(kind, said), **self._place(frames)}
+
+    def _is_of_file(self, error: SyntaxError) -> bool:
+        """Return whether a file of the submission cannot be compiled: anybody may raise such an error."""
+        try:
+            path = os.path.realpath(error.filename or "")
+            with open(path, "rb") as source:
+                text = source.read() if self._inside(path) else b""
+        except Exception:  # what is no path, or a file that cannot be read
+            return False
+        try:
+            compile(text, path, "exec", dont_inherit=True)
+        except (SyntaxError, ValueError):
+            return type(error.lineno) in (int, type(None))
+        return False
 
     def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
         """Return a file that cannot be compiled as a fault."""

@@ -90,6 +90,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
         return timer(callback, group, clock.end_of(period_ns) - clock.now_ns, of, **rest)
 
     rclpy.executors.Timer = timeout
+    _count_periods(clock, timer)
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
@@ -108,6 +109,21 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
 
     Clock.now = looked_at
     Clock.sleep_until = sleep_until
+
+
+def _count_periods(clock: VirtualClock, timer: Any) -> None:
+    """Note that a pause begins, or the period of a timer that is made or set again."""
+
+    def counting(method: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(method)
+        def counted(*args: Any, **kwargs: Any) -> Any:
+            clock.counted = True
+            return method(*args, **kwargs)
+
+        return counted
+
+    for owner, name in ((timer, "__init__"), (timer, "reset"), (Clock, "sleep_for")):
+        setattr(owner, name, counting(getattr(owner, name)))
 
 
 def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> type:

@@ -110,6 +110,12 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             """Answer a condition that asks whether it may go on; trying to acquire would count as a look."""
             return self._locked
 
+        def __reduce_ex__(self, protocol: Any) -> Any:
+            raise TypeError("cannot pickle '_thread.lock' object")
+
+        def __repr__(self) -> str:
+            return f"<{'locked' if self._locked else 'unlocked'} _thread.lock object at {id(self):#x}>"
+
         def _at_fork_reinit(self) -> None:
             self._locked = False
             self._waiters.clear()
@@ -122,6 +128,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
 
         acquire_lock, release_lock, locked_lock = acquire, release, locked
 
+    VirtualLock.__module__, VirtualLock.__name__, VirtualLock.__qualname__ = "_thread", "lock", "lock"
     return VirtualLock
 
 

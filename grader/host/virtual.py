@@ -40,7 +40,7 @@ class VirtualTime:
         self._clocks: RosClocks | None = None
         self._stopping = False
         self._end_ns = 0
-        self._free_until_ns = 0
+        self._free_until_ns = self._moved = 0
         self.unreported = False
         self.resumed_ns = originals.processor_ns()
         self.running = True
@@ -92,7 +92,8 @@ class VirtualTime:
     def summary(self) -> dict[str, Any]:
         """Return what every report carries: the time, traffic, and endpoints if they changed."""
         self.unreported = False
-        report: dict[str, Any] = {"now_ns": self.clock.now_ns}
+        report: dict[str, Any] = {"now_ns": self.clock.now_ns, "counted": self.clock.counted, "moved": self._moved}
+        self.clock.counted, self._moved = False, 0
         if self._ledger is not None:
             report["sent"] = dict(self._ledger.sent)
             self._ledger.sent.clear()
@@ -136,6 +137,7 @@ class VirtualTime:
             return
         if wake_ns is not None and self._may_go_on(wake_ns):
             self._move_to(wake_ns)
+            self._moved += 1
             return
         if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
             self.leave()  # what was freed in the meantime goes only now

@@ -69,7 +69,7 @@ class Watch:
     def _matters(self, event: str, arguments: tuple[Any, ...]) -> bool:
         if event in LOOKS:
             place = arguments[0] if arguments else None
-            return type(place) is str and place.startswith(FOLDERS)
+            return type(place) is str and (place == "/" or place.startswith(FOLDERS))
         return event.startswith(EVENTS)
 
     def _by_student(self, frame: FrameType | None, event: str) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 
 from grader.judging.silence import faults_before_stop
 from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds, within
-from grader.model.trace import Delivery, Fault, LogRecord, Message, Request, Response, Trace
+from grader.model.trace import ClockKind, Delivery, Fault, LogRecord, Message, Request, Response, Trace
 
 #: Rates and counts agree within this share, and so many more or fewer.
 SHARE, COUNT = 0.3, 4
@@ -100,22 +100,38 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
     return (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
 
 
-def sentence(difference: Difference) -> str:
-    """Say how the clocks disagree, for the reason of a clock."""
+def sentence(difference: Difference, clock: ClockKind) -> str:
+    """Say how two recordings disagree, for the reason of a clock.
+
+    Args:
+        difference: How.
+        clock: The clock of the first one; on the wall clock it differs in what runs beside the program.
+    """
     name = difference.name[:200]
-    virtual, wall = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
-    what = {
-        Aspect.SILENT: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.RATE: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.VALUE: f"{name} was {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.CONSTANT: f"{name} varied in virtual time and was always {wall} on the wall clock",
-        Aspect.ANSWER: f"{name} was {virtual} in virtual time and {wall} on the wall clock for the same input",
-        Aspect.LOGS: f"{name} logged {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.ENDPOINT: f"{name} was {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.CALLS: f"{name} had {virtual} in virtual time and {wall} on the wall clock",
-        Aspect.END: f"{name} {virtual} in virtual time and {wall} on the wall clock",
-    }
-    return f"the node behaved differently on the wall clock: {what[difference.aspect]}"
+    first, second = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
+    where = ("in virtual time", "on the wall clock")
+    if clock is ClockKind.WALL:
+        where = ("beside the grader's own code", "without it")
+    if difference.aspect is Aspect.CONSTANT:
+        what = f"{name} varied {where[0]} and was always {second} {where[1]}"
+    else:
+        verb = _VERBS[difference.aspect]
+        what = f"{name} {verb}{first} {where[0]} and {second} {where[1]}"
+        what += " for the same input" if difference.aspect is Aspect.ANSWER else ""
+    return f"the node behaved differently {where[1]}: {what}"
+
+
+#: What stands between the name of what differs and how it was.
+_VERBS = {
+    Aspect.SILENT: "had ",
+    Aspect.RATE: "had ",
+    Aspect.VALUE: "was ",
+    Aspect.ANSWER: "was ",
+    Aspect.LOGS: "logged ",
+    Aspect.ENDPOINT: "was ",
+    Aspect.CALLS: "had ",
+    Aspect.END: "",
+}
 
 
 def _shown(value: float | str, aspect: Aspect) -> str:

@@ -20,7 +20,7 @@ def _words(text: str) -> frozenset[str]:
 LONG = "a very long file"
 #: Modules that show or change the insides of a process, or start others.
 _MODULES = _words(
-    "gc ctypes cffi inspect dis marshal types traceback tracemalloc faulthandler resource psutil time_machine "
+    "gc ctypes cffi inspect dis marshal types tracemalloc faulthandler resource psutil time_machine "
     "freezegun subprocess multiprocessing pty fcntl mmap _thread _socket _ctypes _posixsubprocess pickle code codeop "
     "runpy imp weakref builtins __main__ site sysconfig importlib pkgutil zipimport cProfile profile pdb bdb select "
     "selectors forbiddenfruit wrapt mock platform"
@@ -39,7 +39,9 @@ _NAMES = _words(
     "threading.get_native_id threading.get_ident threading._start_new_thread socket.socket socket.fromfd "
     "socket.create_connection socket.socketpair socket.SOCK_STREAM asyncio.create_subprocess_exec "
     "asyncio.create_subprocess_shell atexit._run_exitfuncs atexit._clear signal.setitimer signal.set_wakeup_fd "
-    "rclpy.impl rclpy.impl.implementation_singleton rclpy._rclpy_pybind11"
+    "rclpy.impl rclpy.impl.implementation_singleton rclpy._rclpy_pybind11 traceback.extract_stack traceback.walk_stack "
+    "traceback.format_stack traceback.print_stack traceback.walk_tb traceback.extract_tb traceback.StackSummary "
+    "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1"
 )
 #: Attributes of whatever they are read.
 _ATTRIBUTES = _words(
@@ -49,7 +51,8 @@ _ATTRIBUTES = _words(
     "st_mtime st_mtime_ns st_ctime st_ctime_ns st_atime st_atime_ns st_ino exec_module load_module reload "
     "import_module getrusage CLOCK_PROCESS_CPUTIME_ID CLOCK_THREAD_CPUTIME_ID CLOCK_BOOTTIME CLOCK_MONOTONIC_RAW "
     "CLOCK_REALTIME CLOCK_MONOTONIC handle implementation_singleton rclpy_implementation tm_year tm_mon tm_mday "
-    "tm_yday year month day toordinal fromordinal"
+    "tm_yday year month day toordinal fromordinal "
+    "__traceback__ tb_next relativeCreated"
 )
 #: Functions of Python that run or find what no text names.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id")
@@ -73,6 +76,13 @@ _CLOCKS = {
     "time.perf_counter": "steady",
     "time.perf_counter_ns": "steady",
 }
+#: What tells the date or the time of day; comparing it, or a part of it, with anything is more than telling it.
+_CALENDARS = _words(
+    "time.strftime time.ctime time.asctime time.localtime time.gmtime email.utils.formatdate datetime.date.today"
+)
+_TOLD = _words("strftime isoformat isocalendar isoweekday weekday timetuple ctime")
+#: Differences of clocks that no program acts upon.
+_TINY_S = 1e-3
 #: Seconds, or nanoseconds, since 1970 between these are a date that a program compares with.
 _DATES = ((1.5e9, 2.5e9), (1.5e18, 2.5e18))
 
@@ -115,34 +125,82 @@ def _named(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
             name = code.resolved(node)
             if node.attr in _ATTRIBUTES or name in _NAMES:
                 yield node.attr if node.attr in _ATTRIBUTES else name
+            elif node.attr == "__doc__" or (_is_private(node.attr) and chain(node.value) in code.aliases):
+                yield name
         elif isinstance(node, ast.Name) and node.id in (_BUILTINS | _ATTRIBUTES):
             yield node.id
         elif isinstance(node, ast.Constant) and isinstance(node.value, (str, bytes)):
             value = node.value if isinstance(node.value, str) else node.value.decode("latin-1")
             yield from (part for part in _TEXTS if part in value)
+        elif isinstance(node, ast.keyword) and node.arg in ("stack_info", "stacklevel"):
+            yield node.arg
         elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
             if any(low <= node.value <= high for low, high in _DATES):
                 yield "a date"
 
 
+def _is_private(name: str) -> bool:
+    return name.startswith("_") and not name.endswith("__")
+
+
 def _computed(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
     """Yield names that are looked up by a text that is worked out, and functions that are asked what they are."""
+    spelt = _loops_over_texts(nodes)
     for call in (node for node in nodes if isinstance(node, ast.Call)):
         name = chain(call.func)
-        if name in ("getattr", "setattr", "delattr") and not (
-            len(call.args) > 1 and isinstance(call.args[1], ast.Constant)
-        ):
+        if name in ("getattr", "setattr", "delattr") and not _is_spelt_out(call, spelt):
             yield f"{name} of a name that is worked out"
+        elif name in ("getattr", "setattr", "delattr", "hasattr") and _named_by_text(call, code):
+            yield f"{name} of {_named_by_text(call, code)}"
         elif name in _ASKING and any(_of_module(argument, code) for argument in call.args):
             yield f"{name} of a function"
         elif name.endswith("environ.items") or (name in ("dict", "list", "sorted", "len") and _takes_environ(call)):
             yield "os.environ"
 
 
+def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
+    """Return the names that loops give to texts which stand in the file, and that nothing else gives."""
+    inner = [n.generators for n in nodes if isinstance(n, (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp))]
+    loops: list[ast.For | ast.comprehension] = [n for n in nodes if isinstance(n, ast.For)]
+    loops += [loop for generators in inner for loop in generators]
+    named = [
+        loop.target.id
+        for loop in loops
+        if isinstance(loop.target, ast.Name)
+        and isinstance(loop.iter, (ast.Tuple, ast.List, ast.Set))
+        and not any(_is_telling(text) for text in loop.iter.elts)
+    ]
+    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    return frozenset(name for name in named if given.count(name) == named.count(name))
+
+
+def _is_telling(node: ast.expr) -> bool:
+    """Return whether an expression is anything but a text that names nothing inside."""
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
+        return True
+    return node.value in _ATTRIBUTES or any(node.value == name.rpartition(".")[2] for name in _NAMES)
+
+
+def _is_spelt_out(call: ast.Call, spelt: frozenset[str]) -> bool:
+    """Return whether it can be read which attribute a call is about; what a program sets in itself is its own."""
+    if len(call.args) > 1 and (isinstance(call.args[1], ast.Constant) or chain(call.args[1]) in spelt):
+        return True
+    return chain(call.func) == "setattr" and bool(call.args) and chain(call.args[0]) == "self"
+
+
+def _named_by_text(call: ast.Call, code: Code) -> str:
+    """Return the name that a call looks up by its text, if it is one that is looked for; empty otherwise."""
+    if len(call.args) < 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
+        return ""
+    name = f"{code.resolved(call.args[0])}.{call.args[1].value}"
+    return name if name in _NAMES or call.args[1].value in _ATTRIBUTES else ""
+
+
 def _of_module(node: ast.expr, code: Code) -> bool:
     """Return whether an expression is something in a module, or a module, and not what calling it gives."""
     name = chain(node)
-    return bool(name) and name.partition(".")[0] in code.aliases and name.rpartition(".")[2][:1].islower()
+    called = isinstance(node, ast.Call)
+    return not called and name.partition(".")[0] in code.aliases and name.rpartition(".")[2][:1].islower()
 
 
 def _takes_environ(call: ast.Call) -> bool:
@@ -155,12 +213,45 @@ def _timing(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
     clocks = {clock for node in names if (clock := _CLOCKS.get(code.resolved(node)))}
     if len(clocks) > 1:
         yield "two clocks"
+    if any(_compares(node, code) for node in nodes):
+        yield "a clock that is compared"
     for loop in (node for node in nodes if isinstance(node, ast.While)):
         inside = list(ast.walk(loop))
         looks = any(isinstance(n, (ast.Attribute, ast.Name)) and code.resolved(n) in _CLOCKS for n in inside)
         waits = any(isinstance(n, ast.Call) and chain(n.func).rpartition(".")[2] in _WAITING for n in inside)
         if looks and not waits and any(isinstance(n, ast.AugAssign) for n in inside):
             yield "a loop that counts"
+
+
+def _compares(node: ast.AST, code: Code) -> bool:
+    """Return whether a date is compared with anything, or a clock as nobody does who waits for time to pass."""
+    if isinstance(node, (ast.Subscript, ast.Attribute)):
+        return _is_date(node.value, code) and (
+            isinstance(node, ast.Subscript) or node.attr in ("startswith", "endswith")
+        )
+    if not isinstance(node, ast.Compare):
+        return False
+    sides = [node.left, *node.comparators]
+    if any(_is_date(side, code) for side in sides):
+        return True
+    numbers = [s.value for s in sides if isinstance(s, ast.Constant) and isinstance(s.value, (int, float))]
+    if any(_is_clock(side, code) for side in sides) and numbers:
+        return True
+    exact = any(isinstance(op, (ast.Eq, ast.NotEq, ast.In, ast.NotIn)) for op in node.ops)
+    looks = any(_is_clock(inner, code) for side in sides for inner in ast.walk(side))
+    return looks and (exact or any(0 < abs(n) < _TINY_S for n in numbers))
+
+
+def _is_clock(node: ast.AST, code: Code) -> bool:
+    return isinstance(node, ast.Call) and code.resolved(node.func) in _CLOCKS
+
+
+def _is_date(node: ast.AST, code: Code) -> bool:
+    if not isinstance(node, ast.Call):
+        return False
+    told = isinstance(node.func, ast.Attribute) and node.func.attr in _TOLD
+    texts = chain(node.func) in ("str", "repr") and any(_is_date(a, code) or _is_clock(a, code) for a in node.args)
+    return told or texts or code.resolved(node.func) in _CALENDARS
 
 
 #: Calls in which a loop waits.

@@ -217,7 +217,7 @@ class Conductor:
                 fault, limits = report.get("fault"), self._plan.limits
                 self._tape.add(reported_fault(student.name, self._now_ns, fault, limits, student.places))
                 continue
-            workload.end()
+            workload.end(counted=bool(report.get("counted")), moved=report.get("moved"))
             self._account(student, report)
             if kind == "exited":
                 student.unsettled = str(report.get("unsettled", ""))

@@ -36,6 +36,8 @@ _FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dict
 NO_MEMORY = b"std::bad_alloc"
 #: A process that had this share of the threads it may have, and then failed, wanted more.
 NEARLY_ALL = 0.9
+#: A process that had used less than this share of its processor time has sent itself the signal of that limit.
+HARDLY_ANY = 0.5
 #: The exit code of a program that Ctrl-C has ended, and the exceptions that ROS programs end with then.
 STOPPED_CODE = 130
 NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
@@ -164,23 +166,24 @@ def _by(signal: str) -> str:
     return f"ended by {signal}"
 
 
-def limit_behind(signal: str, last_words: bytes, most_threads: int, limits: Limits) -> str:
+def limit_behind(signal: str, last_words: bytes, most_threads: int, used_ns: int, limits: Limits) -> str:
     """Return which limit a process was ended at that a signal ended, in words; empty if none explains it.
 
     Args:
         signal: Name of the signal.
         last_words: The end of what it wrote on standard error; it serves the wording only.
         most_threads: The most threads it had.
+        used_ns: The processor time it had used when that was last looked at.
         limits: What it might use.
     """
-    if signal == "SIGXCPU":
+    if signal == "SIGXCPU" and used_ns > HARDLY_ANY * limits.processor_ns:
         return f"stopped at {limits.processor_words()}"
     if signal == "SIGXFSZ":
         return f"stopped at {size(limits.file_bytes)} in one file"
     if signal == OUTGROWN.name:
         return f"stopped at {size(limits.scratch_bytes)} in one folder"
     if signal == "SIGABRT" and NO_MEMORY in last_words:
-        return f"{_by(signal)}: it found no more memory (the limit is {limits.memory_words()})"
+        return f"{_by(signal)} after it wrote {NO_MEMORY.decode()} (the limit is {limits.memory_words()})"
     if signal == "SIGABRT" and most_threads >= NEARLY_ALL * limits.processes:
         return f"{_by(signal)} (the limit is {limits.processes_words()})"
     return ""

@@ -112,6 +112,7 @@ class Guard:
             used = usage(self._families.get(student.process.pid, ()))
             student.most_threads = max(student.most_threads, used.threads)
             student.most_bytes = max(student.most_bytes, used.memory_bytes)
+            student.used_ns = max(student.used_ns, used.processor_ns)
             self._hold(student, self._reached(used))
         self._look_at_itself()
         self._look_at_time()

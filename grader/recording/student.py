@@ -68,6 +68,7 @@ class Student:
         workload: What its steps cost; None until its program starts.
         most_bytes: Most memory that it and its children filled at once.
         most_threads: Most threads that it and its children had at once.
+        used_ns: Processor time that it and its children had used when the guard last looked.
         stopped: Which limit it reached, in words; empty while it reached none.
         unsettled: Why its program does not settle, as it says; empty if it does.
         stop_signalled: Whether it is to get, or has got, the stop signal.
@@ -95,6 +96,7 @@ class Student:
     workload: Workload | None = None
     most_bytes: int = 0
     most_threads: int = 0
+    used_ns: int = 0
     stopped: str = ""
     unsettled: str = ""
     stop_signalled: bool = False
@@ -311,7 +313,7 @@ class Student:
         if 0 <= code <= 128:
             return exited(self.name, t_ns, code)
         name = _signal_name(-code if code < 0 else code - 128)
-        behind = limit_behind(name, self._last, self.most_threads, self.limits)
+        behind = limit_behind(name, self._last, self.most_threads, self.used_ns, self.limits)
         return Fault(t_ns, self.name, FaultKind.KILLED, behind) if behind else ended_by(self.name, t_ns, name)
 
     def stop(self, why: str, family: Collection[int] = ()) -> None:

@@ -23,6 +23,10 @@ ARRIVAL_NS = 20 * NS_PER_MS
 LATE_NS, SLOW_NS = 40 * NS_PER_MS, 200 * NS_PER_MS
 #: Virtual time hides too much when more than this share of the wake-ups are late, and more than so many.
 LATE_SHARE, LATE_AT_LEAST = 0.05, 3
+#: A loop with a pause, or a timer that is set again, is put off by its own work each time. It matters beyond this share
+#: of the time; not counting the longest pieces of work, and what the grader costs for each step and each pause in it.
+DRIFT_SHARE, LONGEST = 0.04, 3
+STEP_NS, PAUSE_NS = 3 * NS_PER_MS // 2, NS_PER_MS
 #: Beyond this delay there is no need to go on in virtual time.
 HOPELESS_NS = 2 * NS_PER_S
 
@@ -46,6 +50,9 @@ class Delay:
         self._starting = True
         self._work_ns = 0
         self._delay_ns = 0
+        self._began_ns = start_ns
+        self._put_off_ns = 0
+        self._longest_ns = [0] * LONGEST
         self.wake_ups = 0
         self.late = 0
 
@@ -57,6 +64,8 @@ class Delay:
             self.wake_ups += 1
             self._delay_ns = max(0, self._delay_ns + self._work_ns - (t_ns - self._at_ns))
             self.late += self._work_ns > SLOW_NS or self._delay_ns > LATE_NS
+        else:
+            self._began_ns = t_ns
         self._starting = False
         self._at_ns, self._work_ns = t_ns, 0
 
@@ -64,10 +73,20 @@ class Delay:
         """Note what the process did at this moment would have taken."""
         self._work_ns += real_ns
 
+    def put_off(self, real_ns: int) -> None:
+        """Note that what comes next is counted from the end of some work, however much time there is."""
+        if not self._starting:
+            self._put_off_ns += max(0, real_ns)
+            self._longest_ns = sorted([*self._longest_ns, real_ns])[1:]
+
     @property
     def hides(self) -> bool:
         """Whether virtual time hides how late the process would be."""
-        return self.hopeless or self.late > max(LATE_AT_LEAST, LATE_SHARE * self.wake_ups)
+        return self.hopeless or self._drifts or self.late > max(LATE_AT_LEAST, LATE_SHARE * self.wake_ups)
+
+    @property
+    def _drifts(self) -> bool:
+        return self._put_off_ns - sum(self._longest_ns) > DRIFT_SHARE * (self._at_ns - self._began_ns)
 
     @property
     def hopeless(self) -> bool:
@@ -106,8 +125,13 @@ class Workload:
         """Note that the process has waited for what was on its way to it, and goes on by itself."""
         self._began_ns = min(time.monotonic_ns(), self._began_ns + ARRIVAL_NS)
 
-    def end(self) -> None:
-        """Note that the process has said that it waits, or has ended."""
+    def end(self, *, counted: bool = False, moved: object = 0) -> None:
+        """Note that the process has said that it waits, or has ended.
+
+        Args:
+            counted: Whether a pause, or a timer's period, began in this step.
+            moved: How many pauses there were inside of it.
+        """
         real_ns = time.monotonic_ns() - self._began_ns
         used_ns = max(0, self._used() - self._used_before_ns)
         if real_ns - used_ns > UNEXPLAINED_NS:
@@ -117,6 +141,8 @@ class Workload:
         self.used_ns += used_ns
         self.waited_ns += taken_ns - used_ns
         self.delay.work(taken_ns)
+        if counted:
+            self.delay.put_off(taken_ns - STEP_NS - PAUSE_NS * (moved if isinstance(moved, int) else 0))
 
     def _used(self) -> int:
         """Return the processor time that the process has used; 0 once it has ended."""

@@ -99,3 +99,15 @@ def test_a_str_that_raises_leaves_the_class(text_of):
             raise ValueError
 
     assert text_of(BrokenError()).startswith("test_fault_texts.")
+
+
+def test_only_a_file_that_cannot_be_compiled_has_a_syntax_error(faults, tmp_path):
+    """Anybody may raise one by hand: that is an exception of the line that raises it."""
+    good, bad = tmp_path / "good.py", tmp_path / "bad.py"
+    good.write_text("x = 1\n")
+    bad.write_text("x = (\n")
+    told = faults.Describer(str(tmp_path)).exception
+    assert told(SyntaxError("x", (str(bad), 1, 5, "x = (")))["code"] == "syntax_error"
+    for strange in (str(good), 7, "\0", str(tmp_path / "none.py")):
+        found = told(SyntaxError("never closed", (strange, 3, 1, "x")))
+        assert (found["code"], found["type"], found["message"]) == ("exception", "SyntaxError", "never closed")

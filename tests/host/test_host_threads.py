@@ -317,6 +317,23 @@ def test_a_lock_goes_to_whoever_has_waited_longest():
     ]
 
 
+def test_a_lock_can_be_copied_no_more_than_elsewhere():
+    """A program that copies an object with a lock in it fails, and fails here as well."""
+    said = play("""
+        import copy, threading
+        class Robot:
+            def __init__(self):
+                self.lock = threading.Lock()
+        for thing in (Robot(), threading.RLock(), threading.Event()):
+            try:
+                copy.deepcopy(thing)
+            except TypeError as error:
+                say(type(error).__name__)
+        say(repr(threading.Lock())[:24])
+    """)
+    assert [line.partition(" ")[2] for line in said[:-1]] == [*["TypeError"] * 3, "<unlocked _thread.lock ob"[:24]]
+
+
 def test_locks_are_misused_with_the_same_errors():
     """Whatever raises in an ordinary program raises here, with the same words."""
     said = play("""

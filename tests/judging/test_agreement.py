@@ -85,7 +85,7 @@ def test_a_program_that_is_another_differs(aspect, program):
     """The first difference is of the kind that shows it, and is told in one sentence."""
     found = differences(program(virtual(), 0).trace(), program(wall(), 1).trace())
     assert aspect in [d.aspect for d in found]
-    assert sentence(found[0]).startswith("the node behaved differently on the wall clock: ")
+    assert sentence(found[0], ClockKind.VIRTUAL).startswith("the node behaved differently on the wall clock: ")
 
 
 def _controlled(builder, answer, *, late_s):
@@ -139,5 +139,6 @@ def test_a_sentence_has_both_numbers():
     """As a reader needs them to see which clock was right."""
     one, other = publishing(virtual(), 0.5), publishing(wall(), 0.5, rate_hz=1.0)
     (found, *_) = differences(one.trace(), other.trace())
-    assert sentence(found).endswith("/x had 20.0 Hz in virtual time and 1.0 Hz on the wall clock")
+    assert sentence(found, ClockKind.VIRTUAL).endswith("/x had 20.0 Hz in virtual time and 1.0 Hz on the wall clock")
+    assert sentence(found, ClockKind.WALL).endswith("/x had 20.0 Hz beside the grader's own code and 1.0 Hz without it")
     assert other.trace().stop_ns == 6 * NS_PER_S

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from grader.model.limits import Limits
-from grader.model.quantities import MIB
+from grader.model.quantities import MIB, NS_PER_S
 from grader.model.trace import FaultKind
 from grader.recording.ending import ending_fault, limit_behind, reported_fault
 from grader.recording.places import Places
@@ -54,20 +54,27 @@ def test_other_errors_stay_as_they_are():
 
 
 @pytest.mark.parametrize(
-    ("signal", "last", "threads", "said"),
+    ("signal", "last", "threads", "used_s", "said"),
     [
-        ("SIGXCPU", b"", 1, "stopped at 120 s of processor time"),
-        ("SIGXFSZ", b"", 1, "stopped at 3 MiB in one file"),
-        ("SIGPWR", b"", 1, "in one folder"),
-        ("SIGABRT", b"terminate called after throwing an instance of 'std::bad_alloc'", 1, "200 MiB of memory"),
-        ("SIGABRT", b"", 49, "ended by SIGABRT (the limit is 50 processes and threads)"),
-        ("SIGABRT", b"", 20, ""),
-        ("SIGKILL", b"std::bad_alloc", 50, ""),
+        ("SIGXCPU", b"", 1, 119, "stopped at 120 s of processor time"),
+        ("SIGXCPU", b"", 1, 2, ""),
+        ("SIGXFSZ", b"", 1, 0, "stopped at 3 MiB in one file"),
+        ("SIGPWR", b"", 1, 0, "in one folder"),
+        (
+            "SIGABRT",
+            b"terminate called after throwing an instance of 'std::bad_alloc'",
+            1,
+            0,
+            "wrote std::bad_alloc (the limit is 200 MiB of memory",
+        ),
+        ("SIGABRT", b"", 49, 0, "ended by SIGABRT (the limit is 50 processes and threads)"),
+        ("SIGABRT", b"", 20, 0, ""),
+        ("SIGKILL", b"std::bad_alloc", 50, 0, ""),
     ],
 )
-def test_a_signal_that_a_limit_is_behind_names_it(signal, last, threads, said):
+def test_a_signal_that_a_limit_is_behind_names_it(signal, last, threads, used_s, said):
     """Where nothing explains the signal, nothing is made up."""
-    found = limit_behind(signal, last, threads, LIMITS)
+    found = limit_behind(signal, last, threads, used_s * NS_PER_S, LIMITS)
     assert said in found
     assert bool(found) == bool(said)
 

@@ -25,7 +25,7 @@ class Watched:
         self.process = SimpleNamespace(pid=pid)
         self.ended = False
         self.stopped = ""
-        self.most_bytes = self.most_threads = 0
+        self.most_bytes = self.most_threads = self.used_ns = 0
         self.held = threading.Event()
 
     def stop(self, why, family=()):

@@ -52,6 +52,29 @@ def test_a_long_answer_is_late_even_where_there_is_time():
     assert not delayed(*[100] * 10, period_ms=1000).hides
 
 
+def put_off(*costs_ms, period_ms=50):
+    """Return the delay of a process that pauses for a period after so much work, each time."""
+    delay = Delay()
+    for number, cost_ms in enumerate((0, *costs_ms)):
+        delay.wake(number * period_ms * MS)
+        delay.work(round(cost_ms * MS))
+        delay.put_off(round(cost_ms * MS))
+    return delay
+
+
+def test_a_pause_after_work_puts_off_what_comes_next():
+    """A loop that works for 5 ms and sleeps for 50 runs at 18 Hz, and is never late by what a timer would need."""
+    assert put_off(*[5] * 100).hides
+    assert not delayed(*[5] * 100).hides
+    assert not put_off(*[1.5] * 100).hides
+    assert not put_off(*[20] * 20, period_ms=1000).hides
+
+
+def test_some_long_work_between_pauses_is_no_habit():
+    """Importing a module and making a node may come after a first pause."""
+    assert not put_off(45, 45, 45, *[1.5] * 100).hides
+
+
 def test_the_start_delays_nothing():
     """A program that imports for ten seconds only starts later."""
     delay = Delay()

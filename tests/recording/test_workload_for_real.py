@@ -78,6 +78,29 @@ def test_a_rare_block_that_delays_other_timers_is_noticed(run):
     assert run("", "if self.count % 20 == 0: __import__('ctypes').CDLL(None).usleep(200_000)").clock_reason == OUTSIDE
 
 
+LOOP = """
+import threading
+def run():
+    while True:
+        self.tick()
+        time.sleep(0.05)
+self.destroy_timer(self.timer)
+threading.Thread(target=run, daemon=True).start()
+"""
+AGAIN = "self.timer.cancel()\n{}\nself.timer.reset()"
+COMPUTING = "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 20_000)"
+
+
+@pytest.mark.parametrize(("once", "later"), [(LOOP, COMPUTING), ("", AGAIN.format(COMPUTING))], ids=["loop", "again"])
+def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(run, once, later):
+    """Ten milliseconds fit between two ticks of a timer; a pause is counted from their end."""
+    assert run(once, later).clock_reason == BUSY
+
+
+def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
+    assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
+
+
 @pytest.mark.parametrize(
     "later",
     [
