@@ -375,3 +375,29 @@ def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
         messages=(numbers,),
     )
     assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
+
+
+def test_a_look_at_the_graph_sees_what_is_there(run):
+    """At the first look, whatever it looks at; a loop that does nothing but look lets time pass."""
+    trace = run(
+        """
+        rclpy.init()
+        node = Node('other')
+        node.create_subscription(String, '/words', print, 10)
+        service = node.create_service(Trigger, '/status', print)
+        time.sleep(1)
+        node.destroy_service(service)
+        rclpy.spin(node)
+        """,
+        """
+        rclpy.init()
+        node = Node('looker')
+        publisher = node.create_publisher(String, '/words', 10)
+        print(publisher.get_subscription_count(), node.count_subscribers('/words'))
+        print('other' in node.get_node_names(), '/status' in dict(node.get_service_names_and_types()), flush=True)
+        while node.count_services('/status'):
+            pass
+        print('gone', flush=True)
+        """,
+    )
+    assert [(line.text, line.t_ns // MS) for line in trace.lines()] == [("2 2", 0), ("True True", 0), ("gone", 1000)]
