@@ -39,6 +39,7 @@ class VirtualTime:
         self._ledger: Ledger | None = None
         self._clocks: RosClocks | None = None
         self._stopping = False
+        self._finishing = False
         self._end_ns = 0
         self._free_until_ns = 0
         self.unreported = False
@@ -99,7 +100,7 @@ class VirtualTime:
             if self._ledger.lost:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
-            if self._ledger.changed and not self._ledger.sending_and_removed:
+            if self._ledger.changed and not (self._ledger.sending_and_removed or self._finishing):
                 report["endpoints"] = self._ledger.claims()
                 report["sees_graph"] = self._ledger.sees_graph
         return report
@@ -119,6 +120,12 @@ class VirtualTime:
         """Let everything that was sent arrive everywhere, because its sender is about to go."""
         if self._ledger is not None and self._ledger.sending and not self._stopping:
             self._converse(self.clock.now_ns, leaving=True)
+
+    def finish(self) -> None:
+        """Tell of everything that was made, and of no departure any more: what is freed at the end may still send."""
+        if self._ledger is not None and self._ledger.changed:
+            self._settle()
+        self._finishing = True
 
     def end(self) -> bool:
         """Leave the ROS graph, as the interpreter does at its end; return whether that was done."""

@@ -72,6 +72,28 @@ def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
     assert numbers(trace) == list(range(10))
 
 
+@pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])
+def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(run, at_the_end):
+    """A node that a module still holds is freed at the very end, when nothing can be imported any more."""
+    trace = run(f"""
+        import atexit
+        class Talker(Node):
+            def __init__(self):
+                super().__init__('talker')
+                self.publisher = self.create_publisher(String, '/words', 10)
+            def burst(self):
+                burst(self.publisher, 3)
+            def __del__(self):
+                self.burst()
+                import json
+        rclpy.init()
+        node = Talker()
+        {at_the_end}
+        """)
+    assert numbers(trace) == [0, 1, 2] * (2 if "atexit" in at_the_end else 1)
+    assert any(line.text.startswith("ImportError: sys.meta_path is None") for line in trace.lines())
+
+
 def test_a_context_manager_takes_nothing_with_it(run):
     trace = run("""
         from rclpy.context import Context
