@@ -11,13 +11,14 @@ import os
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+from .setup_files import given_to_setup
+
 #: What makes a folder that of a ROS package.
 MARKERS = ("setup.py", "package.xml")
 #: The name of a package whose own folder is all that was handed in.
 NAMELESS = "submission"
-#: Folders of a submission that are looked at in search of packages, and the longest text that is put together of a
-#: setup.py.
-FOLDERS, TEXT_CHARACTERS = 500, 10_000
+#: Folders of a submission that are looked at in search of packages.
+FOLDERS = 500
 
 SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
 
@@ -151,17 +152,10 @@ def _script(line: str) -> tuple[str, str, str] | None:
 
 
 def _scripts_of_setup(tree: ast.Module) -> list[str]:
-    known: dict[str, Any] = {}
-    for statement in tree.body:
-        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-            known[statement.targets[0].id] = _value(statement.value, known)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _name(node.func) == "setup":
-            given = next((_value(k.value, known) for k in node.keywords if k.arg == "entry_points"), None)
-            scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
-            scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
-            return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, (list, tuple)) else []
-    return []
+    given = given_to_setup(tree).get("entry_points")
+    scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
+    scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
+    return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, list) else []
 
 
 def _ini_scripts(text: Any) -> list[str]:
@@ -174,48 +168,6 @@ def _ini_scripts(text: Any) -> list[str]:
         elif section == "console_scripts":
             found.append(line)
     return found
-
-
-def _name(node: ast.expr) -> str:
-    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
-
-
-def _value(node: ast.expr | None, known: dict[str, Any]) -> Any:
-    """Return what an expression of texts, lists and dictionaries comes to; None for anything else."""
-    value: Any = None
-    if isinstance(node, ast.Constant):
-        value = node.value
-    elif isinstance(node, ast.Name):
-        value = known.get(node.id)
-    elif isinstance(node, (ast.List, ast.Tuple)):
-        value = [_value(item, known) for item in node.elts]
-    elif isinstance(node, ast.Dict):
-        value = {_value(k, known): _value(v, known) for k, v in zip(node.keys, node.values, strict=True) if k}
-    elif isinstance(node, ast.JoinedStr):
-        parts = [_value(p.value if isinstance(p, ast.FormattedValue) else p, known) for p in node.values]
-        value = "".join(parts) if all(isinstance(part, str) for part in parts) else None
-    elif isinstance(node, ast.BinOp):
-        value = _combined(node, known)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
-        text, values = _value(node.func.value, known), [_value(a, known) for a in node.args]
-        named = {k.arg: _value(k.value, known) for k in node.keywords if k.arg}
-        plain = all(isinstance(v, str) for v in (*values, *named.values()))
-        value = text.format(*values, **named) if isinstance(text, str) and len(text) < 1000 and plain else None
-    if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
-        raise ValueError
-    return value
-
-
-def _combined(node: ast.BinOp, known: dict[str, Any]) -> Any:
-    left, right = _value(node.left, known), _value(node.right, known)
-    if isinstance(node.op, ast.Add) and isinstance(left, str) and isinstance(right, str):
-        return left + right
-    if isinstance(node.op, ast.Add) and isinstance(left, list) and isinstance(right, list):
-        return left + right
-    if isinstance(node.op, ast.Mod) and isinstance(left, str) and len(left) < 1000:
-        values = tuple(right) if isinstance(right, list) else (right,)
-        return left % values if all(isinstance(v, str) for v in values) else None
-    return None
 
 
 def _offers_main(tree: ast.Module) -> bool:
