@@ -15,6 +15,8 @@ from .setup_files import given_to_setup
 
 #: What makes a folder that of a ROS package.
 MARKERS = ("setup.py", "package.xml")
+#: What builds a package that installs its programs as they are, unless there is a setup.py.
+CMAKE = "CMakeLists.txt"
 #: The name of a package whose own folder is all that was handed in.
 NAMELESS = "submission"
 #: Folders of a submission that are looked at in search of packages.
@@ -27,7 +29,7 @@ class Layout(NamedTuple):
     """Where a file lies.
 
     Attributes:
-        module: Its dotted name in its package; empty for a file in none.
+        module: Its dotted name in its package; empty for a file in none, and for a program of a CMake package.
         base: The folder that the dotted name begins in, absolute; empty if that is above the submission.
         package: Relative folder of the ROS package, that of its setup.py or package.xml; None without one.
     """
@@ -66,6 +68,8 @@ def layout_of(root: str, file: str) -> Layout:
     stem = os.path.splitext(os.path.basename(file))[0]
     if not chain and package is None:
         return Layout()
+    if not chain and package is not None and _is_file(root, package, CMAKE) and not _is_file(root, package, "setup.py"):
+        return Layout(package=package)
     if not chain and package is not None:
         below = os.path.relpath(folder, package) if folder != package else ""
         names, base = [part for part in below.split("/") if part], os.path.join(root, package)
@@ -191,6 +195,9 @@ def _top_level(statements: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 def _defines_main(statement: ast.stmt) -> bool:
     if isinstance(statement, ast.ImportFrom):
         return any((alias.asname or alias.name) == "main" for alias in statement.names)
+    if isinstance(statement, ast.Assign):
+        made = isinstance(statement.value, (ast.Name, ast.Lambda))
+        return made and any(isinstance(target, ast.Name) and target.id == "main" for target in statement.targets)
     return isinstance(statement, ast.FunctionDef) and statement.name == "main"
 
 

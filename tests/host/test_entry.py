@@ -160,6 +160,11 @@ def setup_py(*scripts):
             "main, robot.node, main",
             ["main ran"],
         ),
+        (
+            f"from . import words\n{MAIN.replace('main()', 'run()')}main = run\n",
+            "main, robot.node, main",
+            ["main ran"],
+        ),
         (f"{MAIN}if __name__ == '_main_':\n    main()\n", "main, robot.node, main", ["main ran"]),
         (f"{MAIN}main()\n", "module, robot.node", ["main ran"]),
         ("from . import words\nif __name__ == '__main__':\n    say('guarded')\n", "module, robot.node", ["guarded"]),
@@ -289,6 +294,22 @@ def test_a_package_without_init_is_what_setup_py_says(start):
     found = start({**files, **setup_py("'node = robot.node:go'")}, "src/robot/robot/node.py")
     assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
     assert start(setup_py(), "src/robot/robot/node.py") == ("main, robot.node, main", ["main ran"])
+
+
+def test_a_program_of_a_cmake_package_is_a_script(start):
+    """It is installed as it is, beside others, and sees the Python packages that are built."""
+    built = {"robot/package.xml": "", "robot/CMakeLists.txt": "", "robot/robot/__init__.py": ""}
+    files = {
+        **built,
+        "robot/scripts/node.py": f"import helper\nfrom robot.words import WORD\nsay(WORD)\n{MAIN}main()\n",
+        "robot/scripts/helper.py": "",
+        "robot/robot/words.py": "WORD = 'found'\n",
+    }
+    assert start(files, "robot/scripts/node.py") == ("script", ["found", "main ran"])
+    assert start({**built, "robot/robot/node.py": MAIN}, "robot/robot/node.py") == (
+        "main, robot.node, main",
+        ["main ran"],
+    )
 
 
 @pytest.mark.parametrize("marker", ["setup.py", "package.xml"])
