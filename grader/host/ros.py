@@ -37,6 +37,11 @@ from .scheduler import Scheduler
 #: So many messages published in a row are let arrive before the next one, so that none is overwritten.
 MESSAGES_PER_FLUSH = 8
 KINDS = ("subscription", "guard_condition", "timer", "client", "service")
+#: The signals at which rclpy shuts contexts down, and the options that have it do so.
+SHUTTING_DOWN = {
+    signal.SIGINT: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGINT),
+    signal.SIGTERM: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGTERM),
+}
 #: The methods by which nodes look at the whole graph.
 GRAPH_LOOKS = (
     *("count_clients", "count_publishers", "count_services", "count_subscribers"),
@@ -402,6 +407,26 @@ def install_departures(leave: Callable[[], None], remove: Callable[[], None] = l
     leaving(rclpy.context.Context, "try_shutdown")
     for owner, name in ((os, "_exit"), (os, "abort"), (os, "kill"), (os, "killpg"), (signal, "raise_signal")):
         leaving(owner, name)
+
+
+def install_own_signals(settle: Callable[[], None]) -> None:
+    """Call `settle` when the program has sent itself a signal at which rclpy shuts down, in a thread of its own."""
+
+    def sending(owner: Any, name: str, mine: Callable[..., bool]) -> None:
+        send = getattr(owner, name)
+
+        @functools.wraps(send)
+        def sent(*args: Any) -> Any:
+            try:
+                return send(*args)
+            finally:
+                if mine(*args) and _rclpy.get_current_signal_handlers_options() in SHUTTING_DOWN.get(args[-1], ()):
+                    settle()
+
+        setattr(owner, name, sent)
+
+    sending(os, "kill", lambda process, _: process == os.getpid())
+    sending(signal, "raise_signal", lambda _: True)
 
 
 def leave_graph(ledger: Ledger) -> None:

@@ -68,6 +68,7 @@ class VirtualTime:
         ros.install_wait_sets(self.scheduler, self.clock, self._ledger)
         ros.install_traffic(self._ledger, self.clock, self._settle, self.leave)
         ros.install_looks(self.clock, self._ledger, self._settle)
+        ros.install_own_signals(self._await_shutdown)
         times.install_wall_time(self.clock)
         self._notice_output(ros)
 
@@ -196,9 +197,13 @@ class VirtualTime:
             originals.kill(os.getpid(), signal.SIGINT)
             originals.sleep(INTERRUPT_S)
         finally:
-            if self._ledger is not None:
-                self._ledger.await_shutdown()
-            self.scheduler.progress()
+            self._await_shutdown()
+
+    def _await_shutdown(self) -> None:
+        """Wait, in real time, until rclpy has done what it does at a signal."""
+        if self._ledger is not None:
+            self._ledger.await_shutdown()
+        self.scheduler.progress()
 
     def _may_go_on(self, wake_ns: int) -> bool:
         """Return whether time may move on unasked: nothing else happens until then, and nothing is to be told."""

@@ -130,6 +130,33 @@ def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
     assert numbers(trace) == list(range(18))
 
 
+@pytest.mark.parametrize("pause", ["", "time.sleep(0.1)"])
+def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run, pause):
+    """Without destroy_node(), publisher and client stay in the graph until they are freed."""
+    trace = run(f"""
+        held = []
+        for number in range(3):
+            rclpy.init()
+            node = Node('talker')
+            publisher = node.create_publisher(String, '/words', 10)
+            held.append((node, publisher, node.create_client(Trigger, '/status')))
+            burst(publisher, 3, 3 * number)
+            print(node.count_publishers('/words'), flush=True)
+            {pause}
+            rclpy.shutdown()
+        """)
+    assert numbers(trace) == list(range(9))
+    assert [line.text for line in trace.lines()] == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize("signal", ["os.kill(os.getpid(), signal.SIGTERM)", "signal.raise_signal(signal.SIGTERM)"])
+def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run, signal):
+    """A thread of rclpy's does that, which is no faster in virtual time."""
+    trace = run(TALKER + f"burst(publisher, 3)\n{signal}\nprint(rclpy.ok(), flush=True)\n")
+    assert numbers(trace) == [0, 1, 2]
+    assert [line.text for line in trace.lines()] == ["False"]
+
+
 LISTENER = """
 rclpy.init()
 class Listener(Node):
