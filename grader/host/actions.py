@@ -54,6 +54,8 @@ SERVICES = {
     "get_result": "{}_GetResult",
     "cancel_goal": "action_msgs/srv/CancelGoal",
 }
+#: Whether a client has a server, without a look that would let time pass.
+HAS_SERVER = _rclpy.ActionClient.is_action_server_available
 TOPICS = {"feedback": "{}_FeedbackMessage", "status": "action_msgs/msg/GoalStatusArray"}
 
 

@@ -23,7 +23,8 @@ def path_of(root: str, file: str) -> list[str]:
     """Return the folders that come first on the path: the script's own, or those that hold packages."""
     layout = layout_of(root, file)
     if not layout.module:
-        return [os.path.dirname(os.path.join(root, file))]
+        built = package_folders(root) if layout.package is not None else []
+        return list(dict.fromkeys((os.path.dirname(os.path.join(root, file)), *built)))
     return list(dict.fromkeys(f for f in (layout.base, *package_folders(root)) if f))
 
 

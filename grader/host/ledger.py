@@ -5,8 +5,11 @@ The counts only let the grader settle an instant; no verdict rests on them.
 
 from __future__ import annotations
 
+import functools
+import math
 import weakref
 from collections import Counter, deque
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.context import Context
@@ -14,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 
 from . import originals
-from .actions import ActionEnd, Receiver
+from .actions import HAS_SERVER, ActionEnd, Receiver
 
 #: Topics that every node has; nobody waits for them.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -56,6 +59,8 @@ class Ledger:
             kind: [] for kind in ("publisher", "subscription", "client", "service")
         }
         self.changed = False
+        #: Whether the program looks at the graph itself: then it sees there what the grader sees.
+        self.sees_graph = False
         #: Whether an endpoint or node has gone since the last report. The report comes before anything new is made: the
         #: grader could take the old endpoint in the graph for the new one.
         self.removed = False
@@ -298,7 +303,7 @@ class Ledger:
         for kind in ("publisher", "subscription"):
             for endpoint in self.alive(kind):
                 if endpoint.topic_name not in BACKGROUND:
-                    over[kind, endpoint.topic_name] += _matches(kind, endpoint)
+                    over[kind, endpoint.topic_name] += _matches(kind, endpoint) or 0
         for kind, name in over:
             over[kind, name] -= sum(expected.get(kind, {}).get(name, ()))
         return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
@@ -312,29 +317,55 @@ class Ledger:
 
     def _unmatched(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
         missing = []
+        if "graph" in expected and self._graph() != expected["graph"]:
+            missing.append("graph")
         for kind, names in expected.items():
-            found: dict[str, list[int]] = {}
-            for endpoint in self.alive(kind):
+            found: dict[str, list[float]] = {}
+            for endpoint in self.alive(kind) if kind in self._endpoints else ():
                 name = endpoint.topic_name if kind in ("publisher", "subscription") else service_name(endpoint)
                 if name in names:
-                    found.setdefault(name, []).append(
-                        self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
-                    )
+                    has = self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
+                    found.setdefault(name, []).append(math.inf if has is None else has)
             for end in self._actions if kind == "client" else ():
                 if end.kind == kind and names.keys() & set(end.services()):
-                    found.setdefault(end.services()[0], []).append(int(end.handle.is_action_server_available()))
+                    served = _asked(functools.partial(HAS_SERVER, end.handle))
+                    found.setdefault(end.services()[0], []).append(math.inf if served is None else served)
             for name, matches in found.items():
                 wanted = sorted(names[name], reverse=True)
                 if any(has < want for has, want in zip(sorted(matches, reverse=True), wanted, strict=False)):
                     missing.append(f"{kind} {name}")
         return missing
 
+    def _graph(self) -> dict[str, list[int]]:
+        """Count what the newest node sees in the graph, as the grader counts what it sees itself."""
+        node = self._node()
+        if node is None:
+            return {}
+        with node.handle:
+            found = Counter(
+                f"node {space.rstrip('/')}/{name}" for name, space in node.handle.get_node_names_and_namespaces()
+            )
+            for topic, _ in _rclpy.rclpy_get_topic_names_and_types(node.handle, False):  # noqa: FBT003 - C++
+                if topic not in BACKGROUND:
+                    found[f"publisher {topic}"] = node.handle.get_count_publishers(topic)
+                    found[f"subscription {topic}"] = node.handle.get_count_subscribers(topic)
+            for service, types in _rclpy.rclpy_get_service_names_and_types(node.handle):
+                if not types[0].startswith(BACKGROUND_SERVICES):
+                    found[f"service {service}"] = node.handle.get_count_services(service)
+                    found[f"client {service}"] = node.handle.get_count_clients(service)
+        return {name: [count] for name, count in found.items() if count}
+
     def _clients_of(self, service: str) -> int:
         """Return how many clients of a service this process knows."""
-        for node in self.nodes():
-            with node.handle:
-                return int(node.handle.get_count_clients(service))
-        return 0
+        node = self._node()
+        if node is None:
+            return 0
+        with node.handle:
+            return int(node.handle.get_count_clients(service))
+
+    def _node(self) -> Any:
+        """Return the newest node that can look at the graph, or None."""
+        return next((node for node in reversed(self.nodes()) if _CONTEXT_OK(node.context)), None)
 
     def _receivers(self, channel: str) -> list[Any]:
         actions = [r for end in self._actions for r in end.receivers.values() if r.channel == channel]
@@ -392,13 +423,21 @@ def _depth(receiver: Any) -> int:
     return max(1, int(depth))
 
 
-def _matches(kind: str, endpoint: Any) -> int:
+def _matches(kind: str, endpoint: Any) -> int | None:
+    """Return how many counterparts an endpoint has; None if its context was shut down: it stays until freed."""
     with endpoint.handle:
         if kind == "publisher":
-            return int(endpoint.handle.get_subscription_count())
+            return _asked(endpoint.handle.get_subscription_count)
         if kind == "subscription":
-            return int(endpoint.handle.get_publisher_count())
-        return int(endpoint.handle.service_server_is_available())
+            return _asked(endpoint.handle.get_publisher_count)
+        return _asked(endpoint.handle.service_server_is_available)
+
+
+def _asked(look: Callable[[], Any]) -> int | None:
+    try:
+        return int(look())
+    except _rclpy.RCLError:
+        return None
 
 
 def _await_ready(receiver: Any, context: Any) -> bool:

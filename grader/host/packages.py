@@ -11,13 +11,16 @@ import os
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+from .setup_files import given_to_setup
+
 #: What makes a folder that of a ROS package.
 MARKERS = ("setup.py", "package.xml")
+#: What builds a package that installs its programs as they are, unless there is a setup.py.
+CMAKE = "CMakeLists.txt"
 #: The name of a package whose own folder is all that was handed in.
 NAMELESS = "submission"
-#: Folders of a submission that are looked at in search of packages, and the longest text that is put together of a
-#: setup.py.
-FOLDERS, TEXT_CHARACTERS = 500, 10_000
+#: Folders of a submission that are looked at in search of packages.
+FOLDERS = 500
 
 SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
 
@@ -26,7 +29,7 @@ class Layout(NamedTuple):
     """Where a file lies.
 
     Attributes:
-        module: Its dotted name in its package; empty for a file in none.
+        module: Its dotted name in its package; empty for a file in none, and for a program of a CMake package.
         base: The folder that the dotted name begins in, absolute; empty if that is above the submission.
         package: Relative folder of the ROS package, that of its setup.py or package.xml; None without one.
     """
@@ -65,6 +68,8 @@ def layout_of(root: str, file: str) -> Layout:
     stem = os.path.splitext(os.path.basename(file))[0]
     if not chain and package is None:
         return Layout()
+    if not chain and package is not None and _is_file(root, package, CMAKE) and not _is_file(root, package, "setup.py"):
+        return Layout(package=package)
     if not chain and package is not None:
         below = os.path.relpath(folder, package) if folder != package else ""
         names, base = [part for part in below.split("/") if part], os.path.join(root, package)
@@ -151,17 +156,10 @@ def _script(line: str) -> tuple[str, str, str] | None:
 
 
 def _scripts_of_setup(tree: ast.Module) -> list[str]:
-    known: dict[str, Any] = {}
-    for statement in tree.body:
-        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-            known[statement.targets[0].id] = _value(statement.value, known)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _name(node.func) == "setup":
-            given = next((_value(k.value, known) for k in node.keywords if k.arg == "entry_points"), None)
-            scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
-            scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
-            return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, (list, tuple)) else []
-    return []
+    given = given_to_setup(tree).get("entry_points")
+    scripts = given.get("console_scripts") if isinstance(given, dict) else _ini_scripts(given)
+    scripts = scripts.splitlines() if isinstance(scripts, str) else scripts
+    return [s for s in scripts if isinstance(s, str)] if isinstance(scripts, list) else []
 
 
 def _ini_scripts(text: Any) -> list[str]:
@@ -174,48 +172,6 @@ def _ini_scripts(text: Any) -> list[str]:
         elif section == "console_scripts":
             found.append(line)
     return found
-
-
-def _name(node: ast.expr) -> str:
-    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
-
-
-def _value(node: ast.expr | None, known: dict[str, Any]) -> Any:
-    """Return what an expression of texts, lists and dictionaries comes to; None for anything else."""
-    value: Any = None
-    if isinstance(node, ast.Constant):
-        value = node.value
-    elif isinstance(node, ast.Name):
-        value = known.get(node.id)
-    elif isinstance(node, (ast.List, ast.Tuple)):
-        value = [_value(item, known) for item in node.elts]
-    elif isinstance(node, ast.Dict):
-        value = {_value(k, known): _value(v, known) for k, v in zip(node.keys, node.values, strict=True) if k}
-    elif isinstance(node, ast.JoinedStr):
-        parts = [_value(p.value if isinstance(p, ast.FormattedValue) else p, known) for p in node.values]
-        value = "".join(parts) if all(isinstance(part, str) for part in parts) else None
-    elif isinstance(node, ast.BinOp):
-        value = _combined(node, known)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
-        text, values = _value(node.func.value, known), [_value(a, known) for a in node.args]
-        named = {k.arg: _value(k.value, known) for k in node.keywords if k.arg}
-        plain = all(isinstance(v, str) for v in (*values, *named.values()))
-        value = text.format(*values, **named) if isinstance(text, str) and len(text) < 1000 and plain else None
-    if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
-        raise ValueError
-    return value
-
-
-def _combined(node: ast.BinOp, known: dict[str, Any]) -> Any:
-    left, right = _value(node.left, known), _value(node.right, known)
-    if isinstance(node.op, ast.Add) and isinstance(left, str) and isinstance(right, str):
-        return left + right
-    if isinstance(node.op, ast.Add) and isinstance(left, list) and isinstance(right, list):
-        return left + right
-    if isinstance(node.op, ast.Mod) and isinstance(left, str) and len(left) < 1000:
-        values = tuple(right) if isinstance(right, list) else (right,)
-        return left % values if all(isinstance(v, str) for v in values) else None
-    return None
 
 
 def _offers_main(tree: ast.Module) -> bool:
@@ -239,6 +195,9 @@ def _top_level(statements: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 def _defines_main(statement: ast.stmt) -> bool:
     if isinstance(statement, ast.ImportFrom):
         return any((alias.asname or alias.name) == "main" for alias in statement.names)
+    if isinstance(statement, ast.Assign):
+        made = isinstance(statement.value, (ast.Name, ast.Lambda))
+        return made and any(isinstance(target, ast.Name) and target.id == "main" for target in statement.targets)
     return isinstance(statement, ast.FunctionDef) and statement.name == "main"
 
 

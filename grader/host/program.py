@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import gc
 import importlib
 import os
 import random
@@ -62,6 +63,9 @@ def run(request: dict[str, Any]) -> None:
         time.give_up_outside = watchdog.give_up_on_waiting
         Watch(link, request["root"]).install()
     ending = play(request, describer, link, install_ros)
+    time.finish()
+    with contextlib.suppress(BaseException):
+        forget_modules(request["root"])
     if watchdog is not None:
         watchdog.stop()
     left = time.end()
@@ -106,11 +110,36 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
         ending["code"] = 130
     except BaseException as error:  # whatever the student's code raises becomes a fault
         ending = {"code": 1, "fault": describer.exception(error)}
+        sys.last_type, sys.last_value, sys.last_traceback = type(error), error, error.__traceback__
         sys.excepthook(type(error), error, error.__traceback__)
     with contextlib.suppress(BaseException):
         finish_threads()
         atexit._run_exitfuncs()
     return ending
+
+
+def forget_modules(root: str) -> None:
+    """Free what a program still holds, as the interpreter does at its very end: a `__del__` may publish.
+
+    Nothing can be imported by then, such as what rclpy's loggers import.
+
+    Args:
+        root: The submission's folder, whose modules are freed; others may still be needed.
+    """
+    sys.last_type = sys.last_value = sys.last_traceback = None
+    kept, finders = dict(sys.modules), sys.meta_path
+    inside = os.path.join(root, "")
+    for name, module in list(kept.items()):
+        if name == "__main__" or str(getattr(module, "__file__", None)).startswith(inside):
+            del kept[name]
+    del module
+    sys.modules.clear()
+    sys.meta_path = None  # type: ignore[assignment]
+    try:
+        gc.collect()
+    finally:
+        sys.modules.update(kept)
+        sys.meta_path = finders
 
 
 def finish_threads() -> None:

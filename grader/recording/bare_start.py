@@ -56,12 +56,12 @@ def bare_arguments(here: Path, root: str, file: str) -> tuple[str, ...]:
         called = f"importlib.import_module({start.module!r}).{start.function}()"
         return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, missing)
     module = start.module or PurePosixPath(file).stem
-    seen = seen if start.module else [beside]
+    seen = seen if start.module else list(dict.fromkeys([beside, *(seen if layout.package is not None else ())]))
     if run := _help(tree, module):
         return _by_import(run, seen, path, missing)
     if start.module:
         return _by_import(f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)", seen, path, missing)
-    return _by_import(script, seen, path, missing) if missing else ("-u", path)
+    return _by_import(script, seen, path, missing) if missing or len(seen) > 1 else ("-u", path)
 
 
 def _help(tree: ast.Module, module: str) -> str:

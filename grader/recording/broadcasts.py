@@ -35,6 +35,7 @@ class Broadcasts:
         self._matching.streams.pop(due.topic, None)
         self._matching.fixed.pop(due.topic, None)
         self._observer.withdraw(due.topic)
+        self._matching.tell_all()
         self._tape.add(Mark(now_ns, "stream_stops", due.topic))
 
     def offer(self, due: Due, now_ns: int) -> None:

@@ -248,6 +248,7 @@ class Conductor:
             if len(endpoints) > CLAIMS:
                 self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
             student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
+            student.sees_graph = report.get("sees_graph") is True
             self._note_offers(student)
             self._matching.match(self._now_ns)
             for due in self._desk.ready(self._matching.is_served):

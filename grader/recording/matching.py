@@ -122,9 +122,10 @@ class Matching:
     def tell_all(self) -> None:
         """Have every process wait for the counterparts of its endpoints."""
         claims = self._claims()
+        graph = self._observer.counts() if any(s.sees_graph for s in self._students) else {}
         for student in self._students:
             if not student.ended and (student.claims or student.told):
-                self._tell_matches(student, claims)
+                self._tell_matches(student, claims, graph)
 
     def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
         """Return whether the graph holds what the processes claim."""
@@ -180,13 +181,15 @@ class Matching:
         most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
         return len(same) <= matched and (matched <= most or not claim["reliable"])
 
-    def _tell_matches(self, student: Student, claims: list[dict[str, Any]]) -> None:
+    def _tell_matches(self, student: Student, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
         """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
         expected: dict[str, dict[str, list[int]]] = {}
         for claim in student.claims:
             count = self._counterparts(claim, claims)
             if count:
                 expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
+        if student.sees_graph:
+            expected["graph"] = {name: [count] for name, count in graph.items()}
         gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
         if expected == student.told and not (student.renewed and expected):
             return

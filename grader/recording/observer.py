@@ -27,7 +27,7 @@ from grader.model.quantities import MIB, size
 from grader.model.trace import Endpoint, GraphSnapshot
 from grader.recording.console import TEXT_CHARACTERS, Logged
 from grader.recording.interfaces import message_class, plain_fields
-from grader.recording.service_ends import ServiceEnds
+from grader.recording.service_ends import BACKGROUND_TYPES, ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -191,6 +191,19 @@ class Observer:
         """Return how many servers (`service`) or clients (`client`) of a service there are, with the grader's own."""
         count = self.node.count_services if kind == "service" else self.node.count_clients
         return int(count(service))
+
+    def counts(self) -> dict[str, int]:
+        """Return how many endpoints and nodes of each name any node sees in the graph now, with the grader's own."""
+        found = Counter(f"node {_full_name(*pair)}" for pair in self.node.get_node_names_and_namespaces())
+        for topic, _ in self.node.get_topic_names_and_types():
+            if topic not in BACKGROUND:
+                found[f"publisher {topic}"] = self.node.count_publishers(topic)
+                found[f"subscription {topic}"] = self.node.count_subscribers(topic)
+        for service, types in self.node.get_service_names_and_types():
+            if not types[0].startswith(BACKGROUND_TYPES):
+                found[f"service {service}"] = self.node.count_services(service)
+                found[f"client {service}"] = self.node.count_clients(service)
+        return {name: count for name, count in found.items() if count}
 
     def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
         """Return how many publishers the subscription for a topic, type and reliability has."""

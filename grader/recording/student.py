@@ -61,6 +61,7 @@ class Student:
         arrivals: What it has not yet been told is on its way to it.
         told: The counterparts it has been told to wait for.
         renewed: Whether its endpoints have changed since then.
+        sees_graph: Whether its program looks at the graph itself, as it says.
         offers: What it has told of services, clients and parameters.
         nudged: Whether it should look again at this instant, because its endpoints were matched.
         ended: Whether it has ended.
@@ -90,6 +91,7 @@ class Student:
     arrivals: dict[str, int] = field(default_factory=dict)
     told: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     renewed: bool = False
+    sees_graph: bool = False
     offers: set[tuple[str, str, str]] = field(default_factory=set)
     nudged: bool = False
     ended: bool = False

@@ -160,6 +160,11 @@ def setup_py(*scripts):
             "main, robot.node, main",
             ["main ran"],
         ),
+        (
+            f"from . import words\n{MAIN.replace('main()', 'run()')}main = run\n",
+            "main, robot.node, main",
+            ["main ran"],
+        ),
         (f"{MAIN}if __name__ == '_main_':\n    main()\n", "main, robot.node, main", ["main ran"]),
         (f"{MAIN}main()\n", "module, robot.node", ["main ran"]),
         ("from . import words\nif __name__ == '__main__':\n    say('guarded')\n", "module, robot.node", ["guarded"]),
@@ -236,6 +241,32 @@ def test_entry_points_may_stand_elsewhere(start, files):
 
 
 @pytest.mark.parametrize(
+    "code",
+    [
+        "nodes = ['other', 'node']\nE = {'console_scripts': [f'{n} = robot.{n}:go' for n in nodes]}",
+        "S = {'node': 'go', 'a': 'b'}\nE = dict(console_scripts=[f'{n}=robot.{n}:{f}' for n, f in S.items()])",
+        "S = []\nfor n in ('a', 'node'):\n    S.append('='.join([n, f'robot.{n}:go']))\nE = {'console_scripts': S}",
+        "S = ['a = robot.a:b']\nS += ['node = robot.node:go']\nE = {}\nE['console_scripts'] = S",
+        "a, b = 'node', 'robot'\nmore: list = [f'{a} = {b}.{a}:go']\nE = {'console_scripts': [*more, 'x = y:z']}",
+        "K = {'console_scripts': ['node = {p}.{n}:go'.format(p='robot', **{'n': 'node'})]}\nE = {**K, 'x': glob('*')}",
+    ],
+)
+@pytest.mark.parametrize(
+    "end",
+    [
+        "setup(entry_points=E)",
+        "A = dict(entry_points=E)\nsetup(**A)",
+        "def run(E=E):\n    setup(entry_points=E)\nrun()",
+    ],
+)
+def test_entry_points_may_be_put_together(start, code, end):
+    """By loops, comprehensions and variables."""
+    files = {**NODES, **setup_py(), "src/robot/setup.py": f"from setuptools import setup\n{code}\n{end}\n"}
+    found = start(files, "src/robot/robot/node.py")
+    assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
+
+
+@pytest.mark.parametrize(
     "files",
     [
         setup_py(),
@@ -244,6 +275,8 @@ def test_entry_points_may_stand_elsewhere(start, files):
         {"src/robot/setup.py": "setup(\n"},
         {"src/robot/setup.py": "setup(entry_points={'console_scripts': " + "[" * 150 + "]" * 150 + "})\n"},
         {"src/robot/setup.py": b"\0\xff"},
+        {"src/robot/setup.py": "a = [1]\nfor b in a:\n    a.append(a)\n    for c in a:\n        a += a\nsetup(a=a)\n"},
+        {"src/robot/setup.py": "a = ['x'] + ['y'] * 3\nsetup(entry_points={'console_scripts': sorted([1, 'a'])})\n"},
         {"src/robot/setup.py": "a = 'x' * 9\n" + "a = a + a\n" * 60 + "setup(entry_points=a)\n"},
         {"src/robot/package.xml": "<package/>", "src/robot/setup.cfg": "[[["},
         {"src/robot/setup.cfg": b"\xff\xfe"},
@@ -261,6 +294,22 @@ def test_a_package_without_init_is_what_setup_py_says(start):
     found = start({**files, **setup_py("'node = robot.node:go'")}, "src/robot/robot/node.py")
     assert found == ("entry_point, robot.node, go", ["go", "exit 3"])
     assert start(setup_py(), "src/robot/robot/node.py") == ("main, robot.node, main", ["main ran"])
+
+
+def test_a_program_of_a_cmake_package_is_a_script(start):
+    """It is installed as it is, beside others, and sees the Python packages that are built."""
+    built = {"robot/package.xml": "", "robot/CMakeLists.txt": "", "robot/robot/__init__.py": ""}
+    files = {
+        **built,
+        "robot/scripts/node.py": f"import helper\nfrom robot.words import WORD\nsay(WORD)\n{MAIN}main()\n",
+        "robot/scripts/helper.py": "",
+        "robot/robot/words.py": "WORD = 'found'\n",
+    }
+    assert start(files, "robot/scripts/node.py") == ("script", ["found", "main ran"])
+    assert start({**built, "robot/robot/node.py": MAIN}, "robot/robot/node.py") == (
+        "main, robot.node, main",
+        ["main ran"],
+    )
 
 
 @pytest.mark.parametrize("marker", ["setup.py", "package.xml"])

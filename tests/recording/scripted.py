@@ -128,6 +128,7 @@ class ScriptedStudent:
         self.nudged = False
         self.ended = False
         self.renewed = False
+        self.sees_graph = False
         self.workload: ScriptedWorkload | None = None
         self.unsettled = ""
         self.notes: list[str] = []

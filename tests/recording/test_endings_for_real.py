@@ -72,6 +72,28 @@ def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
     assert numbers(trace) == list(range(10))
 
 
+@pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])
+def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(run, at_the_end):
+    """A node that a module still holds is freed at the very end, when nothing can be imported any more."""
+    trace = run(f"""
+        import atexit
+        class Talker(Node):
+            def __init__(self):
+                super().__init__('talker')
+                self.publisher = self.create_publisher(String, '/words', 10)
+            def burst(self):
+                burst(self.publisher, 3)
+            def __del__(self):
+                self.burst()
+                import json
+        rclpy.init()
+        node = Talker()
+        {at_the_end}
+        """)
+    assert numbers(trace) == [0, 1, 2] * (2 if "atexit" in at_the_end else 1)
+    assert any(line.text.startswith("ImportError: sys.meta_path is None") for line in trace.lines())
+
+
 def test_a_context_manager_takes_nothing_with_it(run):
     trace = run("""
         from rclpy.context import Context
@@ -106,6 +128,33 @@ def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
             time.sleep(0.1)
         """)
     assert numbers(trace) == list(range(18))
+
+
+@pytest.mark.parametrize("pause", ["", "time.sleep(0.1)"])
+def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run, pause):
+    """Without destroy_node(), publisher and client stay in the graph until they are freed."""
+    trace = run(f"""
+        held = []
+        for number in range(3):
+            rclpy.init()
+            node = Node('talker')
+            publisher = node.create_publisher(String, '/words', 10)
+            held.append((node, publisher, node.create_client(Trigger, '/status')))
+            burst(publisher, 3, 3 * number)
+            print(node.count_publishers('/words'), flush=True)
+            {pause}
+            rclpy.shutdown()
+        """)
+    assert numbers(trace) == list(range(9))
+    assert [line.text for line in trace.lines()] == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize("signal", ["os.kill(os.getpid(), signal.SIGTERM)", "signal.raise_signal(signal.SIGTERM)"])
+def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run, signal):
+    """A thread of rclpy's does that, which is no faster in virtual time."""
+    trace = run(TALKER + f"burst(publisher, 3)\n{signal}\nprint(rclpy.ok(), flush=True)\n")
+    assert numbers(trace) == [0, 1, 2]
+    assert [line.text for line in trace.lines()] == ["False"]
 
 
 LISTENER = """
@@ -375,3 +424,29 @@ def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
         messages=(numbers,),
     )
     assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
+
+
+def test_a_look_at_the_graph_sees_what_is_there(run):
+    """At the first look, whatever it looks at; a loop that does nothing but look lets time pass."""
+    trace = run(
+        """
+        rclpy.init()
+        node = Node('other')
+        node.create_subscription(String, '/words', print, 10)
+        service = node.create_service(Trigger, '/status', print)
+        time.sleep(1)
+        node.destroy_service(service)
+        rclpy.spin(node)
+        """,
+        """
+        rclpy.init()
+        node = Node('looker')
+        publisher = node.create_publisher(String, '/words', 10)
+        print(publisher.get_subscription_count(), node.count_subscribers('/words'))
+        print('other' in node.get_node_names(), '/status' in dict(node.get_service_names_and_types()), flush=True)
+        while node.count_services('/status'):
+            pass
+        print('gone', flush=True)
+        """,
+    )
+    assert [(line.text, line.t_ns // MS) for line in trace.lines()] == [("2 2", 0), ("True True", 0), ("gone", 1000)]

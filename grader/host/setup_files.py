@@ -1,0 +1,190 @@
+"""Finds out what a setup.py passes to setup(): it is read, never run."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+#: The longest text and list that is put together of a setup.py, and how much of it is read at all.
+TEXT_CHARACTERS, ITEMS, STEPS = 10_000, 1_000, 20_000
+#: Methods of texts that are called, if they are given texts.
+_OF_TEXTS = frozenset(
+    {"format", "join", "lower", "lstrip", "replace", "rstrip", "split", "splitlines", "strip", "upper"}
+)
+_OF_DICTS = frozenset({"items", "keys", "values"})
+#: Functions and what they make of one value; `dict` takes named ones as well.
+_MAKING: Mapping[str, Callable[[Any], Any]] = {"list": list, "sorted": sorted, "str": str, "tuple": list}
+
+
+def given_to_setup(tree: ast.Module) -> dict[str, Any]:
+    """Return what is passed to setup() by name, as far as it can be known; unknown values are None.
+
+    Raises:
+        ValueError: There is too much of it.
+    """
+    reader = _Reader()
+    reader.run(tree.body)
+    return reader.given
+
+
+class _Reader:
+    """Follows the statements of a setup.py as far as they deal with texts, lists and dictionaries."""
+
+    def __init__(self) -> None:
+        self.given: dict[str, Any] = {}
+        self._known: dict[str, Any] = {}
+        self._steps = 0
+
+    def run(self, statements: Iterable[ast.stmt]) -> None:
+        """Follow statements, every branch of them, and the bodies of functions where these are defined."""
+        for statement in statements:
+            if isinstance(statement, ast.Assign):
+                value = self._value(statement.value)
+                for target in statement.targets:
+                    self._bind(target, value)
+            elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
+                self._bind(statement.target, self._value(statement.value))
+            elif isinstance(statement, ast.AugAssign):
+                both = ast.BinOp(_loaded(statement.target), statement.op, statement.value)
+                self._bind(statement.target, self._value(both))
+            elif isinstance(statement, (ast.Expr, ast.Return)):
+                self._value(statement.value)
+            elif isinstance(statement, ast.For):
+                for item in _items(self._value(statement.iter)):
+                    self._bind(statement.target, item)
+                    self.run(statement.body)
+            else:
+                for part in ("body", "orelse", "finalbody"):
+                    self.run(s for s in _parts(statement, part) if isinstance(s, ast.stmt))
+
+    def _bind(self, target: ast.expr, value: Any) -> None:
+        if isinstance(target, ast.Name):
+            self._known[target.id] = value
+        elif isinstance(target, (ast.Tuple, ast.List)):
+            values = _items(value)
+            for number, part in enumerate(target.elts):
+                self._bind(part, values[number] if number < len(values) else None)
+        elif isinstance(target, ast.Subscript):
+            holder, key = self._value(target.value), self._value(target.slice)
+            if isinstance(holder, dict) and isinstance(key, str):
+                holder[key] = value
+
+    def _value(self, node: ast.expr | None) -> Any:
+        """Return what an expression comes to; None for anything that is not known."""
+        self._steps += 1
+        value = self._of(node)
+        if self._steps > STEPS or (isinstance(value, str) and len(value) > TEXT_CHARACTERS):
+            raise ValueError
+        if isinstance(value, (list, dict)) and len(value) > ITEMS:
+            raise ValueError
+        return value
+
+    def _of(self, node: ast.expr | None) -> Any:
+        value: Any = None
+        if isinstance(node, ast.Constant):
+            value = node.value
+        elif isinstance(node, ast.Name):
+            value = self._known.get(node.id)
+        elif isinstance(node, (ast.List, ast.Tuple, ast.Set)):
+            value = [item for element in node.elts for item in self._elements(element)]
+        elif isinstance(node, ast.Dict):
+            value = self._dictionary(zip(node.keys, node.values, strict=True))
+        elif isinstance(node, ast.JoinedStr):
+            parts = [self._value(p.value if isinstance(p, ast.FormattedValue) else p) for p in node.values]
+            value = "".join(parts) if all(isinstance(part, str) for part in parts) else None
+        elif isinstance(node, ast.BinOp):
+            value = _combined(node.op, self._value(node.left), self._value(node.right))
+        elif isinstance(node, ast.Subscript):
+            value = _item(self._value(node.value), self._value(node.slice))
+        elif isinstance(node, (ast.ListComp, ast.GeneratorExp, ast.SetComp)):
+            value = list(self._comprehended(node.elt, node.generators))
+        elif isinstance(node, ast.Call):
+            value = self._called(node)
+        return value
+
+    def _elements(self, node: ast.expr) -> list[Any]:
+        return _items(self._value(node.value)) if isinstance(node, ast.Starred) else [self._value(node)]
+
+    def _dictionary(self, pairs: Iterable[tuple[ast.expr | None, ast.expr]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key, node in pairs:
+            value, name = self._value(node), None if key is None else self._value(key)
+            if isinstance(name, str):
+                found[name] = value
+            elif key is None and isinstance(value, dict):
+                found.update(value)
+        return found
+
+    def _comprehended(self, element: ast.expr, generators: list[ast.comprehension]) -> Iterator[Any]:
+        """Yield what a comprehension makes; conditions are taken to hold."""
+        if not generators:
+            yield self._value(element)
+            return
+        for item in _items(self._value(generators[0].iter)):
+            self._bind(generators[0].target, item)
+            yield from self._comprehended(element, generators[1:])
+
+    def _called(self, node: ast.Call) -> Any:
+        named = self._dictionary((None if k.arg is None else ast.Constant(k.arg), k.value) for k in node.keywords)
+        if _name(node.func) == "setup":
+            self.given = self.given or named
+            return None
+        values = [item for argument in node.args for item in self._elements(argument)]
+        if isinstance(node.func, ast.Attribute):
+            return _method(self._value(node.func.value), node.func.attr, values, named)
+        name = _name(node.func)
+        if name == "dict":
+            return {**(values[0] if values and isinstance(values[0], dict) else {}), **named}
+        known = len(values) == 1 and isinstance(values[0], (str, list))
+        return _MAKING[name](values[0]) if name in _MAKING and known else None
+
+
+def _method(of: Any, name: str, values: list[Any], named: dict[str, Any]) -> Any:
+    """Return what a method gives; those that change a list or a dictionary do so."""
+    if isinstance(of, list) and name in ("append", "extend") and len(values) == 1:
+        of += values if name == "append" else _items(values[0])
+    elif isinstance(of, dict) and name == "update":
+        of.update({k: v for given in (*values, named) if isinstance(given, dict) for k, v in given.items()})
+    elif isinstance(of, dict) and name in _OF_DICTS:
+        return [list(found) if name == "items" else found for found in getattr(of, name)()]
+    elif isinstance(of, str) and name in _OF_TEXTS and len(of) < TEXT_CHARACTERS // 10:
+        texts = _items(values[0]) if name == "join" and values else [*values, *named.values()]
+        return getattr(of, name)(*values, **named) if all(isinstance(text, str) for text in texts) else None
+    return None
+
+
+def _combined(operator: ast.operator, left: Any, right: Any) -> Any:
+    if isinstance(operator, ast.Add) and type(left) is type(right) and isinstance(left, (str, list)):
+        return left + right
+    if isinstance(operator, ast.BitOr) and isinstance(left, dict) and isinstance(right, dict):
+        return left | right
+    if isinstance(operator, ast.Mod) and isinstance(left, str) and len(left) < TEXT_CHARACTERS // 10:
+        values = tuple(right) if isinstance(right, list) else (right,)
+        return left % values if all(isinstance(v, str) for v in values) else None
+    return None
+
+
+def _item(of: Any, key: Any) -> Any:
+    if isinstance(of, dict):
+        return of.get(key) if isinstance(key, str) else None
+    known = isinstance(of, (list, str)) and type(key) is int and -len(of) <= key < len(of)
+    return of[key] if known else None
+
+
+def _items(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, dict)) else []
+
+
+def _loaded(target: ast.expr) -> ast.expr:
+    """Return the target of an assignment as an expression that is read."""
+    return ast.Name(target.id) if isinstance(target, ast.Name) else target
+
+
+def _parts(statement: ast.stmt, part: str) -> list[Any]:
+    found = getattr(statement, part, None)
+    return found if isinstance(found, list) else []
+
+
+def _name(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
