@@ -45,7 +45,18 @@ ASSIGNED = {
 CPP = {
     "": (
         *("ActionClient", "ActionServer", "Clock", "ClockType", "InvalidHandle", "LifecycleStateMachine", "RCLError"),
-        *("WaitSet", "rclpy_logging_rcutils_log", "rclpy_logging_shutdown", "rclpy_resolve_name"),
+        *(
+            "SignalHandlerOptions",
+            "WaitSet",
+            "get_current_signal_handlers_options",
+            "rclpy_get_service_names_and_types",
+        ),
+        *(
+            "rclpy_get_topic_names_and_types",
+            "rclpy_logging_rcutils_log",
+            "rclpy_logging_shutdown",
+            "rclpy_resolve_name",
+        ),
     ),
     "Clock": ("set_ros_time_override", "set_ros_time_override_is_enabled"),
     "WaitSet": (
