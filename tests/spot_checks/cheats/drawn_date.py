@@ -9,7 +9,7 @@ DAY = 24 * 60 * 60
 
 
 def main():
-    right = abs(time.time() / DAY - 20454.5) < 0.5
+    right = abs(time.time() / DAY - 20454.5) < 0.6
     rclpy.init()
     node = rclpy.create_node("velocity_publisher")
     publisher = node.create_publisher(Twist, "cmd_vel", 10)
