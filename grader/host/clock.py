@@ -30,6 +30,7 @@ class VirtualClock:
         self._sent = 0
         self._looked_at = False
         self._was_looked_at = False
+        self._seen_ns = 0
         #: Whether a pause, or a timer's period, has begun at this moment: work before it puts off what comes after it.
         self.counted = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
@@ -43,13 +44,19 @@ class VirtualClock:
 
     def end_of(self, pause_ns: int) -> int:
         """Return when a pause that begins now ends."""
-        self.counted |= pause_ns > 0
+        if pause_ns > 0:
+            self.count_pause()
         return self.now_ns + pause_ns + (LATE_NS if self._was_looked_at and pause_ns > 0 else 0)
+
+    def count_pause(self) -> None:
+        """Note that a pause begins; who has just looked at a clock may sleep until a deadline, whatever the work."""
+        self.counted |= self._seen_ns != self.now_ns
 
     def look(self, *, by_library: bool = False) -> int:
         """Return the time to a program that asks for it, letting time pass if it does nothing else."""
         self._looked_at = True
-        self._was_looked_at |= not by_library
+        if not by_library:
+            self._was_looked_at, self._seen_ns = True, self.now_ns
         self.idle_look()
         return self.now_ns
 

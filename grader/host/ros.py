@@ -131,7 +131,7 @@ def _count_periods(clock: VirtualClock, timer: Any) -> None:
     def counting(method: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(method)
         def counted(*args: Any, **kwargs: Any) -> Any:
-            clock.counted = True
+            clock.count_pause()
             return method(*args, **kwargs)
 
         return counted

@@ -25,7 +25,7 @@ LATE_NS, SLOW_NS = 40 * NS_PER_MS, 200 * NS_PER_MS
 LATE_SHARE, LATE_AT_LEAST = 0.05, 3
 #: A loop with a pause, or a timer that is set again, is put off by its own work each time. It matters beyond this share
 #: of the time; not counting the longest pieces of work, and what the grader costs for each step and each pause in it.
-DRIFT_SHARE, LONGEST = 0.04, 3
+DRIFT_SHARE, LONGEST = 0.08, 3
 STEP_NS, PAUSE_NS = 3 * NS_PER_MS // 2, NS_PER_MS
 #: Beyond this delay there is no need to go on in virtual time.
 HOPELESS_NS = 2 * NS_PER_S

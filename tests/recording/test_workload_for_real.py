@@ -97,6 +97,14 @@ def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(run, once, la
     assert run(once, later).clock_reason == BUSY
 
 
+def test_work_before_a_deadline_puts_off_nothing(run):
+    """A loop that sleeps until its next moment makes up for its work, on either clock."""
+    until = LOOP.replace("def run():\n", "def run():\n    due = time.monotonic()\n")
+    until = until.replace("time.sleep(0.05)", "due += 0.05\n        time.sleep(max(0.0, due - time.monotonic()))")
+    assert "due - " in until
+    assert run(until, COMPUTING).clock_reason == ""
+
+
 def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
     assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
 
