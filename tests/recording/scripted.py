@@ -107,7 +107,7 @@ class ScriptedWorkload:
     def arrived(self) -> None:
         """Wait no longer for messages."""
 
-    def end(self) -> None:
+    def end(self, **_: object) -> None:
         """Take what the step cost."""
         self.delay.work(self._student.cost_ns)
 
