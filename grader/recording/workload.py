@@ -27,6 +27,9 @@ LATE_SHARE, LATE_AT_LEAST = 0.05, 3
 #: of the time; not counting the longest pieces of work, and what the grader costs for each step and each pause in it.
 DRIFT_SHARE, LONGEST = 0.08, 3
 STEP_NS, PAUSE_NS = 3 * NS_PER_MS // 2, NS_PER_MS
+#: What each of the polls of a busy loop may cost, and how many there may be in a step: on a real clock such a loop
+#: makes as many as there is time for, and is not late by them.
+POLL_NS, MOST_POLLS = NS_PER_MS // 2, 10
 #: Beyond this delay there is no need to go on in virtual time.
 HOPELESS_NS = 2 * NS_PER_S
 
@@ -130,7 +133,7 @@ class Workload:
 
         Args:
             counted: Whether a pause, or a timer's period, began in this step.
-            moved: How many pauses there were inside of it.
+            moved: How many pauses or polls there were inside of it; more than a few are not believed.
         """
         real_ns = time.monotonic_ns() - self._began_ns
         used_ns = max(0, self._used() - self._used_before_ns)
@@ -140,9 +143,10 @@ class Workload:
         taken_ns = max(used_ns, real_ns)
         self.used_ns += used_ns
         self.waited_ns += taken_ns - used_ns
-        self.delay.work(taken_ns)
+        moves = min(moved, MOST_POLLS) if isinstance(moved, int) else 0
+        self.delay.work(max(0, taken_ns - POLL_NS * max(0, moves)))
         if counted:
-            self.delay.put_off(taken_ns - STEP_NS - PAUSE_NS * (moved if isinstance(moved, int) else 0))
+            self.delay.put_off(taken_ns - STEP_NS - PAUSE_NS * max(0, moves))
 
     def _used(self) -> int:
         """Return the processor time that the process has used; 0 once it has ended."""

@@ -105,6 +105,26 @@ def test_work_before_a_deadline_puts_off_nothing(run):
     assert run(until, COMPUTING).clock_reason == ""
 
 
+POLLS = """
+import threading
+def run():
+    due = time.perf_counter()
+    while True:
+        rclpy.ok()
+        if time.perf_counter() >= due:
+            due += 0.05
+            self.tick()
+self.destroy_timer(self.timer)
+threading.Thread(target=run, daemon=True).start()
+"""
+
+
+@pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(3_000_000))", BUSY)], ids=["polls", "works"])
+def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(run, later, reason):
+    """On a real clock a busy loop polls as often as there is time for, and is late by what it computes only."""
+    assert run(POLLS, later).clock_reason == reason
+
+
 def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
     assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
 
