@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from grader.recording import patience
-from grader.recording.patience import BRIEF_S, LOSSES, SETTLE_S, Patience
+from grader.recording.patience import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
 
 
 @pytest.fixture
@@ -18,6 +18,7 @@ def waited(monkeypatch) -> list[float]:
         return condition()
 
     monkeypatch.setattr(patience, "wait_until", wait_until)
+    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0))
     return found
 
 
@@ -37,3 +38,25 @@ def test_after_some_losses_waits_are_brief(waited):
     assert mine.wait_s == BRIEF_S
     assert mine.wait(lambda: True)
     assert waited == [*[SETTLE_S] * (LOSSES - 1), BRIEF_S]
+
+
+@pytest.mark.parametrize(("load", "times"), [(0.1, 1.0), (6.0, 3.0), (100.0, MOST_BUSY)])
+def test_a_busy_machine_gets_more_time(waited, monkeypatch, load, times):
+    """In proportion to how long everything takes there; an impatient recording stays impatient."""
+    monkeypatch.setattr("os.getloadavg", lambda: (load, 0.0, 0.0))
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    mine = Patience()
+    assert mine.wait_s == times * SETTLE_S
+    for _ in range(LOSSES):
+        mine.lose()
+    assert mine.wait_s == BRIEF_S
+
+
+def test_a_system_that_tells_no_load_is_taken_for_a_quiet_one(monkeypatch):
+    """Not all containers show it."""
+
+    def refuse():
+        raise OSError
+
+    monkeypatch.setattr("os.getloadavg", refuse)
+    assert Patience().wait_s == SETTLE_S
