@@ -31,17 +31,17 @@ class Patience:
     """The patience of one recording.
 
     Args:
-        full_s: How long a wait may take at first.
+        full_s: How long a wait may take at first, on a quiet machine.
     """
 
     def __init__(self, full_s: float = SETTLE_S) -> None:
-        self._full_s = full_s
+        self._full_s = full_s * load_per_processor()
         self._losses = 0
 
     @property
     def wait_s(self) -> float:
         """How long the next wait may take."""
-        return self._full_s * load_per_processor() if self._losses < LOSSES else BRIEF_S
+        return self._full_s if self._losses < LOSSES else BRIEF_S
 
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
         """Wait until a condition holds; return whether it came to."""
