@@ -87,11 +87,11 @@ class SpotChecks:
 
     def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> list[Key]:
         """Return what is checked: recordings that nothing was wrong with; in virtual time, unless it is suspected."""
+        drawn = self.drawn
         return [
             key
             for key, job in jobs.items()
-            if (self.drawn or self.suspects(key, traces))
-            and _can_be_checked(job.plan, traces[key], suspect=self.suspects(key, traces))
+            if _is_due(job.plan, traces[key], drawn=drawn, suspect=self.suspects(key, traces))
         ]
 
     def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
@@ -136,13 +136,15 @@ def check(
     return found
 
 
-def _can_be_checked(plan: Plan, trace: Trace, *, suspect: bool) -> bool:
-    """Return whether a recording is one in virtual time, of processes that all start at once.
+def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
+    """Return whether a recording of processes that all start at once is checked.
 
-    One on the wall clock is, if who suspects it wants to know whether the program finds the grader in its process.
+    One in virtual time is if it is drawn or suspected; one on the wall clock only if it is suspected: the program may
+    find the grader in its process.
     """
-    judged = suspect if trace.clock is ClockKind.WALL else not trace.clock_reason
-    return judged and not trace.harness_problem and not plan.starts_ns
+    on_virtual = (drawn or suspect) and not trace.clock_reason
+    wanted = suspect if trace.clock is ClockKind.WALL else on_virtual
+    return wanted and not trace.harness_problem and not plan.starts_ns
 
 
 def _disagreement(job: Job, virtual: Trace, record: Record) -> tuple[Difference | None, bool]:

@@ -143,10 +143,10 @@ class Workload:
         taken_ns = max(used_ns, real_ns)
         self.used_ns += used_ns
         self.waited_ns += taken_ns - used_ns
-        moves = min(moved, MOST_POLLS) if isinstance(moved, int) else 0
-        self.delay.work(max(0, taken_ns - POLL_NS * max(0, moves)))
+        moves = min(max(moved, 0), MOST_POLLS) if isinstance(moved, int) else 0
+        self.delay.work(max(0, taken_ns - POLL_NS * moves))
         if counted:
-            self.delay.put_off(taken_ns - STEP_NS - PAUSE_NS * max(0, moves))
+            self.delay.put_off(taken_ns - STEP_NS - PAUSE_NS * moves)
 
     def _used(self) -> int:
         """Return the processor time that the process has used; 0 once it has ended."""
