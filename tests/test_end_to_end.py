@@ -10,16 +10,14 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from recorded.archive import SEED, SUBMISSIONS, outcomes, told
 from ruamel.yaml import YAML
 
 from grader.session import Request, grade
 
 ROOT = Path(__file__).resolve().parent.parent
-SUBMISSIONS = ROOT / "tests" / "submissions"
 EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
 GOLDEN = YAML(typ="safe").load((SUBMISSIONS / "golden.yaml").read_text(encoding="utf-8"))
-#: That of the golden texts, see tests/recorded.
-SEED = 1
 #: What these are told depends on where a loop stood when it was stopped.
 UNSTEADY = ("broken/loops_in_callback", "broken/loops_in_constructor", "broken/events_executor", "broken/memory_grows")
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -31,25 +29,9 @@ def say_nothing(step):
     del step
 
 
-def outcomes(report):
-    """Return the outcome of every criterion that is not met, and what a student reads about it."""
-    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
-    told = {v.id: f"{v.reason} | hint: {v.hint}" for v in verdicts}
-    return {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}, told
-
-
-def what_a_student_reads(report):
-    """Return reason, hint and place of every criterion that lost points by a fault of its own."""
-    return {
-        verdict.id: {
-            "reason": verdict.reason,
-            "hint": verdict.hint,
-            "at": f"{verdict.location.file}:{verdict.location.line}" if verdict.location else "",
-        }
-        for exercise in report.exercises
-        for verdict in exercise.verdicts
-        if verdict.outcome.value in ("not_met", "partly")
-    }
+def reasons(report):
+    """Return what a student reads about every criterion."""
+    return {v.id: f"{v.reason} | hint: {v.hint}" for exercise in report.exercises for v in exercise.verdicts}
 
 
 def run(*arguments, **options):
@@ -70,19 +52,18 @@ def test_a_submission_gets_what_it_is_worth(folder):
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = EXPECTED[folder]
     report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
-    found, told = outcomes(report)
-    assert found == wanted["expected"], told
+    assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.
     same_words = report.environment.ros_distro == "jazzy" or folder != "broken/timer_callback_called"
     if steady and same_words:
-        assert what_a_student_reads(report) == GOLDEN.get(folder, {})
+        assert told(report) == GOLDEN.get(folder, {})
 
 
 def test_the_reference_solutions_score_full_on_the_virtual_clock():
     """All that the exercises ask can be done, and needs no wall clock."""
     report = grade(Request(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
-    assert outcomes(report)[0] == {}
+    assert outcomes(report) == {}
     assert (report.score, report.max_score, report.final) == (100, 100, True)
 
 
@@ -98,7 +79,7 @@ def test_the_wall_clock_gives_the_same_verdict():
     request = Request(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
     report = grade(request, say_nothing)
     assert report.exercises[0].clock.value == "wall"
-    lost = {i: o for i, o in outcomes(report)[0].items() if o != "undecided"}  # a busy machine decides nothing
+    lost = {i: o for i, o in outcomes(report).items() if o != "undecided"}  # a busy machine decides nothing
     assert lost == {}
 
 
