@@ -14,19 +14,15 @@ import click
 
 import grader
 from grader.commands import batch, doctor, explain, export, rejudge, rubric, selftest
+from grader.exit_codes import ALL_MET, INTERRUPTED, UNDECIDED, UNUSABLE, exit_code
 from grader.model.containment import TIERS, missing
 from grader.model.errors import GraderError, HarnessError, RubricError
 from grader.options import (
-    ALL_MET,
     EVIDENCE,
-    INTERRUPTED,
     PATH,
-    UNDECIDED,
-    UNUSABLE,
     audience_options,
     drawn_by,
     drawn_with,
-    exit_code,
     parse_outputs,
     parse_percent,
     parse_share,

@@ -1,4 +1,4 @@
-"""What the commands of the command line share: exit codes, and how options are read."""
+"""What the commands of the command line share: how options are read, and which files they name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import click
 
 from grader.model.feedback import Audience
 from grader.model.limits import TIME_BUDGET_S
-from grader.model.report import Report
 from grader.reports.delivery import Output
 from grader.reports.formats import FORMATS
 from grader.reports.readers import Readers
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from grader.seeding import SeedKey
     from grader.variants import ByKey
 
-ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 #: What `-o` calls the folder of recordings that a report rests on.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
@@ -139,19 +137,6 @@ def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float
     if not 0 <= percent <= 100:  # NaN loses
         raise click.BadParameter(f"expected a share from 0% to 100%, found {value!r}")
     return percent / 100
-
-
-def exit_code(report: Report, min_score: Fraction | None) -> int:
-    """Return what the exit code says about a report.
-
-    Args:
-        report: The result, as far as whoever sees the exit code may see it.
-        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
-    """
-    if not report.final:
-        return UNDECIDED
-    reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score
-    return ALL_MET if reached else NOT_ALL_MET
 
 
 def nearest(found: str, known: Sequence[str]) -> str:

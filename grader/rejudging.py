@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from grader.exit_codes import UNUSABLE, exit_code
 from grader.judging.whole import judge_run
 from grader.keeping import request_of
 from grader.model.errors import EvidenceError, GraderError
 from grader.model.exercise import Exercise
 from grader.model.report import Report
-from grader.options import UNUSABLE, exit_code
 from grader.reading.variants import First
 from grader.recording.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
 from grader.reports.audience import told

@@ -30,10 +30,10 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
         "rubric.schema.json",
         "odometry/metadata.yaml",
     ):
-        assert f"grader/rubrics/{needed}" in names
+        assert f"grader/shipped/rubrics/{needed}" in names
     assert "grader/reports/report.schema.json" in names
     assert "grader/host/fastdds.xml" in names
-    assert "grader/student_template/velocity_publisher.py" in names
+    assert "grader/shipped/student_template/velocity_publisher.py" in names
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]
 
 

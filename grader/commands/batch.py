@@ -10,17 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from grader.batch.cluster.extra import require_dask
+from grader.exit_codes import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
 from grader.model.containment import TIERS
-from grader.options import (
-    ALL_MET,
-    INTERRUPTED,
-    NOT_ALL_MET,
-    PATH,
-    UNDECIDED,
-    drawn_with,
-    parse_share,
-    time_budget_option,
-)
+from grader.options import PATH, drawn_with, parse_share, time_budget_option
 from grader.reports.escape import encoded, shown
 from grader.similarity.extra import require_library
 

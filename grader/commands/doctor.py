@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from grader.options import ALL_MET, UNUSABLE
+from grader.exit_codes import ALL_MET, UNUSABLE
 from grader.progress import shown_progress
 from grader.reports.delivery import show
 

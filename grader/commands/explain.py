@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from grader.options import ALL_MET, PATH
+from grader.exit_codes import ALL_MET
+from grader.options import PATH
 from grader.reports.delivery import show
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from grader.exit_codes import ALL_MET
 from grader.model.containment import NO_WALLS, TIERS
 from grader.model.errors import GraderError
-from grader.options import ALL_MET, PATH
+from grader.options import PATH
 from grader.reports.delivery import show
 
 _exercises = click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this; repeatable.")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.options import EVIDENCE, PATH, audience_options, exit_code, parse_outputs, parse_percent, readers
+from grader.exit_codes import exit_code
+from grader.options import EVIDENCE, PATH, audience_options, parse_outputs, parse_percent, readers
 from grader.reports.delivery import Output, deliver, prepared, show
 from grader.reports.formats import FORMATS
 

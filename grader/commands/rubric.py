@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from grader.exit_codes import ALL_MET, UNUSABLE
 from grader.model.containment import TIERS
 from grader.model.errors import GraderError, RubricError
-from grader.options import ALL_MET, PATH, UNUSABLE
+from grader.options import PATH
 from grader.progress import shown_progress
 from grader.reports.delivery import show
 from grader.reports.destination import write_whole

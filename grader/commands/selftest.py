@@ -7,9 +7,10 @@ from pathlib import Path
 
 import click
 
+from grader.exit_codes import ALL_MET, NOT_ALL_MET
 from grader.model.containment import TIERS
 from grader.model.errors import EnvironmentFault
-from grader.options import ALL_MET, NOT_ALL_MET, PATH
+from grader.options import PATH
 from grader.progress import shown_progress
 from grader.reports.delivery import show
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import grader
 from grader.model.errors import EnvironmentFault
-from grader.reading.shipped import shipped_folder
+from grader.reading.shipped import shipped
 
 PACKAGE = "rclpy-grader"
 #: A zip knows no time before this; the same files give the same bytes.
@@ -23,14 +23,12 @@ _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 _PROGRAM, _FILE, _PRIVATE = 0o100755, 0o100644, 0o100600
 #: What every environment has of its own, for its own Python.
 _WITH_PYTHON = ("pip", "setuptools", "wheel")
-_NOT_PACKED = ("__pycache__", "rubrics", "integrations")
+_NOT_PACKED = ("__pycache__", "shipped")
 
 
 def integration(name: str) -> bytes:
     """Return one of the files that platforms run, such as `gradescope/setup.sh`."""
-    package = Path(grader.__file__).resolve().parent
-    inside = package / "integrations"
-    return ((inside if inside.is_dir() else package.parent / "integrations") / name).read_bytes()
+    return (shipped("integrations") / name).read_bytes()
 
 
 def wheel() -> tuple[str, bytes]:
@@ -113,11 +111,9 @@ def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
 def _code() -> dict[str, bytes]:
     package = Path(grader.__file__).resolve().parent
     files = {f"grader/{name}": content for name, content in _below(package, but=_NOT_PACKED).items()}
-    for name, content in _below(shipped_folder()).items():
-        files[f"grader/rubrics/{name}"] = content
-    inside = package / "integrations"
-    for name, content in _below(inside if inside.is_dir() else package.parent / "integrations").items():
-        files[f"grader/integrations/{name}"] = content
+    for folder in ("rubrics", "integrations"):
+        for name, content in _below(shipped(folder)).items():
+            files[f"grader/shipped/{folder}/{name}"] = content
     return files
 
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 
+def shipped(name: str) -> Path:
+    """Return a folder that comes with the grader: `rubrics`, `student_template` or `integrations`."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "shipped" / name
+    return inside if inside.is_dir() else package.parent / name
+
+
 def shipped_folder() -> Path:
     """Return the folder of the built-in rubrics and of the recording."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "rubrics"
-    return inside if inside.is_dir() else package.parent / "rubrics"
+    return shipped("rubrics")
 
 
 def shipped_templates() -> Path:
     """Return the folder of the templates that students begin with."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "student_template"
-    return inside if inside.is_dir() else package.parent / "student_template"
+    return shipped("student_template")
 
 
 def builtin_odometry() -> Path:

@@ -74,8 +74,12 @@ def test_the_wheel_holds_what_an_installation_needs_and_no_solution():
     archive = opened(content)
     names = set(archive.namelist())
     assert re.fullmatch(r"rclpy_grader-[\w.]+-py3-none-any\.whl", name)
-    needed = {"grader/cli.py", "grader/rubrics/exercise_1.yaml", "grader/rubrics/odometry/odometry.mcap"}
-    assert needed | {"grader/integrations/prepare", "grader/reports/report.schema.json"} <= names
+    needed = {
+        "grader/cli.py",
+        "grader/shipped/rubrics/exercise_1.yaml",
+        "grader/shipped/rubrics/odometry/odometry.mcap",
+    }
+    assert needed | {"grader/shipped/integrations/prepare", "grader/reports/report.schema.json"} <= names
     assert not [n for n in names if "__pycache__" in n or "reference" in n or "template/" in n]
     record = next(n for n in names if n.endswith("RECORD"))
     rows = list(csv.reader(archive.read(record).decode().splitlines()))

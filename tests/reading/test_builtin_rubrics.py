@@ -176,7 +176,7 @@ def test_the_schema_is_plain_json():
 
 def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatch):
     """Beside the package's code, exercise 2 before exercise 10."""
-    rubrics = tmp_path / "grader" / "rubrics"
+    rubrics = tmp_path / "grader" / "shipped" / "rubrics"
     rubrics.mkdir(parents=True)
     text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
