@@ -12,8 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.batch import standing as kept
-from grader.batch.standing import Standing
+from grader.batch.standing import Standing, dump, load
 from grader.model.errors import ClassError, HarnessError
 from grader.reports.destination import write_whole
 
@@ -84,11 +83,11 @@ class Store:
         try:
             before = self.kept(name).result
             if before is not None and before.state.worth > standing.state.worth:
-                write_whole(place / ATTEMPT, kept.dump(standing))
+                write_whole(place / ATTEMPT, dump(standing))
                 shutil.rmtree(fresh, ignore_errors=True)
                 return False
             fresh.mkdir(exist_ok=True)
-            write_whole(fresh / RESULT, kept.dump(standing))
+            write_whole(fresh / RESULT, dump(standing))
             _sync(fresh)
             self._swap(fresh, place)
         except OSError as error:
@@ -183,7 +182,7 @@ def open_store(folder: Path) -> Iterator[Store]:
 
 def _read(path: Path) -> Standing | None:
     with suppress(OSError):
-        return kept.load(path.read_bytes())
+        return load(path.read_bytes())
     return None
 
 
