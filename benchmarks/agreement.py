@@ -20,8 +20,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.model.errors import GraderError
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
+from grader.core.errors import GraderError
 
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
 MODES = ("virtual", "wall", "auto", "auto-load")

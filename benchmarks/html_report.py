@@ -10,9 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-from grader.reports.html.bundle import bundle, shared_assets
-from grader.reports.html.render import render_html
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
+from grader.reporting.html.assets import bundle, shared_assets
+from grader.reporting.html.render import render_html
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = 20

@@ -19,13 +19,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.model.errors import EnvironmentFault
-from grader.recording.isolation.choose import choose_isolation
-from grader.recording.isolation.environment import quick_discovery, runtime_environment
-from grader.recording.isolation.protocol import Limits, StudentProcess, runtime_from_json, runtime_to_json
-from grader.recording.isolation.starting import HOST
-from grader.recording.isolation.tiers import WALLED, isolation_from_name
-from grader.recording.ros_installation import RosInstallation, find_ros
+from grader.core.errors import EnvironmentFault
+from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.sandbox.choose import choose_isolation
+from grader.execution.sandbox.environment import quick_discovery, runtime_environment
+from grader.execution.sandbox.protocol import Limits, StudentProcess, runtime_from_json, runtime_to_json
+from grader.execution.sandbox.starting import HOST
+from grader.execution.sandbox.tiers import WALLED, isolation_from_name
 
 NODE = """
 import rclpy, os

@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from grader import rejudging
+from grader.app import rejudge
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -45,24 +45,24 @@ def main() -> None:
         measure(members)
 
 
-def processor_s(one: tuple[str, Path], how: rejudging.Judgement, wanted: rejudging.Wanted) -> float:
+def processor_s(one: tuple[str, Path], how: rejudge.Judgement, wanted: rejudge.Wanted) -> float:
     """Return the processor time that one submission takes, start-up left out."""
     started = time.process_time()
-    rejudging.rejudge_class([one], how, wanted, jobs=1)
+    rejudge.rejudge_class([one], how, wanted, jobs=1)
     return time.process_time() - started
 
 
 def measure(members: Path) -> None:
     """Judge a class in several ways."""
-    named = rejudging.named_evidence([members])
-    how = rejudging.judgement((), ())
-    wanted = rejudging.Wanted()
-    rejudging.rejudge_class(named[:5], how, wanted, jobs=1)
+    named = rejudge.named_evidence([members])
+    how = rejudge.judgement((), ())
+    wanted = rejudge.Wanted()
+    rejudge.rejudge_class(named[:5], how, wanted, jobs=1)
     used = [processor_s(one, how, wanted) for one in named]
     print(f"processor time of one: median {1e3 * statistics.median(used):.1f} ms, least {1e3 * min(used):.1f} ms")
     for jobs in dict.fromkeys((1, len(os.sched_getaffinity(0)))):
         started, before = time.perf_counter(), time.process_time()
-        results = rejudging.rejudge_class(named, how, wanted, jobs=jobs)
+        results = rejudge.rejudge_class(named, how, wanted, jobs=jobs)
         took, processor = time.perf_counter() - started, time.process_time() - before
         assert not any(result.problem for result in results), results
         print(f"{jobs} process(es): {len(named) / took:.0f} submissions/s", end="")
@@ -71,7 +71,7 @@ def measure(members: Path) -> None:
     subprocess.run([GRADE, "rejudge", str(members)], stdout=subprocess.DEVNULL, check=False)
     print(f"grade rejudge, start included: {len(named) / (time.perf_counter() - started):.0f} submissions/s")
     with cProfile.Profile() as profile:
-        rejudging.rejudge_class(named[:50], how, wanted, jobs=1)
+        rejudge.rejudge_class(named[:50], how, wanted, jobs=1)
     pstats.Stats(profile).sort_stats("tottime").print_stats(SLOWEST)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from agreement import run, table, what_is_known
 
-from grader.session import Request
+from grader.app.grade import Request
 
 
 def seeds_in(text: str) -> range:

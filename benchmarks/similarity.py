@@ -14,13 +14,16 @@ from dataclasses import replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "batch"))
+sys.path.insert(0, str(ROOT / "tests" / "classroom"))
 
 import copies  # noqa: E402  beside the tests
 
-from grader.similarity.contents import Handed  # noqa: E402  as above
-from grader.similarity.finding import find_similar  # noqa: E402  as above
-from grader.similarity.reading import read_given, read_programs  # noqa: E402  as above
+from grader.similarity.finding import (  # noqa: E402  as above
+    find_similar,  # noqa: E402  as above
+    read_given,
+    read_programs,
+)
+from grader.similarity.library import Handed  # noqa: E402  as above
 
 CLASSES = ("velocity", "odom", "fan", "joint", "angle", "battery")
 WAYS = tuple(copies.DISGUISES)

@@ -27,8 +27,8 @@ from arena import Arena
 from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
 
-from grader.model.errors import GraderError
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
+from grader.core.errors import GraderError
 
 NODE = "velocity_publisher"
 #: Runs after which everything that is loaded once has been loaded, and that count for nothing.

@@ -16,11 +16,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.judging.contract import breach
-from grader.judging.findings import met, not_met, partly
-from grader.model.exercise import Check, Finding, SourceCheck
-from grader.model.quantities import NS_PER_S, nanoseconds
-from grader.model.trace import (
+from grader.core.exercise import Check, Finding, SourceCheck
+from grader.core.quantities import NS_PER_S, nanoseconds
+from grader.core.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -37,6 +35,8 @@ from grader.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.judging.contract import breach
+from grader.judging.findings import met, not_met, partly
 
 __all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
 
@@ -207,7 +207,7 @@ class TraceBuilder:
         return self
 
     def mark(self, t_s: float, name: str, detail: str = "") -> TraceBuilder:
-        """Add a moment of the scenario itself; `grader.model.trace.Mark` lists the names."""
+        """Add a moment of the scenario itself; `grader.core.trace.Mark` lists the names."""
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
     def trace(self, scenario: str = "alone") -> Trace:

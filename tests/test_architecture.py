@@ -15,14 +15,13 @@ IMPURE = {"os", "subprocess", "socket", "time", "datetime", "random", "threading
 #: Modules in pure packages that are not pure: a path is a value in some, others deliver what has been rendered or read
 #: what a platform says in the environment.
 EXCUSED = {
-    "model/submission.py": {"pathlib"},
-    "reports/delivery.py": IMPURE,
-    "reports/destination.py": IMPURE,
-    "reports/formats.py": {"os"},
-    "reports/surroundings.py": {"os", "pathlib", "datetime"},
-    "reports/github.py": {"pathlib"},
-    "reports/junit.py": {"pathlib"},
-    "reports/json_report.py": {"pathlib"},
+    "core/submission.py": {"pathlib"},
+    "reporting/delivery.py": IMPURE,
+    "reporting/formats.py": {"os"},
+    "reporting/surroundings.py": {"os", "pathlib", "datetime"},
+    "reporting/platforms/github.py": {"pathlib"},
+    "reporting/junit.py": {"pathlib"},
+    "reporting/json_report.py": {"pathlib"},
 }
 #: What the host may import besides the standard library and its own modules.
 HOST_MAY_IMPORT = {"rclpy", "time_machine", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs"}
@@ -46,11 +45,10 @@ PATTERN_METHODS = {"search", "match", "fullmatch", "finditer", "findall", "split
 OF_PROGRAMS = r"o|t|side\.program|log|line|lines\[n\]|output|record|episode|value|self"
 #: Modules that look into such texts all the same, and why.
 READS_TEXT = {
-    "reports/audience.py": "takes the parts with numbers out of what a student sees",
-    "reports/class_page/causes.py": "reports of earlier versions name another criterion in their sentences only",
-    "reports/class_page/kinds.py": "puts reasons together that differ in numbers and names only",
-    "reports/text.py": "does not name a place twice",
-    "reports/wording.py": "leaves out how every reason of a blocked criterion begins",
+    "reporting/audience.py": "takes the parts with numbers out of what a student sees",
+    "reporting/class_page/causes.py": "reports of earlier versions name another criterion, and reasons are grouped without numbers and names",
+    "reporting/text.py": "does not name a place twice",
+    "reporting/wording.py": "leaves out how every reason of a blocked criterion begins",
 }
 
 
@@ -133,7 +131,7 @@ def test_what_is_no_reading_is_let_be(line, tmp_path):
 
 
 #: Packages that are pure.
-PURE = ("model", "judging", "reports", "selftest/mutating")
+PURE = ("core", "judging", "reporting", "mutation/operators")
 
 
 def impurities(package):
@@ -156,18 +154,18 @@ def test_a_planted_impurity_is_found(tmp_path):
     """Also inside a function, and under another name."""
     planted = {
         "judging/checks/bad.py": "def f():\n    from time import sleep as rest\n",
-        "model/bad.py": "import os.path as p, random\n",
-        "reports/bad.py": "import datetime\n",
-        "reports/delivery.py": "import tempfile\n",
+        "core/bad.py": "import os.path as p, random\n",
+        "reporting/bad.py": "import datetime\n",
+        "reporting/delivery.py": "import tempfile\n",
     }
     for name, source in planted.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(source)
     assert impurities(tmp_path) == [
         "judging/checks/bad.py imports time",
-        "model/bad.py imports os",
-        "model/bad.py imports random",
-        "reports/bad.py imports datetime",
+        "core/bad.py imports os",
+        "core/bad.py imports random",
+        "reporting/bad.py imports datetime",
     ]
 
 
@@ -175,7 +173,7 @@ def host_needs(package):
     """Return what the host imports beyond the standard library, ROS and itself, as sentences."""
     return [
         f"{path.name} imports {imported}"
-        for path in sorted((package / "host").rglob("*.py"))
+        for path in sorted((package / "student_host").rglob("*.py"))
         for imported in imports_of(path)
         if not imported.startswith(".") or imported.startswith("..")
         if imported.split(".")[0] not in HOST_MAY_IMPORT | sys.stdlib_module_names
@@ -189,10 +187,10 @@ def test_the_host_needs_little():
 
 def test_a_planted_need_is_found(tmp_path):
     """Other libraries, the rest of the grader, and what lies above the host's folder."""
-    (tmp_path / "host").mkdir()
+    (tmp_path / "student_host").mkdir()
     source = "import os, numpy\nimport rclpy.node\nfrom . import fine\nfrom .fine import a\n"
-    (tmp_path / "host" / "bad.py").write_text(source + "from ..model import trace\nimport grader\n")
-    assert host_needs(tmp_path) == ["bad.py imports numpy", "bad.py imports ..model", "bad.py imports grader"]
+    (tmp_path / "student_host" / "bad.py").write_text(source + "from ..core import trace\nimport grader\n")
+    assert host_needs(tmp_path) == ["bad.py imports numpy", "bad.py imports ..core", "bad.py imports grader"]
 
 
 def test_every_module_says_what_it_holds():

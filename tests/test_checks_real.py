@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from grader.app.grade import Request, grade
 from grader.judging.asking import check_name
 from grader.judging.checks import CHECKS
-from grader.reading.rubric_file import read_rubric
-from grader.session import Request, grade
+from grader.rubrics.loader import read_rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 REAL = ROOT / "tests" / "real_checks"
-NODES = ROOT / "tests" / "recording" / "service_nodes"
+NODES = ROOT / "tests" / "execution" / "service_nodes"
 TABLE = YAML(typ="safe").load((ROOT / "tests" / "checks_real.yaml").read_text(encoding="utf-8"))
 
 

@@ -12,11 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 import grader
-from grader import cli, session
-from grader.model import errors
-from grader.model.exercise import Outcome
-from grader.model.report import Environment, ExerciseReport, Report, Verdict
-from grader.model.trace import ClockKind
+from grader.app import grade as session
+from grader.cli import main
+from grader.core import errors
+from grader.core.exercise import Outcome
+from grader.core.report import Environment, ExerciseReport, Report, Verdict
+from grader.core.trace import ClockKind
 
 
 def a_report(*outcomes, score=None):
@@ -55,7 +56,7 @@ def run_session(monkeypatch):
 
 
 def grade(*arguments, **kwargs):
-    return CliRunner().invoke(cli.app, list(arguments), prog_name="grade", **kwargs)
+    return CliRunner().invoke(main.app, list(arguments), prog_name="grade", **kwargs)
 
 
 def test_the_everyday_form_prints_the_text_report(run_session):
@@ -287,7 +288,7 @@ def with_batch():
         click.echo(f"batch {folder}")
         return 1
 
-    app = cli.CommandLine(cli.app.everyday, name="grade", context_settings=cli.app.context_settings)
+    app = main.CommandLine(main.app.everyday, name="grade", context_settings=main.app.context_settings)
     app.add_command(batch)
     return app
 
@@ -320,7 +321,7 @@ def grade(request, progress, hear=None, early=None, *, pictures=True):
     return a_report()
 session.grade = grade
 sys.argv[0] = "grade"
-cli.main()
+main.main()
 """
 
 
@@ -383,7 +384,7 @@ def test_help_starts_light():
     """Neither rich nor pydantic nor ROS is imported before they are needed."""
     code = (
         "import sys\nfrom grader import cli\n"
-        "try: cli.app(['--help'])\nexcept SystemExit: pass\n"
+        "try: main.app(['--help'])\nexcept SystemExit: pass\n"
         "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy'}\n"
         "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
     )

@@ -58,7 +58,7 @@ def test_what_does_not_exist_is_found():
     """A link, a path, a path inside a command, one of several, and a pattern that fits nothing."""
     text = (
         "[a](docs/none.md#part) [b](README.md) [c](https://a.b/c) `grader/none.py` `python tests/none.py --all`"
-        " `grader/host/{clock,none}.py` `rubrics/*.none` `rubrics/*.yaml` `out/grader/x.py`"
+        " `grader/student_host/{clock,none}.py` `rubrics/*.none` `rubrics/*.yaml` `out/grader/x.py`"
     )
-    wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/host/none.py", "rubrics/*.none"]
+    wanted = ["docs/none.md", "grader/none.py", "tests/none.py", "grader/student_host/none.py", "rubrics/*.none"]
     assert missing(text, ROOT) == wanted

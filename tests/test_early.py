@@ -8,13 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.early import EarlyReports
-from grader.model.exercise import Outcome
-from grader.model.report import Environment
-from grader.model.run import Run
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import ClockKind, Trace
-from grader.session import Request, read_exercises
+from grader.app.grade import EarlyReports, Request, read_exercises
+from grader.core.exercise import Outcome
+from grader.core.report import Environment
+from grader.core.submission import Run, StudentFile, Submission
+from grader.core.trace import ClockKind, Trace
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference_solutions"
 EXERCISES = read_exercises(Request("x"))
@@ -93,7 +91,7 @@ def test_a_platform_that_ends_the_run_finds_what_was_earned(tmp_path):
     command = [
         sys.executable,
         "-c",
-        "from grader.cli import main; main()",
+        "from grader.cli.main import main; main()",
         str(REFERENCE),
         "-o",
         f"gradescope={pipe}",

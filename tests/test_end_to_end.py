@@ -13,7 +13,7 @@ import pytest
 from recorded.archive import SEED, SUBMISSIONS, outcomes, told
 from ruamel.yaml import YAML
 
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
 
 ROOT = Path(__file__).resolve().parent.parent
 EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))

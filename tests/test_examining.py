@@ -8,12 +8,11 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner
 
-from grader import examining
-from grader.cli import app
-from grader.model.checkup import Fact
-from grader.model.containment import TierReport
-from grader.model.errors import EnvironmentFault, HarnessError
-from grader.recording import machine
+from grader.app import doctor
+from grader.cli.main import app
+from grader.core.checkup import Fact, TierReport
+from grader.core.errors import EnvironmentFault, HarnessError
+from grader.execution import machine
 
 BY_ROOT = TierReport("bubblewrap-root", "A2", usable=False, why="not root", remedy="run it with sudo")
 BY_USER = TierReport("bubblewrap", "A1", usable=False, why="none", remedy="install bubblewrap")
@@ -30,19 +29,19 @@ def stand_in(monkeypatch):
         seen.append((request.isolation, request.files[0].read_text()))
         return SimpleNamespace(topics=[SimpleNamespace(name="/trial", messages=10)], faults=[])
 
-    monkeypatch.setattr(examining, "find_ros", lambda: None)
-    monkeypatch.setattr(examining, "software", lambda ros: ())
-    monkeypatch.setattr(examining, "observe", observe)
-    monkeypatch.setattr(examining, "is_for_others", lambda name: name == "bubblewrap-root")
+    monkeypatch.setattr(doctor, "find_ros", lambda: None)
+    monkeypatch.setattr(doctor, "software", lambda ros: ())
+    monkeypatch.setattr(doctor, "observe", observe)
+    monkeypatch.setattr(doctor, "is_for_others", lambda name: name == "bubblewrap-root")
     return seen
 
 
 def examined(monkeypatch, *tiers):
-    monkeypatch.setattr(examining, "find_ros", lambda: SimpleNamespace(runtime=None))
-    monkeypatch.setattr(examining, "inspect_tiers", lambda ros: tiers)
-    monkeypatch.setattr(examining, "byte_code", lambda runtime: Fact("byte code", "up to date"))
-    monkeypatch.setattr(examining, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
-    return examining.examine(lambda step: None)
+    monkeypatch.setattr(doctor, "find_ros", lambda: SimpleNamespace(runtime=None))
+    monkeypatch.setattr(doctor, "inspect_tiers", lambda ros: tiers)
+    monkeypatch.setattr(doctor, "byte_code", lambda runtime: Fact("byte code", "up to date"))
+    monkeypatch.setattr(doctor, "sandbox_memory", lambda ros: Fact("sandbox check", "remembered"))
+    return doctor.examine(lambda step: None)
 
 
 def test_the_strongest_tier_that_holds_is_used(monkeypatch, stand_in):
@@ -65,7 +64,7 @@ def test_a_run_that_fails_is_a_finding(monkeypatch, stand_in):
     def fail(request, progress):
         raise HarnessError("the worker died")
 
-    monkeypatch.setattr(examining, "observe", fail)
+    monkeypatch.setattr(doctor, "observe", fail)
     checkup = examined(monkeypatch, HOLDS)
     assert checkup.exchange.problem == "the worker died"
     assert not checkup.safe
@@ -77,7 +76,7 @@ def test_without_ros_the_rest_is_told(monkeypatch):
     def none():
         raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", "pip install it")
 
-    monkeypatch.setattr(examining, "find_ros", none)
+    monkeypatch.setattr(doctor, "find_ros", none)
     result = CliRunner().invoke(app, ["doctor"])
     assert result.exit_code == 2
     assert result.stdout.startswith(
@@ -124,7 +123,7 @@ def test_too_little_room_is_told(monkeypatch, memory, space, fits):
 def test_a_real_machine_is_examined():
     """The real command: versions, ten messages over DDS, all tiers; the exit code is the verdict's."""
     done = subprocess.run(
-        [sys.executable, "-c", "from grader.cli import main; main()", "doctor", "--json"],
+        [sys.executable, "-c", "from grader.cli.main import main; main()", "doctor", "--json"],
         capture_output=True,
         text=True,
         check=False,

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import pytest
 from click.testing import CliRunner
 
-from grader import cli, explaining, session
-from grader.explaining import explain
+from grader.app import explain as explaining
+from grader.app import grade as session
+from grader.app.explain import explain
+from grader.cli import main
+from grader.core.errors import GraderError
 from grader.judging.checks import CHECKS
-from grader.model.errors import GraderError
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.manuals import manual_of
-from grader.reading.rubric_file import read_rubric
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
+from grader.rubrics.manuals import manual_of
 
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
 
@@ -35,7 +37,7 @@ _READ = {}
 
 
 def grade(*words: str):
-    return CliRunner().invoke(cli.app, ["explain", *words])
+    return CliRunner().invoke(main.app, ["explain", *words])
 
 
 @pytest.mark.parametrize(("exercise", "criterion"), CRITERIA, ids=[c for _, c in CRITERIA])

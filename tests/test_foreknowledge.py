@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.seeding import PRACTICE, SeedKey
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
+from grader.app.seeds import PRACTICE, SeedKey
 
 PROGRAM = str(Path(__file__).resolve().parent / "foreknowledge")
 

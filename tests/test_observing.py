@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from grader.core.quantities import NS_PER_MS, NS_PER_S
+from grader.core.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Offer, Trace
 from grader.judging.summary import summarise
-from grader.model.quantities import NS_PER_MS, NS_PER_S
-from grader.model.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Offer, Trace
-from grader.reports.observed import render_summary, summary_to_json
+from grader.reporting.observed import render_summary, summary_to_json
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOAT = "std_msgs/msg/Float32"

@@ -5,11 +5,12 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from grader import cli, session
-from grader.model.scenario import TimedMessage
-from grader.recording.bag import Odometry
-from grader.reproducing import command_words, recording_digest, reproduction
-from grader.session import Request, read_exercises
+from grader.app import grade
+from grader.app.grade import Request, read_exercises
+from grader.app.reproducing import command_words, recording_digest, reproduction
+from grader.cli import main
+from grader.core.scenario import TimedMessage
+from grader.execution.bag import Odometry
 
 
 def test_the_seed_is_named_even_if_nobody_asked_for_one():
@@ -35,8 +36,8 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
         heard.append(request)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(session, "grade", hear)
-    CliRunner().invoke(cli.app, list(command_words(asked, 7))[1:])
+    monkeypatch.setattr(grade, "grade", hear)
+    CliRunner().invoke(main.app, list(command_words(asked, 7))[1:])
     assert heard == [asked]
 
 

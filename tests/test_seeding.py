@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.errors import KeyFileError
-from grader.recording.evidence.store import open_evidence, run_of
-from grader.seeding import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key, seed_key
-from grader.session import Request, read_exercises
+from grader.app.grade import Request, read_exercises
+from grader.app.seeds import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key, seed_key
+from grader.core.errors import KeyFileError
+from grader.execution.evidence.store import open_evidence, run_of
 
 ROOT = Path(__file__).resolve().parent.parent
 GRADE = str(Path(sys.executable).with_name("grade"))

@@ -2,9 +2,9 @@
 
 import pytest
 
-from grader.model.errors import RecordingError, RubricError
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.session import Request, read_exercises, read_recording
+from grader.app.grade import Request, read_exercises, read_recording
+from grader.core.errors import RecordingError, RubricError
+from grader.rubrics.builtin import builtin_rubrics
 
 
 def test_all_exercises_are_graded_unless_some_are_named():

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.report import Report
-from grader.model.trace import ClockKind, Trace
-from grader.recording.plan import Plan
-from grader.recording.recorder import Job
-from grader.session import Request, grade
-from grader.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.app.grade import Request, grade
+from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
+from grader.core.report import Report
+from grader.core.trace import ClockKind, Trace
+from grader.execution.plan import Plan
+from grader.execution.supervisor import Job
 from grader.testing import TraceBuilder
 
 HERE = Path(__file__).parent / "spot_checks"

@@ -8,10 +8,10 @@ from collections import Counter
 import pytest
 from click.testing import CliRunner
 
-from grader.cli import app
-from grader.model.errors import KeyFileError, VariantError
-from grader.reading.keys import read_key
-from grader.variants import ByKey, by_key, checked
+from grader.app.seeds import read_key
+from grader.app.variants import ByKey, by_key, checked
+from grader.cli.main import app
+from grader.core.errors import KeyFileError, VariantError
 
 KEY = b"a course key for tests, not a secret"
 
@@ -82,7 +82,7 @@ def test_a_key_that_cannot_be_used_is_refused(tmp_path, content, found):
 @pytest.fixture
 def sheet(tmp_path):
     """Run `grade rubric variant` on exercise 1 with a rate that varies."""
-    from grader.reading.builtin_rubrics import builtin_rubrics
+    from grader.rubrics.builtin import builtin_rubrics
 
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {choose: [10 Hz, 15 Hz, 20 Hz]}\nscenarios:", 1)

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from grader.batch.intake import take_in
-from grader.model.errors import SubmissionError
-from grader.reading.archives import collect_archive
-from grader.reports.json_report import report_to_json
-from grader.seeding import SeedKey
-from grader.session import Request, grade
+from grader.app.grade import Request, grade
+from grader.app.seeds import SeedKey
+from grader.classroom.intake import take_in
+from grader.core.errors import SubmissionError
+from grader.reporting.json_report import report_to_json
+from grader.submissions.archives import collect_archive
 
 HERE = Path(__file__).parent / "trust"
 PROGRAMS = YAML(typ="safe").load((HERE / "programs.yaml").read_text(encoding="utf-8"))["programs"]

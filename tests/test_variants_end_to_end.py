@@ -6,17 +6,16 @@ import jsonschema
 import pytest
 from click.testing import CliRunner
 
-from grader import cli
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.shipped import shipped_folder
-from grader.reports.json_report import report_schema
+from grader.cli import main
+from grader.reporting.json_report import report_schema
+from grader.rubrics.builtin import builtin_rubrics, shipped_folder
 
 SOLUTION = shipped_folder().parent / "reference_solutions" / "velocity_publisher.py"
 
 
 def run(*words):
     """Return what a command comes to."""
-    return CliRunner().invoke(cli.app, list(map(str, words)), catch_exceptions=False)
+    return CliRunner().invoke(main.app, list(map(str, words)), catch_exceptions=False)
 
 
 @pytest.mark.ros

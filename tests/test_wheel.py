@@ -31,8 +31,8 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
         "odometry/metadata.yaml",
     ):
         assert f"grader/shipped/rubrics/{needed}" in names
-    assert "grader/reports/report.schema.json" in names
-    assert "grader/host/fastdds.xml" in names
+    assert "grader/reporting/report.schema.json" in names
+    assert "grader/student_host/fastdds.xml" in names
     assert "grader/shipped/student_template/velocity_publisher.py" in names
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]
 
@@ -61,8 +61,8 @@ def test_the_installed_wheel_grades_from_any_directory(wheel, tmp_path):
     )
     program = (
         "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
-        "import grader.cli; assert grader.__file__.startswith(sys.path[0]), grader.__file__\n"
-        "grader.cli.main()"
+        "import grader.cli.main; assert grader.__file__.startswith(sys.path[0]), grader.__file__\n"
+        "grader.cli.main.main()"
     )
     command = [sys.executable, "-c", program, str(site), "ada", "--exercise", "velocity_publisher"]
     done = subprocess.run(command, check=False, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)

@@ -1,18 +1,86 @@
-"""Looks a rubric over for its author: whether it can be used, what it comes to, and what is odd about it."""
+"""Looks a rubric over for its author: whether it can be used, its points, and what is odd about it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
-from grader.authoring.oddities import oddities
-from grader.model.errors import RubricError
-from grader.model.exercise import Exercise
-from grader.reading.quoting import shown
-from grader.reading.rubric_file import RubricMistakes, read_rubric
-from grader.reading.variants import First
-from grader.reading.yaml_tree import read_yaml
+from grader.core.errors import RubricError
+from grader.core.exercise import Criterion, Exercise
+from grader.core.quantities import duration
+from grader.core.scenario import Scenario, shortest
+from grader.judging.checks import CHECKS
+from grader.rubrics.loader import RubricMistakes, read_rubric
+from grader.rubrics.manuals import manual_of
+from grader.rubrics.variants import First
+from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree, read_yaml
+from grader.submissions.collected import shown
+
+#: Points of a rubric are easy to reckon with if they add up to a multiple of this.
+ROUND = 5
+#: Parameters of checks that name a stretch of time which a scenario must be long enough for.
+_STRETCHES = ("window", "silence")
+
+
+def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
+    """Return what is odd in a rubric, in the order of the file.
+
+    Args:
+        exercise: What the rubric says.
+        tree: The document, for places.
+    """
+    found = [*_of_points(exercise, tree), *_of_scenarios(exercise, tree), *_of_files(exercise, tree)]
+    for index, criterion in enumerate(exercise.criteria):
+        found += _of_criterion(criterion, exercise, ("criteria", index), tree)
+    return sorted(set(found))
+
+
+def _of_points(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
+    total = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
+    if total % ROUND:
+        text = f"the points add up to {float(total):g}, which is no multiple of {ROUND}"
+        yield tree.keys.get(("criteria",), TOP).mistake(text)
+
+
+def _of_scenarios(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
+    judged = {criterion.scenario for criterion in exercise.criteria}
+    for index, scenario in enumerate(exercise.scenarios):
+        if scenario.id not in judged:
+            where = tree.values.get(("scenarios", index, "id"), TOP)
+            yield where.mistake(f"the scenario {scenario.id} is recorded, but no criterion looks at it")
+
+
+def _of_files(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
+    run = {process for scenario in exercise.scenarios for process in scenario.processes}
+    for index, name in enumerate(exercise.files):
+        if name not in run:
+            yield tree.values.get(("files", index), TOP).mistake(f"{name} is asked for, but no scenario runs it")
+
+
+def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    where = tree.values.get((*path, "id"), TOP)
+    kind = type(criterion.check)
+    if not criterion.hint:
+        yield where.mistake(f"{criterion.id} has no hint: a student who misses it may not be told what to do")
+    if kind not in CHECKS.values() and not manual_of(kind).summary:
+        yield where.mistake(f"{criterion.id} is judged by {kind.__name__}, which has no docstring to explain it")
+    scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    yield from _of_stretches(criterion, scenario, path, tree)
+
+
+def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    observed = shortest(scenario.span.duration_ns)
+    check: Any = criterion.check
+    for field in fields(check):
+        asked = getattr(check, field.name)
+        if field.name in _STRETCHES and isinstance(asked, int) and asked > observed:
+            (name,) = (p[-1] for p in tree.keys if len(p) == len(path) + 2 and p[: len(path) + 1] == (*path, "check"))
+            where = tree.values.get((*path, "check", name, field.name), TOP)
+            text = f"{field.name} is {duration(asked)}, but {scenario.id} is observed for {duration(observed)} only"
+            yield where.mistake(text)
 
 
 @dataclass(frozen=True, slots=True)

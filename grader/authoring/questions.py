@@ -2,21 +2,113 @@
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.authoring.answers import ANY, OF_THE_RUN, cases_seen, texts
-from grader.authoring.drafts import DraftCriterion, Quantity, as_id
-from grader.authoring.parameters import parameters
+from grader.authoring.skeleton import DraftCriterion, Quantity, as_id
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.summary import TopicSummary
+from grader.core.trace import Delivery, Message, Offer, Trace
 from grader.judging.silence import student_endpoints
 from grader.judging.summary import summarise
 from grader.judging.values import carries_number, leaves
 from grader.judging.wording import counted, number
-from grader.model.quantities import seconds
-from grader.model.summary import TopicSummary
-from grader.model.trace import Delivery, Trace
+
+#: What every node has.
+_EVERYBODYS = ("use_sim_time", "start_type_description_service")
+_OVERRIDES = "qos_overrides."
+
+
+def parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
+    """Yield node, name and value of each parameter; the node is empty where one alone has any, a list is None."""
+    offers = [(o.name.partition(":"), o.detail) for o in trace.of(Offer) if o.kind == "parameter"]
+    own = {(node, name): value for (node, _, name), value in offers if not _is_everybodys(name)}
+    several = len({node for node, _ in own}) > 1
+    for (node, name), value in own.items():
+        yield node if several else "", name, _read(value)
+
+
+def _is_everybodys(name: str) -> bool:
+    return name in _EVERYBODYS or name.startswith(_OVERRIDES)
+
+
+def _read(text: str) -> str | float | bool | None:
+    """Return the value that a node told as Python writes it; None for a list and for what is no value."""
+    try:
+        value = ast.literal_eval(text)
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return None
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, (str, int, float)) and value != "" else None
+
+
+#: Times in a message are of the run.
+OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
+#: Something comes after anything.
+ANY: list[dict[str, Any]] = [{"when": {}, "then": {}}]
+#: More different inputs than this are no cases, and more fields than this are no answer that a person wrote down.
+_MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
+
+
+def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
+    """Return a case for each different input: what it held, and what came of it within a second.
+
+    Args:
+        trace: What was seen.
+        given: Topic of the inputs.
+        answered: Topic of the answers.
+    """
+    inputs = trace.deliveries(given)
+    answers = _answers(trace, inputs, answered)
+    different: dict[str, tuple[Delivery, Message | None]] = {}
+    for sent, answer in zip(inputs, answers, strict=True):
+        different.setdefault(str(sent.value), (sent, answer))
+    if not 0 < len(different) <= _MOST_CASES:
+        return ANY
+    paths = _telling([answer for answer in answers if answer is not None])
+    return [_case(sent, answer, paths) for sent, answer in different.values()]
+
+
+def texts(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield every text of a message by its path."""
+    for name, inner in value.items():
+        if isinstance(inner, Mapping):
+            yield from texts(inner, f"{prefix}{name}.")
+        elif isinstance(inner, str):
+            yield f"{prefix}{name}", inner
+
+
+def _answers(trace: Trace, inputs: tuple[Delivery, ...], answered: str) -> list[Message | None]:
+    """Return the last answer to each input, within a second and before the next one; None where there was none."""
+    stops = [*(sent.t_ns for sent in inputs), trace.stop_ns][1:]
+    found: list[Message | None] = []
+    for sent, stop_ns in zip(inputs, stops, strict=True):
+        until_ns = min(stop_ns, sent.t_ns + NS_PER_S)
+        found.append(next((m for m in reversed(trace.messages(answered)) if sent.t_ns <= m.t_ns < until_ns), None))
+    return found
+
+
+def _scalars(value: Mapping[str, Any]) -> dict[str, float | str]:
+    return {**dict(texts(value)), **{k: v for k, v in leaves(value).items() if not k.endswith(OF_THE_RUN) and v == v}}  # noqa: PLR0124  NaN
+
+
+def _telling(answers: list[Message]) -> list[str]:
+    """Return the paths that are not at their default in every answer."""
+    rows = [_scalars(answer.value) for answer in answers]
+    return [path for path in (rows[0] if rows else ()) if any(row.get(path) for row in rows)][:_MOST_ANSWER_FIELDS]
+
+
+def _case(sent: Delivery, answer: Message | None, paths: list[str]) -> dict[str, Any]:
+    when = {path: value for path, value in _scalars(sent.value).items() if value}
+    if answer is None:
+        return {"when": when, "silent": True}
+    held = _scalars(answer.value)
+    return {"when": when, "then": {path: held[path] for path in paths if path in held}}
+
 
 #: Fewer messages tell no rate, and more spread of the intervals than this share of them is no rate.
 _FEWEST, _STEADY = 5, 0.2

@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Check, Criterion, Exercise, Finding, SourceCheck
+from grader.core.scenario import Scenario
+from grader.core.submission import Submission
+from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.contract import breach
 from grader.judging.findings import not_met
 from grader.judging.silence import fault_hint, first_fault, student_endpoints
 from grader.judging.wording import fault_sentence, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Check, Criterion, Exercise, Finding, SourceCheck
-from grader.model.scenario import Scenario
-from grader.model.submission import Submission
-from grader.model.trace import Fault, FaultKind, Request, Response, Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from grader.core.trace import LogRecord
 from grader.judging.positions.numbers import Printed, clean, printed_numbers, with_decimal_points
 from grader.judging.printed import Output
 from grader.judging.wording import counted, quote
-from grader.model.trace import LogRecord
 
 #: Share of its texts in which a place must be right; the others may hold something else that is written alike.
 _USUALLY = 0.45

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from grader.model.exercise import Finding, Location
-from grader.model.problem import Problem
+from grader.core.exercise import Finding, Location, Problem
 
 #: Deepest nesting of evidence.
 _DEEPEST = 12

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
+from grader.core.trace import LogRecord, Response, Trace
 from grader.judging.output import written
 from grader.judging.paths import NoSuchField, at_path, number_at, text_at
 from grader.judging.printed import Output, number_in, shape_of
 from grader.judging.services import calls_of
 from grader.judging.values import JITTER_NS
-from grader.model.trace import LogRecord, Response, Trace
 
 _COMPLAINTS = ("WARN", "ERROR", "FATAL")
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from grader.model.exercise import Finding, Location
-from grader.model.problem import Problem
-from grader.model.quantities import seconds
-from grader.model.trace import Fault
+from grader.core.exercise import Finding, Location, Problem
+from grader.core.quantities import seconds
+from grader.core.trace import Fault
 
 #: Evidence key under which a finding names the fault that it rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from grader.core.quantities import within
 from grader.judging.formula import Curve
 from grader.judging.wording import counted, number
-from grader.model.quantities import within
 
 #: Share of the values that another formula must give for it to be named as what they follow.
 _SURE = 0.97

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from grader.core.exercise import Exercise, variant_notes
+from grader.core.report import ExerciseReport, ReportedFault, Verdict
+from grader.core.submission import Submission
+from grader.core.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
 from grader.judging.asking import Answer, ask
 from grader.judging.diagnosis.diagnose import diagnose
 from grader.judging.diagnosis.notes import placed
 from grader.judging.silence import on_student_topic
 from grader.judging.verdicts import Bench
-from grader.model.exercise import Exercise
-from grader.model.report import ExerciseReport, ReportedFault, Verdict
-from grader.model.submission import Submission
-from grader.model.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace
-from grader.model.variant import variant_notes
 
 
 def judge_exercise(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
+from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.judging.values import Reading
-from grader.model.quantities import NS_PER_MS, NS_PER_S
 
 #: Lags are tried in these steps, up to the longest.
 _STEP_NS = 100 * NS_PER_MS

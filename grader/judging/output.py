@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.silence import AT_ONCE_NS, first_fault
-from grader.model.trace import LogRecord, OutputLine, Trace
 
 #: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)

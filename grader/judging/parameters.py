@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.trace import Request, Trace
 from grader.judging.services import Call, calls_of
-from grader.model.trace import Request, Trace
 
 #: Number of a type -> the field of rcl_interfaces/msg/ParameterValue that holds it, and what it is called.
 _TYPES: Mapping[int, tuple[str, str]] = {

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from grader.model.exercise import Exercise, Outcome
-from grader.model.report import ExerciseReport, Verdict
-from grader.model.trace import ClockKind
-from grader.model.variant import variant_notes
+from grader.core.exercise import Exercise, Outcome, variant_notes
+from grader.core.report import ExerciseReport, Verdict
+from grader.core.trace import ClockKind
 
 
 def not_graded_yet(exercise: Exercise) -> ExerciseReport:

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
+from grader.core.trace import LogRecord, OutputLine
 from grader.judging.positions.labels import template_of
 from grader.judging.positions.numbers import Printed, clean, printed_numbers, with_decimal_points
 from grader.judging.wording import number
-from grader.model.trace import LogRecord, OutputLine
 
 Output = LogRecord | OutputLine
 

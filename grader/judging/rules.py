@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from grader.core.exercise import Pattern
+from grader.core.quantities import SLACK, within
 from grader.judging.paths import NoSuchField, at_path
 from grader.judging.values import as_number
 from grader.judging.wording import number, quote
-from grader.model.names import Pattern
-from grader.model.quantities import SLACK, within
 
 #: Longest text that is held against a pattern.
 _LONGEST = 2_000

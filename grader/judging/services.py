@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_MS
+from grader.core.trace import ClockKind, Request, Response, ServiceEnd, Trace
 from grader.judging.findings import not_met
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import fault_sentence, listed, nearest, quote, span
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, Request, Response, ServiceEnd, Trace
 
 #: How much later than asked something may come where the machine's load shows.
 LATENESS_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import Endpoint, Fault, FaultKind, Message, Trace
 from grader.judging.findings import not_met
 from grader.judging.wording import counted, fault_sentence, listed, nearest, quote, span
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import Endpoint, Fault, FaultKind, Message, Trace
 
 #: Topics that every node has.
 _HIDDEN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from grader.core.exercise import Location
 from grader.judging.wording import quote
-from grader.model.exercise import Location
 
 #: Files longer than this are not parsed: no node that a person writes for an exercise comes near.
 LONGEST_SOURCE = 100_000

@@ -8,10 +8,10 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.summary import Pace, Summary, TopicSummary
+from grader.core.trace import Message, Offer, Trace
 from grader.judging.judge import started
-from grader.model.quantities import NS_PER_S, seconds
-from grader.model.summary import Pace, Summary, TopicSummary
-from grader.model.trace import Message, Offer, Trace
 
 
 def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:

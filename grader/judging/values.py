@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Generic, TypeVar
 
-from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, Delivery, Message, Trace
+from grader.core.quantities import NS_PER_MS
+from grader.core.trace import ClockKind, Delivery, Message, Trace
 
 T = TypeVar("T")
 Carrier = TypeVar("Carrier", Message, Delivery)

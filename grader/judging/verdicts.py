@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+from grader.core.exercise import Criterion, Exercise, Finding, Outcome
+from grader.core.report import NOT_JUDGED, Verdict
+from grader.core.submission import Submission
 from grader.judging.asking import Answer, check_name
 from grader.judging.findings import FAULT_KEY
 from grader.judging.wording import listed, quote
-from grader.model.exercise import Criterion, Exercise, Finding, Outcome
-from grader.model.report import NOT_JUDGED, Verdict
-from grader.model.submission import Submission
 
 _EARNED = (Outcome.MET, Outcome.PARTLY)
 _SAID = {

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+from grader.core.exercise import Exercise
+from grader.core.report import ExerciseReport, Report
+from grader.core.submission import Run
+from grader.core.trace import Trace
 from grader.judging.figures.pictures import illustrated
 from grader.judging.judge import judge_exercise
 from grader.judging.pending import not_graded_yet
-from grader.model.exercise import Exercise
-from grader.model.report import ExerciseReport, Report
-from grader.model.run import Run
-from grader.model.trace import Trace
 
 
 def judge_run(

@@ -7,8 +7,8 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from grader.model.quantities import seconds
-from grader.model.trace import Fault, FaultKind
+from grader.core.quantities import seconds
+from grader.core.trace import Fault, FaultKind
 
 #: Longest quotation of a student's text inside a sentence.
 QUOTE_LENGTH = 120

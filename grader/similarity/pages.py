@@ -12,11 +12,10 @@ from importlib.resources import files
 from jinja2 import Template
 from markupsafe import Markup
 
-from grader.reports.class_page.render import REPORT_PAGE, result_link
-from grader.reports.escape import csv_cell, shown
-from grader.reports.html.bundle import bundle
-from grader.reports.html.environment import page_environment
-from grader.similarity.contents import Handed, Pair, Side, Similar
+from grader.reporting.class_page.render import REPORT_PAGE, result_link
+from grader.reporting.escape import csv_cell, shown
+from grader.reporting.html.assets import bundle, page_environment
+from grader.similarity.library import Handed, Pair, Side, Similar
 
 #: Pairs beyond these are in the table only.
 MOST_PAGES = 200

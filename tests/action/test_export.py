@@ -10,11 +10,10 @@ import pytest
 from click.testing import CliRunner
 from stand_in_runner import ROOT
 
-from grader.cli import app
-from grader.exporting import parts
-from grader.exporting.bundles import CLASSROOM50_BYTES, Chosen, classroom50, gradescope
-from grader.exporting.parts import pins, wheel
-from grader.model.errors import EnvironmentFault, KeyFileError, RubricError
+from grader import packaging
+from grader.cli.main import app
+from grader.core.errors import EnvironmentFault, KeyFileError, RubricError
+from grader.packaging import CLASSROOM50_BYTES, Chosen, classroom50, gradescope, pins, wheel
 
 
 def opened(content):
@@ -75,18 +74,18 @@ def test_the_wheel_holds_what_an_installation_needs_and_no_solution():
     names = set(archive.namelist())
     assert re.fullmatch(r"rclpy_grader-[\w.]+-py3-none-any\.whl", name)
     needed = {
-        "grader/cli.py",
+        "grader/cli/main.py",
         "grader/shipped/rubrics/exercise_1.yaml",
         "grader/shipped/rubrics/odometry/odometry.mcap",
     }
-    assert needed | {"grader/shipped/integrations/prepare", "grader/reports/report.schema.json"} <= names
+    assert needed | {"grader/shipped/integrations/prepare", "grader/reporting/report.schema.json"} <= names
     assert not [n for n in names if "__pycache__" in n or "reference" in n or "template/" in n]
     record = next(n for n in names if n.endswith("RECORD"))
     rows = list(csv.reader(archive.read(record).decode().splitlines()))
     assert {row[0] for row in rows} == names
-    assert all(parts._recorded(n, archive.read(n)) == f"{n},{d},{s}\n" for n, d, s in rows if n != record)
+    assert all(packaging._recorded(n, archive.read(n)) == f"{n},{d},{s}\n" for n, d, s in rows if n != record)
     scripts = next(n for n in names if n.endswith("entry_points.txt"))
-    assert "grade = grader.cli:main" in archive.read(scripts).decode()
+    assert "grade = grader.cli.main:main" in archive.read(scripts).decode()
 
 
 def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers():
@@ -105,9 +104,9 @@ def test_the_pins_of_the_action_name_all_that_is_needed_now():
 
 def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypatch):
     """A checkout whose requirements grew since it was installed would make a wheel that cannot run."""
-    monkeypatch.setattr(parts, "_needed", lambda requirements, extras: [(r, ()) for r in [*requirements][:1]])
+    monkeypatch.setattr(packaging, "_needed", lambda requirements, extras: [(r, ()) for r in [*requirements][:1]])
     with pytest.raises(EnvironmentFault, match="expected an installation that knows its requirements"):
-        parts._refuse_stale(parts.importlib.metadata.distribution("click"))
+        packaging._refuse_stale(packaging.importlib.metadata.distribution("click"))
 
 
 def test_the_command_warns_of_an_autograder_without_walls(tmp_path):

@@ -9,8 +9,8 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_runner import ROOT
 
-from grader.exporting.bundles import workflow
-from grader.model.errors import GraderError
+from grader.core.errors import GraderError
+from grader.packaging import workflow
 
 BIN = Path(sys.executable).parent
 ACTION, TEMPLATE = ROOT / "action.yml", ROOT / "student_template" / ".github" / "workflows" / "grade.yml"

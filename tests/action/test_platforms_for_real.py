@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from stand_in_runner import CANARY, ROOT, job_environment, obeyed, run_action
 
-from grader.cli import app
+from grader.cli.main import app
 
 BIN = Path(sys.executable).parent
 SCHEMA = ROOT.parent / "shared" / "formats" / "classroom50-result-v1.schema.json"

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from grader.judging.checks import CHECKS
-from grader.reading.manuals import manual_of
-from grader.reading.rubric_stimuli import StimulusShape
+from grader.rubrics.manuals import manual_of
+from grader.rubrics.stimuli import StimulusShape
 
 GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "authors.md"
 FILE = re.compile(r"^`([\w/.]+)`:\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)

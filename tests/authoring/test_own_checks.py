@@ -13,25 +13,25 @@ from click.testing import CliRunner
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
-from grader import cli
-from grader.batch.cluster.errands import lay_out
-from grader.batch.cluster.sending import checks_of
-from grader.batch.keys import Conditions
-from grader.batch.parcels import Errand, Terms
-from grader.exporting.bundles import Chosen, classroom50
+from grader.app.grade import Request, read_exercises
+from grader.classroom.cache_key import Conditions
+from grader.classroom.cluster.jobs import lay_out
+from grader.classroom.cluster.sending import checks_of
+from grader.classroom.messages import Errand, Terms
+from grader.cli import main
+from grader.core.errors import RubricError
+from grader.core.exercise import Outcome
+from grader.core.submission import StudentFile, Submission
 from grader.judging.judge import judge_exercise
-from grader.model.errors import RubricError
-from grader.model.exercise import Outcome
-from grader.model.submission import StudentFile, Submission
-from grader.reading.rubric_file import own_check_files, read_rubric
-from grader.session import Request, read_exercises
+from grader.packaging import Chosen, classroom50
+from grader.rubrics.loader import own_check_files, read_rubric
 from grader.testing import TraceBuilder, judge
 
 FLOAT = "std_msgs/msg/Float32"
 
 
 def command(*words):
-    return CliRunner().invoke(cli.app, [*map(str, words)])
+    return CliRunner().invoke(main.app, [*map(str, words)])
 
 
 def refused(path, **rest):

@@ -5,10 +5,10 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from grader import cli
+from grader.cli import main
 from grader.judging.checks import CHECKS
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.rubric_schema import schema_text
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.schema import schema_text
 
 GOOD = """\
 schema: grader/rubric/v1
@@ -38,7 +38,7 @@ RATE = """\
 
 
 def rubric(*words):
-    return CliRunner().invoke(cli.app, ["rubric", *map(str, words)])
+    return CliRunner().invoke(main.app, ["rubric", *map(str, words)])
 
 
 def written(folder, text, name="r.yaml"):

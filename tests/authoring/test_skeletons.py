@@ -11,14 +11,13 @@ import pytest
 from click.testing import CliRunner
 from ruamel.yaml import YAML
 
-from grader import cli
 from grader.authoring.checking import check_rubric
-from grader.authoring.drafts import Draft, DraftCriterion, DraftStimulus, Quantity, as_id
 from grader.authoring.questions import Seen, questions
-from grader.authoring.skeleton import rubric_text
-from grader.authoring.stimulation import stimuli_for
-from grader.model.trace import Offer
-from grader.reading.rubric_file import read_rubric
+from grader.authoring.skeleton import Draft, DraftCriterion, DraftStimulus, Quantity, as_id, rubric_text
+from grader.authoring.starting import stimuli_for
+from grader.cli import main
+from grader.core.trace import Offer
+from grader.rubrics.loader import read_rubric
 from grader.testing import TraceBuilder
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -171,7 +170,7 @@ def test_an_id_is_made_of_anything(text, id_):
 def test_nothing_is_written_over(tmp_path):
     """A rubric that took an afternoon is not replaced by a skeleton; nothing is run."""
     (tmp_path / "r.yaml").write_text("mine")
-    done = CliRunner().invoke(cli.app, ["rubric", "new", "a.py", "-o", str(tmp_path / "r.yaml")])
+    done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "-o", str(tmp_path / "r.yaml")])
     assert done.exit_code == 2
     assert "expected a new file, found one that is there" in done.stderr
     assert (tmp_path / "r.yaml").read_text() == "mine"
@@ -197,7 +196,7 @@ def test_the_reference_scores_full_under_its_skeleton(tmp_path):
 def test_a_reference_that_fails_is_told(tmp_path):
     """A rubric made of a traceback would ask for it."""
     (tmp_path / "pump.py").write_text("import rclpy\nrclpy.init()\nrclpy.create_node('pump')\nraise ValueError('no')\n")
-    done = CliRunner().invoke(cli.app, ["rubric", "new", str(tmp_path / "pump.py")])
+    done = CliRunner().invoke(main.app, ["rubric", "new", str(tmp_path / "pump.py")])
     assert done.exit_code == 2
     assert "expected a reference that runs, found pump.py:4: ValueError: no" in done.stderr
 
@@ -222,6 +221,6 @@ def test_what_came_of_each_input_becomes_a_case():
 @pytest.mark.parametrize("text", ["say={data: a}", "/say", "/say={data: [}", "/say=5", "/say="])
 def test_a_message_to_send_has_a_topic_and_fields(text):
     """Anything else is told before something runs."""
-    done = CliRunner().invoke(cli.app, ["rubric", "new", "a.py", "--send", text])
+    done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "--send", text])
     assert done.exit_code == 2
     assert "expected TOPIC={field: value}, found something else" in done.stderr

@@ -5,13 +5,13 @@ from fractions import Fraction
 
 import pytest
 
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import FaultKind
+from grader.execution.ending import exited
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import FaultKind
-from grader.recording.ending import exited
 from grader.testing import TraceBuilder, judge, met
 
 FLOAT = "std_msgs/msg/Float32"

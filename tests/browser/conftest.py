@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).resolve().parent.parent
-sys.path += [str(TESTS / "judging"), str(TESTS / "reports"), str(TESTS / "batch")]
+sys.path += [str(TESTS / "judging"), str(TESTS / "reporting"), str(TESTS / "classroom")]
 
 #: Everything that a browser does by itself over the network is switched off: what is left comes from the page.
 ARGUMENTS = [

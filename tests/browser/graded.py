@@ -5,12 +5,12 @@ from pathlib import Path
 from report_samples import report
 from tracing import FLOAT32, Recording, held_at, position_logs, scripted, velocity
 
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import FaultKind
 from grader.judging.figures.pictures import illustrated
 from grader.judging.judge import judge_exercise
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.rubric_file import read_rubric
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
 
 CHAPTER = ("velocity_publisher", "odom_subscriber", "two_node_communication")
 SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"

@@ -8,13 +8,13 @@ from pathlib import Path
 import class_reports
 from class_samples import course
 
-from grader.batch.course import grade_class
-from grader.batch.standing import Standing, State
-from grader.batch.tasks import Attempt
-from grader.batch.watching import SilentWatcher
-from grader.reading.submission import stage_submission
-from grader.reports.html.render import render_html
-from grader.reports.json_report import dumps
+from grader.classroom.class_run import grade_class
+from grader.classroom.local import Attempt
+from grader.classroom.store import Standing, State
+from grader.classroom.watching import SilentWatcher
+from grader.reporting.html.render import render_html
+from grader.reporting.json_report import dumps
+from grader.submissions.submission import stage_submission
 
 FIRST = ("Ada", "Bogdan", "Chiara", "Dmitri", "Élodie", "Fatima", "Giang", "Hyun", "Ines", "Jakob", "Kwame", "Łukasz",
          "Mariam", "Noor", "Øyvind", "Priya", "Quentin", "Rania", "Søren", "Tomás")  # fmt: skip

@@ -8,7 +8,7 @@ from tracing import velocity
 
 from grader.judging.checks.rate import TopicRate
 from grader.judging.figures.rates import rate_chart
-from grader.reports.html.render import render_html
+from grader.reporting.html.render import render_html
 
 pytestmark = pytest.mark.browser
 

@@ -5,8 +5,8 @@ from itertools import pairwise
 import graded
 import pytest
 
-from grader.reports.html.bundle import shared_assets
-from grader.reports.html.render import render_html
+from grader.reporting.html.assets import shared_assets
+from grader.reporting.html.render import render_html
 
 pytestmark = pytest.mark.browser
 

@@ -9,13 +9,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from grader.judging.whole import judge_run
-from grader.model.containment import Property
-from grader.model.exercise import Exercise
-from grader.model.report import Environment, Report, Reproduction
-from grader.model.run import Run
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import (
+from grader.core.checkup import Property
+from grader.core.exercise import Exercise
+from grader.core.report import Environment, Report, Reproduction
+from grader.core.submission import Run, StudentFile, Submission
+from grader.core.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -35,10 +33,11 @@ from grader.model.trace import (
     StartWay,
     Trace,
 )
-from grader.reading.rubric_file import read_rubric
-from grader.recording.evidence.interfaces import encode
-from grader.recording.evidence.store import keep
-from grader.reports.json_report import dumps
+from grader.execution.evidence.shown import encode
+from grader.execution.evidence.store import keep
+from grader.judging.whole import judge_run
+from grader.reporting.json_report import dumps
+from grader.rubrics.loader import read_rubric
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 TWIST = "geometry_msgs/msg/Twist"

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
 
-from grader import cli
+from grader.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 CRASHES = ROOT / "tests/submissions/broken/raises_in_callback"
@@ -26,7 +26,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def run(*words: str) -> int:
-    return CliRunner().invoke(cli.app, list(words), catch_exceptions=False).exit_code
+    return CliRunner().invoke(main.app, list(words), catch_exceptions=False).exit_code
 
 
 @pytest.mark.ros

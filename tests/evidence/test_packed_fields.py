@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.model.errors import EvidenceError
-from grader.model.trace import ClockKind, Message, Trace
-from grader.recording.evidence.fields import Fields, fields_of
-from grader.recording.evidence.packed import pack, unpack, unpack_exactly
+from grader.core.errors import EvidenceError
+from grader.core.trace import ClockKind, Message, Trace
+from grader.execution.evidence.packed import Fields, fields_of, pack, unpack, unpack_exactly
 
 TWIST = {"linear": {"x": 0.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.1}}
 LONG = {"data": "x" * 80}

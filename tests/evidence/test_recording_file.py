@@ -15,10 +15,10 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from grader.model.errors import EvidenceError
-from grader.model.trace import ClockKind, Delivery, Fault, FaultKind, LogRecord, Mark, Message, Observation, Trace
-from grader.recording.codec import trace_to_json
-from grader.recording.evidence.recording_file import recording_bytes, trace_of
+from grader.core.errors import EvidenceError
+from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, LogRecord, Mark, Message, Observation, Trace
+from grader.execution.codec import trace_to_json
+from grader.execution.evidence.recording_file import recording_bytes, trace_of
 
 FACTS = {"format": "x", "seed": "7"}
 

@@ -10,15 +10,16 @@ import pytest
 from click.testing import CliRunner
 from kept_runs import RUBRICS, kept_run, velocity_exercise, velocity_run, velocity_trace
 
-from grader import cli, rejudging
+from grader.app import rejudge
+from grader.cli import main
+from grader.execution.evidence.store import open_evidence
 from grader.judging.whole import judge_run
-from grader.reading.rubric_file import read_rubric
-from grader.recording.evidence.store import open_evidence
-from grader.reports.json_report import dumps
+from grader.reporting.json_report import dumps
+from grader.rubrics.loader import read_rubric
 
 
 def grade(*words: str | Path):
-    return CliRunner().invoke(cli.app, ["rejudge", *map(str, words)])
+    return CliRunner().invoke(main.app, ["rejudge", *map(str, words)])
 
 
 def changed_rubric(folder: Path, *changes: tuple[str, str]) -> Path:
@@ -46,8 +47,8 @@ def test_the_same_rubric_gives_the_same_report(tmp_path, rate_hz, pictures):
     run = velocity_run(velocity_trace(rate_hz=rate_hz), source="import rclpy\nperiod = 0.1\n")
     first = judge_run([velocity_exercise()], run, pictures=pictures)
     kept_run(tmp_path, run)
-    how = rejudging.judgement((), (), pictures=pictures)
-    again = rejudging.rejudge(open_evidence(tmp_path), how)
+    how = rejudge.judgement((), (), pictures=pictures)
+    again = rejudge.rejudge(open_evidence(tmp_path), how)
     assert again.reproduce.command == ("grade", "class/ada", "--seed", "7")
     assert dataclasses.replace(again, reproduce=first.reproduce) == first
 
@@ -59,7 +60,7 @@ def test_the_report_is_printed_and_written_as_by_grading(tmp_path):
     text = grade(tmp_path / "e")
     assert (text.exit_code, "20 of 30 points" in text.output) == (1, True)
     shown = grade(tmp_path / "e", "--json", "-o", f"text={tmp_path / 'r.txt'}", "--min-score", 60)
-    report = rejudging.rejudge(open_evidence(tmp_path / "e"), rejudging.judgement((), ()))
+    report = rejudge.rejudge(open_evidence(tmp_path / "e"), rejudge.judgement((), ()))
     assert (shown.exit_code, shown.stdout) == (0, dumps(report))
     assert "20 of 30 points" in (tmp_path / "r.txt").read_text(encoding="utf-8")
 
@@ -145,20 +146,20 @@ def test_reports_of_a_class_are_files_in_a_folder(tmp_path):
 
 def test_many_processes_give_what_one_gives(tmp_path):
     """In the same order; enough submissions for a pool."""
-    for number in range(rejudging.WORTH_A_POOL * 2):
+    for number in range(rejudge.WORTH_A_POOL * 2):
         kept_run(tmp_path / f"{number:03}", velocity_run(velocity_trace(rate_hz=10) if number % 3 else None))
-    named = rejudging.named_evidence([tmp_path])
-    how, wanted = rejudging.judgement((), ()), rejudging.Wanted(reports=True)
-    several = rejudging.rejudge_class(named, how, wanted, jobs=2)
-    assert several == rejudging.rejudge_class(named, how, wanted, jobs=1)
-    assert [r.name for r in several] == [f"{number:03}" for number in range(rejudging.WORTH_A_POOL * 2)]
+    named = rejudge.named_evidence([tmp_path])
+    how, wanted = rejudge.judgement((), ()), rejudge.Wanted(reports=True)
+    several = rejudge.rejudge_class(named, how, wanted, jobs=2)
+    assert several == rejudge.rejudge_class(named, how, wanted, jobs=1)
+    assert [r.name for r in several] == [f"{number:03}" for number in range(rejudge.WORTH_A_POOL * 2)]
 
 
 def test_equal_names_are_told_apart(tmp_path):
     """Two classes may each have an ada."""
     for name in ("one", "two"):
         kept_run(tmp_path / name / "ada", velocity_run(velocity_trace()))
-    named = rejudging.named_evidence([tmp_path / "one", tmp_path / "two", tmp_path / "one"])
+    named = rejudge.named_evidence([tmp_path / "one", tmp_path / "two", tmp_path / "one"])
     assert [name for name, _ in named] == ["ada", "ada (2)"]
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
-from grader.model.errors import EvidenceError
-from grader.model.scenario import MessageStream, Scenario, Span
-from grader.recording.evidence.manifest import scenario_digest
-from grader.recording.evidence.store import check_place, first_report, found_under, open_evidence, run_of
+from grader.core.errors import EvidenceError
+from grader.core.scenario import MessageStream, Scenario, Span
+from grader.execution.evidence.manifest import scenario_digest
+from grader.execution.evidence.store import check_place, first_report, found_under, open_evidence, run_of
 
 RECORDING = "velocity_publisher.alone/velocity_publisher.alone_0.mcap"
 OWN = {"evidence.json", "report.json", RECORDING, "velocity_publisher.alone/metadata.yaml"}
@@ -154,7 +154,7 @@ def test_a_recording_that_shows_something_else_is_found(tmp_path):
     assert run_of(open_evidence(tmp_path / "a"), [velocity_exercise()], verify=True)
     forged = spliced(one, other)
     old, new = (json.loads((tmp_path / "a" / "evidence.json").read_text()) for _ in "ab")
-    from grader.recording.evidence.manifest import sha256
+    from grader.execution.evidence.manifest import sha256
 
     new["exercises"][0]["recordings"][0]["digest"] = sha256(forged)
     assert new != old

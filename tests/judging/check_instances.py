@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from tracing import ODOMETRY, TRIGGER, TWIST
 
+from grader.core.exercise import Check
+from grader.core.quantities import NS_PER_S
 from grader.judging.checks import CHECKS
 from grader.judging.checks.endpoints import GraphEdge
 from grader.judging.checks.reactions import ReactionCase
 from grader.judging.rules import FieldRule
-from grader.model.exercise import Check
-from grader.model.quantities import NS_PER_S
 
 INSTANCES: dict[str, Check] = {
     "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),

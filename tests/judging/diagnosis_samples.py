@@ -23,13 +23,13 @@ from tracing import (
     velocity,
 )
 
+from grader.core.exercise import Exercise
+from grader.core.report import ExerciseReport, Verdict
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import FaultKind, Trace
 from grader.judging.judge import judge_exercise
-from grader.model.exercise import Exercise
-from grader.model.report import ExerciseReport, Verdict
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind, Trace
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.rubric_file import read_rubric
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
 
 HERE = Path(__file__).parent / "diagnosis"
 FLOAT64 = "std_msgs/msg/Float64"

@@ -7,9 +7,9 @@ import random
 
 import pytest
 
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import ClockKind, FaultKind
 from grader.judging.agreement import Aspect, differences, sentence
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, FaultKind
 from grader.testing import TraceBuilder
 
 TWIST, FLOAT = "geometry_msgs/msg/Twist", "std_msgs/msg/Float32"

@@ -22,11 +22,10 @@ from tracing import FLOAT32, ODOMETRY, TWIST, Recording, position_logs, twist, v
 from wordings import RIGHT
 from wordings import WRONG as WRONG_POSITIONS
 
-from grader.judging.checks import CHECKS
-from grader.model.errors import HarnessError
-from grader.model.exercise import Check
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import (
+from grader.core.errors import HarnessError
+from grader.core.exercise import Check
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -42,6 +41,7 @@ from grader.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.judging.checks import CHECKS
 
 TRACES = {
     "velocity": velocity().log(0.0, "started"),

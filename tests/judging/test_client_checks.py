@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from tracing import TRIGGER, Recording
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Check
+from grader.core.quantities import NS_PER_MS, NS_PER_S
+from grader.core.trace import ClockKind, Request
 from grader.judging.checks.clients import ServiceCalls, WaitsForService
 from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.findings import FAULT_KEY
-from grader.model.errors import HarnessError
-from grader.model.exercise import Check
-from grader.model.quantities import NS_PER_MS, NS_PER_S
-from grader.model.trace import ClockKind, Request
 
 BATTERY = "/battery/get_status"
 FILE = "battery_service_client.py"

@@ -20,13 +20,13 @@ from diagnosis_samples import (
     spoilt,
 )
 
+from grader.core.exercise import Outcome
+from grader.core.report import ExerciseReport, Verdict
+from grader.core.trace import Start, StartWay, Trace
 from grader.judging import judge
 from grader.judging.diagnosis.case import Case, Cause
 from grader.judging.diagnosis.diagnose import CAUSES, diagnose
-from grader.model.exercise import Outcome
-from grader.model.report import ExerciseReport, Verdict
-from grader.model.trace import Start, StartWay, Trace
-from grader.reading.sources import source_text
+from grader.submissions.sources import source_text
 
 Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")

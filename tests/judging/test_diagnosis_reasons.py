@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from tracing import FAN_VALUES, Recording, position_logs, scripted
 
+from grader.core.trace import FaultKind
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
-from grader.model.trace import FaultKind
 
 POSITION = LogsPosition("odom_subscriber.py", "/odom")
 ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")

@@ -14,15 +14,15 @@ from diagnosis_samples import RECORDINGS, RIGHT, line_of, lost, report, silent, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import FaultKind, Trace
 from grader.judging.diagnosis import diagnose as room
 from grader.judging.diagnosis.case import Case, Clue
 from grader.judging.diagnosis.constants import constant
 from grader.judging.diagnosis.notes import placed
 from grader.judging.diagnosis.wiring import goes_to, made
 from grader.judging.source import LONGEST_SOURCE, chain, last_line, read
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind, Trace
-from grader.reading.sources import MAX_SOURCE_BYTES, read_sources
+from grader.submissions.sources import MAX_SOURCE_BYTES, read_sources
 
 FILE = "velocity_publisher.py"
 DEEP = 3_000

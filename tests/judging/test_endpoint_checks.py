@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from tracing import FLOAT32, FLOAT64, Recording
 
+from grader.core.errors import HarnessError
+from grader.core.quantities import NS_PER_MS, NS_PER_S
+from grader.core.trace import FaultKind
 from grader.judging.checks.endings import CleanShutdown, NoFault
 from grader.judging.checks.endpoints import GraphEdge, GraphEdges, NodeName, Qos, TopicNames
 from grader.judging.findings import FAULT_KEY
-from grader.model.errors import HarnessError
-from grader.model.quantities import NS_PER_MS, NS_PER_S
-from grader.model.trace import FaultKind
 
 
 def talking() -> Recording:

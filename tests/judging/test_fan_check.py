@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
 from grader.judging.checks.fan import ThresholdResponse
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
 
 ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")
 OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below")

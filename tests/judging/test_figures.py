@@ -17,17 +17,17 @@ from tracing import (
     velocity,
 )
 
+from grader.core.chart import GraphFigure, Look, Tone
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import FaultKind, Mark, Request, Response
 from grader.judging.checks import CHECKS
 from grader.judging.figures import pictures
 from grader.judging.figures.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
 from grader.judging.figures.expectations import expectation
 from grader.judging.figures.pictures import MAKERS, figures_of, illustrated
 from grader.judging.judge import judge_exercise
-from grader.model.figure import GraphFigure, Look, Tone
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind, Mark, Request, Response
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.rubric_file import read_rubric
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
 
 EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()}
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))

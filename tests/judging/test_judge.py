@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from tracing import ODOMETRY, TWIST, Recording, driving, position_logs, velocity
 
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Outcome
+from grader.core.report import ExerciseReport, Verdict
+from grader.core.scenario import Scenario, Span
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.judge import judge_exercise
-from grader.model.exercise import Check, Criterion, Exercise, Finding, Location, Outcome
-from grader.model.report import ExerciseReport, Verdict
-from grader.model.scenario import Scenario, Span
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import ClockKind, FaultKind, Trace
 
 FILE = "velocity_publisher.py"
 ODOM = "odom_subscriber.py"

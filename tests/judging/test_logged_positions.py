@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from tracing import ODOM_TIMES, drive, driving, pose_at, position_logs
 from wordings import RIGHT, WRONG, Writer
 
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import ClockKind, FaultKind
 from grader.judging.checks.odometry import LogPeriod, LogsPosition
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, FaultKind
 
 POSITION = LogsPosition("odom_subscriber.py", "/odom")
 PERIOD = LogPeriod("odom_subscriber.py", "/odom", NS_PER_S)

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracing import driving, position_logs
 
+from grader.core.errors import HarnessError
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks.odometry import LogPeriod, WaitsGracefully
-from grader.model.errors import HarnessError
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, FaultKind, Trace
 
 PERIOD = LogPeriod("odom_subscriber.py", "/odom", NS_PER_S)
 WAITS = WaitsGracefully("odom_subscriber.py", "/odom", 5 * NS_PER_S)

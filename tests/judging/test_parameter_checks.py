@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from tracing import Recording
 
+from grader.core.errors import HarnessError
 from grader.judging.checks.parameters import ParameterDeclared, ParameterTakesEffect
 from grader.judging.findings import FAULT_KEY
-from grader.model.errors import HarnessError
 
 GET, SET = "rcl_interfaces/srv/GetParameters", "rcl_interfaces/srv/SetParameters"
 DECLARED = ParameterDeclared("speed", value=0.5)

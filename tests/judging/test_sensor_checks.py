@@ -10,8 +10,8 @@ from fractions import Fraction
 import pytest
 from tracing import FLOAT32, Recording, held_at, scripted
 
+from grader.core.errors import HarnessError
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
-from grader.model.errors import HarnessError
 
 RANGE = RandomInRange("/temperature", 20, 30)
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from tracing import Recording
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Criterion, Exercise, Location, Outcome
+from grader.core.quantities import NS_PER_S
+from grader.core.scenario import Scenario, Span
+from grader.core.submission import StudentFile, Submission
+from grader.core.trace import FaultKind
 from grader.judging.checks.sources import SourceAvoids, SourceUses
 from grader.judging.findings import FAULT_KEY
 from grader.judging.judge import judge_exercise
-from grader.model.errors import HarnessError
-from grader.model.exercise import Criterion, Exercise, Location, Outcome
-from grader.model.quantities import NS_PER_S
-from grader.model.scenario import Scenario, Span
-from grader.model.submission import StudentFile, Submission
-from grader.model.trace import FaultKind
 
 NODE = "rclpy.node.Node"
 USES = SourceUses("node.py", (NODE,), ("create_timer", "rclpy.spin"))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from grader.core.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
 from grader.judging.judge import started
 from grader.judging.wording import fault_sentence
-from grader.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
 
 
 @pytest.mark.parametrize(

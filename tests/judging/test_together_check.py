@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FLOAT32, FLOAT64, Recording
 
+from grader.core.trace import ClockKind
 from grader.judging.checks.together import AnswersTogether
-from grader.model.trace import ClockKind
 
 CHECK = AnswersTogether("/temperature", "/fan_speed", 25, 100, 0)
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, twist, velocity
 
+from grader.core.trace import FaultKind
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
-from grader.model.trace import FaultKind
 
 PUBLISHES = Publishes("/cmd_vel", TWIST)
 SUBSCRIBES = Subscribes("/odom", ODOMETRY)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.model.quantities import nanoseconds
-from grader.model.trace import (
+from grader.core.quantities import nanoseconds
+from grader.core.trace import (
     ClockKind,
     Delivery,
     Endpoint,
@@ -25,7 +25,7 @@ from grader.model.trace import (
     ServiceEnd,
     Trace,
 )
-from grader.recording.ending import exited
+from grader.execution.ending import exited
 
 TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"

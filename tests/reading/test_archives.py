@@ -17,9 +17,9 @@ from archive_samples import tarred, zipped
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from grader.model.errors import SubmissionError
-from grader.reading import archives
-from grader.reading.submission import stage_submission
+from grader.core.errors import SubmissionError
+from grader.submissions import archives
+from grader.submissions.submission import stage_submission
 
 WANTED = ("velocity_publisher.py", "odom_subscriber.py")
 FILES = {"velocity_publisher.py": b"x = 1\n", "pkg/helper.py": b"", "pkg/data.bin": bytes(range(256)) * 40}

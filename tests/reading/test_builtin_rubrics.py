@@ -8,13 +8,13 @@ import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
+from grader.core.quantities import NS_PER_S
+from grader.core.scenario import OdometryStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
-from grader.model.quantities import NS_PER_S
-from grader.model.scenario import OdometryStream, longest_course_ns, shortest
-from grader.reading import shipped
-from grader.reading.builtin_rubrics import builtin_headers, builtin_rubrics
-from grader.reading.rubric_file import NOTES, read_rubric
-from grader.reading.rubric_schema import rubric_schema, schema_text
+from grader.rubrics import builtin
+from grader.rubrics.builtin import builtin_headers, builtin_rubrics
+from grader.rubrics.loader import NOTES, read_rubric
+from grader.rubrics.schema import rubric_schema, schema_text
 
 RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 
@@ -105,7 +105,7 @@ def test_every_scripted_number_is_held_for_its_whole_time():
 
 
 def test_the_shipped_schema_is_up_to_date():
-    """`python -m grader.reading.rubric_schema > rubrics/rubric.schema.json` was run after the last change."""
+    """`python -m grader.rubrics.schema > rubrics/rubric.schema.json` was run after the last change."""
     assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
 
 
@@ -182,7 +182,7 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatc
     for number, name in (("10", "a"), ("2", "c"), ("P1", "b")):
         changed = text.replace('number: "1"', f'number: "{number}"').replace("id: velocity_publisher", f"id: {name}")
         (rubrics / f"{name}.yaml").write_text(changed, encoding="utf-8")
-    monkeypatch.setattr(shipped, "__file__", str(tmp_path / "grader" / "reading" / "shipped.py"))
+    monkeypatch.setattr(builtin, "__file__", str(tmp_path / "grader" / "rubrics" / "builtin.py"))
     assert builtin_rubrics() == {"c": rubrics / "c.yaml", "a": rubrics / "a.yaml", "b": rubrics / "b.yaml"}
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 

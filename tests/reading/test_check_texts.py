@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.core.errors import RubricError
+from grader.core.quantities import NS_PER_MS
 from grader.judging.checks.actions import ActionResult
 from grader.judging.checks.endpoints import GraphEdge, GraphEdges, TopicNames
 from grader.judging.checks.functions import FieldFunction
@@ -13,9 +15,7 @@ from grader.judging.checks.services import ServiceResponse
 from grader.judging.checks.timing import Silence
 from grader.judging.checks.transforms import Transform
 from grader.judging.rules import FieldRule
-from grader.model.errors import RubricError
-from grader.model.quantities import NS_PER_MS
-from grader.reading.rubric_file import read_rubric
+from grader.rubrics.loader import read_rubric
 
 RUBRIC = """schema: grader/rubric/v1
 exercise: {id: one, number: "9", title: One}

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.reading.internals import LONG, reaching
-from grader.reading.sources import read_reaches
+from grader.submissions.sources import LONG, reaching, read_reaches
 
 ROOT = Path(__file__).resolve().parents[2]
 SUSPICIOUS = {

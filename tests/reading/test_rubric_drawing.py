@@ -2,9 +2,9 @@
 
 import pytest
 
-from grader.model.errors import RubricError
-from grader.model.scenario import AnyOrder, Between, CountBetween, InOrder, SomeOf, TimeBetween
-from grader.reading.rubric_file import read_rubric
+from grader.core.errors import RubricError
+from grader.core.scenario import AnyOrder, Between, CountBetween, InOrder, SomeOf, TimeBetween
+from grader.rubrics.loader import read_rubric
 
 MS, S = 1_000_000, 1_000_000_000
 HEAD = """\

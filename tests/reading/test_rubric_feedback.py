@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from stand_in_checks import CHECKS
 
-from grader.model.feedback import OPEN, ORDER, Feedback, Shows, strictest
-from grader.reading.rubric_file import read_rubric
+from grader.core.exercise import OPEN, ORDER, Feedback, Shows, strictest
+from grader.rubrics.loader import read_rubric
 
 RUBRIC = """\
 schema: grader/rubric/v1

@@ -9,10 +9,10 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, TopicRate, UsesLogger
 
-from grader.model.errors import RubricError
-from grader.model.exercise import Criterion, Exercise
-from grader.model.scenario import Between, JustAbove, JustBelow, NumberStream, OdometryStream, Scenario, Span
-from grader.reading.rubric_file import MAX_BYTES, MAX_MISTAKES, read_rubric
+from grader.core.errors import RubricError
+from grader.core.exercise import Criterion, Exercise
+from grader.core.scenario import Between, JustAbove, JustBelow, NumberStream, OdometryStream, Scenario, Span
+from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, read_rubric
 
 GOOD = """\
 schema: grader/rubric/v1

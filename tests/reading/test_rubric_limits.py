@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stand_in_checks import CHECKS
 
-from grader.model.errors import RubricError
-from grader.model.limits import Limits
-from grader.model.quantities import KIB, MIB, NS_PER_S, Unit
-from grader.reading.rubric_file import read_rubric
-from grader.reading.rubric_limits import USUAL, LimitsShape, limits_of
-from grader.reading.units import QuantityError, format_quantity, parse_quantity
+from grader.core.errors import RubricError
+from grader.core.limits import Limits
+from grader.core.quantities import KIB, MIB, NS_PER_S, Unit
+from grader.rubrics.loader import read_rubric
+from grader.rubrics.model import USUAL, LimitsShape, limits_of
+from grader.rubrics.units import QuantityError, format_quantity, parse_quantity
 
 BYTES = Unit("B")
 RUBRIC = """\

@@ -4,17 +4,9 @@ import math
 
 import pytest
 
-from grader.model.errors import RubricError
-from grader.model.scenario import (
-    ActionGoal,
-    Between,
-    Choose,
-    MessageStream,
-    ServiceCalls,
-    ServiceServer,
-    Written,
-)
-from grader.reading.rubric_file import read_rubric
+from grader.core.errors import RubricError
+from grader.core.scenario import ActionGoal, Between, Choose, MessageStream, ServiceCalls, ServiceServer, Written
+from grader.rubrics.loader import read_rubric
 
 MS, S = 1_000_000, 1_000_000_000
 HEAD = """\

@@ -8,12 +8,12 @@ import pytest
 from ruamel.yaml import YAML
 from stand_in_checks import CHECKS
 
-from grader.model.errors import RubricError
-from grader.model.scenario import NumberStream
-from grader.model.variant import Drawn, Variant
-from grader.reading.rubric_file import read_rubric
-from grader.reading.rubric_schema import rubric_schema
-from grader.reading.variants import First, Options, Recorded
+from grader.core.errors import RubricError
+from grader.core.exercise import Drawn, Variant
+from grader.core.scenario import NumberStream
+from grader.rubrics.loader import read_rubric
+from grader.rubrics.schema import rubric_schema
+from grader.rubrics.variants import First, Options, Recorded
 
 RUBRIC = """\
 schema: grader/rubric/v1

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.model.errors import HarnessError, SubmissionError
-from grader.reading import staging
-from grader.reading.submission import stage_submission
+from grader.core.errors import HarnessError, SubmissionError
+from grader.submissions import staging
+from grader.submissions.submission import stage_submission
 
 WANTED = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py", "fan_controller.py")
 

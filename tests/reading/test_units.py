@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.model.quantities import Unit
-from grader.reading.units import QuantityError, format_quantity, parse_quantity, quantity_pattern
+from grader.core.quantities import Unit
+from grader.rubrics.units import QuantityError, format_quantity, parse_quantity, quantity_pattern
 
 SECONDS = Unit("s")
 HERTZ = Unit("Hz")

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
+from grader.app.evidence_writer import request_of
+from grader.app.reproducing import command_words
+from grader.core.exercise import Exercise
+from grader.core.report import Report
+from grader.execution.evidence import manifest as kept
+from grader.execution.evidence.packed import unpack
+from grader.execution.evidence.recording_file import packed_trace
+from grader.execution.evidence.store import run_from
 from grader.judging.whole import judge_run
-from grader.keeping import request_of
-from grader.model.exercise import Exercise
-from grader.model.report import Report
-from grader.reading.builtin_rubrics import builtin_rubrics
-from grader.reading.rubric_file import read_rubric
-from grader.recording.evidence import manifest as kept
-from grader.recording.evidence.packed import unpack
-from grader.recording.evidence.recording_file import packed_trace
-from grader.recording.evidence.store import run_from
-from grader.reproducing import command_words
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
 
 ARCHIVE = Path(__file__).with_name("recorded.tar.xz")
 SUBMISSIONS = Path(__file__).resolve().parents[1] / "submissions"

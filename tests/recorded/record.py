@@ -17,7 +17,7 @@ from pathlib import Path
 from archive import ARCHIVE, SEED, SUBMISSIONS, Recorded, judged, read_archive, recorded_in, told, write_archive
 from ruamel.yaml import YAML
 
-from grader.reports.json_report import dumps
+from grader.reporting.json_report import dumps
 
 EXPECTED, GOLDEN = SUBMISSIONS / "expected.yaml", SUBMISSIONS / "golden.yaml"
 GRADE = str(Path(sys.executable).with_name("grade"))

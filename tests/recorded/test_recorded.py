@@ -6,7 +6,7 @@ import pytest
 from archive import SUBMISSIONS, judged, outcomes, outdated, read_archive, told, write_archive
 from ruamel.yaml import YAML
 
-from grader.reports.json_report import dumps
+from grader.reporting.json_report import dumps
 
 EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
 GOLDEN = YAML(typ="safe").load((SUBMISSIONS / "golden.yaml").read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from grader.model.exercise import Outcome
+from grader.core.exercise import Outcome
 
 HERE = Path(__file__).parent
 GROUPS = ("correct", "threads", "wrong", "broken")

@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import DurationNs, seconds
+from grader.core.trace import Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.paths import NoSuchField, at_path
 from grader.judging.rules import FieldRule, breach, broken_rules, shown, told
@@ -15,10 +19,6 @@ from grader.judging.services import LATENESS_NS, Call, calls_of
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.values import as_number, published
 from grader.judging.wording import counted, fault_sentence, listed, moment, nearest, number, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import DurationNs, seconds
-from grader.model.trace import Message, Trace
 
 #: Numbers of action_msgs/msg/GoalStatus.
 _STATUSES: Mapping[int, str] = {

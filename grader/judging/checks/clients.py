@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Location
+from grader.core.quantities import NS_PER_S, DurationNs, seconds
+from grader.core.trace import Trace
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records
 from grader.judging.services import LATENESS_NS, Call, calls_of, explain_no_client
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding, Location
-from grader.model.quantities import NS_PER_S, DurationNs, seconds
-from grader.model.trace import Trace
 
 _WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0): log that it is still waited for"
 

@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Pattern
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.episodes import Episode, Kind, Reading, complaints, episodes_of, shapes_before
 from grader.judging.findings import met, not_met, partly
@@ -14,11 +18,6 @@ from grader.judging.printed import Output, shape_of
 from grader.judging.services import explain_no_client
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.names import Pattern
-from grader.model.quantities import NS_PER_S, seconds
-from grader.model.trace import OutputLine, Trace
 
 #: A client that has not asked again for so long does not ask again.
 _ASKS_AGAIN_NS = 5 * NS_PER_S

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S, DurationNs, seconds
+from grader.core.trace import FaultKind, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.services import LATENESS_NS
 from grader.judging.silence import fault_hint, faults_before_stop, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S, DurationNs, seconds
-from grader.model.trace import FaultKind, Trace
 
 _SHUTDOWN_HINT = "end on Ctrl-C: except KeyboardInterrupt: pass, then destroy the node and rclpy.try_shutdown()"
 

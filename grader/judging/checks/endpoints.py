@@ -6,18 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import DurationNs, seconds
+from grader.core.trace import Endpoint, GraphSnapshot, Trace
 from grader.judging.findings import met, not_met
-from grader.judging.silence import (
-    explain_no_subscription,
-    fault_hint,
-    first_fault,
-    student_endpoints,
-)
+from grader.judging.silence import explain_no_subscription, fault_hint, first_fault, student_endpoints
 from grader.judging.wording import counted, fault_sentence, listed, moment, nearest, number, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import DurationNs, seconds
-from grader.model.trace import Endpoint, GraphSnapshot, Trace
 
 _QOS_HINT = "pass a QoSProfile with that policy where the {kind} is created"
 

@@ -8,24 +8,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import NS_PER_MS, seconds, within
+from grader.core.trace import ClockKind, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.lateness import lag_ns
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
-from grader.judging.values import (
-    Held,
-    Reading,
-    delivered_numbers,
-    held,
-    last_of_instant,
-    published,
-    published_numbers,
-)
+from grader.judging.values import Held, Reading, delivered_numbers, held, last_of_instant, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import NS_PER_MS, seconds, within
-from grader.model.trace import ClockKind, Trace
 
 #: How long after a new input an answer to the one before is still accepted.
 _GRACE_NS = 300 * NS_PER_MS

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
+from grader.core.exercise import Finding
+from grader.core.quantities import SLACK, seconds
+from grader.core.trace import Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.paths import number_at
 from grader.judging.rules import FieldRule, as_rule, breach, broken_rules, told
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
-from grader.model.exercise import Finding
-from grader.model.quantities import SLACK, seconds
-from grader.model.trace import Message, Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.exercise import Finding, Formula, Problem, ProblemKind
+from grader.core.quantities import SLACK, seconds, within
+from grader.core.trace import Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.following import Sample, followed_instead
 from grader.judging.formula import Curve, curve
@@ -13,11 +16,6 @@ from grader.judging.paths import number_at
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
-from grader.model.exercise import Finding
-from grader.model.names import Formula
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import SLACK, seconds, within
-from grader.model.trace import Message, Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import seconds
+from grader.core.trace import Endpoint, GraphSnapshot, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import fault_sentence, moment, quote
-from grader.model.exercise import Finding
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import seconds
-from grader.model.trace import Endpoint, GraphSnapshot, Trace
 
 Pair = tuple[Endpoint, Endpoint]
 

@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import seconds
+from grader.core.trace import Request, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.paths import NoSuchField, at_path
 from grader.judging.services import Call, calls_of
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, moment, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import seconds
-from grader.model.trace import Request, Trace
 
 #: Numbers of lifecycle_msgs/msg/Transition -> label.
 _TRANSITIONS: Mapping[int, str] = {

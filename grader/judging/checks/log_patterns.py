@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from grader.core.exercise import Finding, Pattern
+from grader.core.quantities import DurationNs, seconds, within
+from grader.core.trace import LogRecord, Trace
 from grader.judging.checks.logs import LOGGER_HINT, no_node
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import is_no_node, printed_lines, student_records
 from grader.judging.printed import Output
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, listed, moment, number, quote
-from grader.model.exercise import Finding
-from grader.model.names import Pattern
-from grader.model.quantities import DurationNs, seconds, within
-from grader.model.trace import LogRecord, Trace
 
 _LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")
 _LONGEST = 2_000

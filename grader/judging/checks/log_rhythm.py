@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from grader.core.exercise import Finding
+from grader.core.quantities import within
+from grader.core.trace import Message, Trace
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records
@@ -16,9 +19,6 @@ from grader.judging.printed import Output, numbers_in, shape_of
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
-from grader.model.exercise import Finding
-from grader.model.quantities import within
-from grader.model.trace import Message, Trace
 
 #: Share of the texts of one shape that must show the published number for the shape to count as its log.
 _SHOWING = 0.6

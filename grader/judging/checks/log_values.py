@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.trace import Trace
 from grader.judging.attribution import Sought, crowd, followed, standing
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.conversions import Heard, wrong_conversion
@@ -15,19 +19,9 @@ from grader.judging.output import printed_lines, student_records
 from grader.judging.paths import number_at
 from grader.judging.positions.numbers import Printed
 from grader.judging.printed import Output, in_window, numbers_in, shows_about, times
-from grader.judging.silence import (
-    explain_no_subscription,
-    fault_hint,
-    first_fault,
-    heard_from_ns,
-    student_endpoints,
-)
+from grader.judging.silence import explain_no_subscription, fault_hint, first_fault, heard_from_ns, student_endpoints
 from grader.judging.values import JITTER_NS
 from grader.judging.wording import counted, fault_sentence, moment, number, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S, seconds
-from grader.model.trace import Trace
 
 #: How long after a message its log may come, where there are as many numbers as it takes.
 _LATE_NS = NS_PER_S

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.exercise import Finding
+from grader.core.quantities import seconds
+from grader.core.trace import Trace
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import is_no_node, printed_lines, student_records
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, quote, span
-from grader.model.exercise import Finding
-from grader.model.quantities import seconds
-from grader.model.trace import Trace
 
 LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 

@@ -8,6 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Location, Problem, ProblemKind
+from grader.core.quantities import DurationNs, seconds, within
+from grader.core.trace import Fault, LogRecord, Trace
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.positions.analysis import Analysis, logged_positions, printed_positions
@@ -16,11 +20,6 @@ from grader.judging.positions.matching import Group, blocks, grouped
 from grader.judging.positions.track import Track, track_of
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding, Location
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import DurationNs, seconds, within
-from grader.model.trace import Fault, LogRecord, Trace
 
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
 _TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"

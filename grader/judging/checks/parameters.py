@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.trace import Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.parameters import Got, Set, asked_for, got, settings
 from grader.judging.paths import NoSuchField, at_path
@@ -13,10 +17,6 @@ from grader.judging.rules import FieldRule, shown
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import as_number, published
 from grader.judging.wording import fault_sentence, listed, moment, number, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S, DurationNs, seconds, within
-from grader.model.trace import Message, Trace
 
 _DECLARE_HINT = "declare it where the node is created: self.declare_parameter('{name}', ...)"
 _READ_HINT = "read the parameter each time it is used, self.get_parameter('{name}').value, or react to its change"

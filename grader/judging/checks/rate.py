@@ -6,14 +6,13 @@ import statistics
 from dataclasses import dataclass
 from itertools import pairwise
 
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
+from grader.core.trace import ClockKind, Fault, FaultKind, Trace
 from grader.judging.findings import met, not_met, partly
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import published
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
-from grader.model.exercise import Finding
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
-from grader.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}

@@ -6,6 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_S, DurationNs, seconds
+from grader.core.trace import Delivery, Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.paths import NoSuchField, at_path
 from grader.judging.rules import FieldRule, Rule, as_rule, breach, broken_rules, told
@@ -19,10 +23,6 @@ from grader.judging.silence import (
 )
 from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, listed, moment, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import NS_PER_S, DurationNs, seconds
-from grader.model.trace import Delivery, Message, Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.core.trace import Endpoint, Trace
 from grader.judging.attribution import Sought, crowd, followed, standing
 from grader.judging.findings import met, not_met, partly
 from grader.judging.output import printed_lines, student_records
@@ -23,11 +27,6 @@ from grader.judging.silence import (
 )
 from grader.judging.values import Held, Reading, carries_number, held, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, unit_of
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds
-from grader.model.trace import Endpoint, Trace
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5

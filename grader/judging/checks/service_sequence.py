@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Any
 
+from grader.core.exercise import Finding, Pattern
+from grader.core.quantities import seconds, within
+from grader.core.trace import Response, Trace
 from grader.judging.checks.services import too_few_responses
 from grader.judging.findings import met, not_met
 from grader.judging.paths import number_at, text_at
 from grader.judging.printed import number_in
 from grader.judging.services import Call, calls_of
 from grader.judging.wording import counted, moment, number, numbers, quote
-from grader.model.exercise import Finding
-from grader.model.names import Pattern
-from grader.model.quantities import seconds, within
-from grader.model.trace import Response, Trace
 
 _MOST_IN_EVIDENCE = 250
 _KEEP_HINT = "keep the number in an attribute of the node, self.name, and change it there at each call"

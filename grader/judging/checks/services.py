@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, ServiceType
+from grader.core.quantities import NS_PER_S, DurationNs, seconds
+from grader.core.trace import Response, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.rules import FieldRule, breach, broken_rules, told
 from grader.judging.services import LATENESS_NS, Call, calls_of, explain_no_server
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.wording import counted, fault_sentence, moment, quote, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.names import ServiceType
-from grader.model.quantities import NS_PER_S, DurationNs, seconds
-from grader.model.trace import Response, Trace
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
 

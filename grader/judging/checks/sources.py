@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Location
+from grader.core.trace import FaultKind, Trace
 from grader.judging.code import Code, code_of
 from grader.judging.findings import met, not_met
 from grader.judging.silence import fault_hint, first_fault
 from grader.judging.source import read, subtree
 from grader.judging.wording import counted, fault_sentence, listed, quote
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding, Location
-from grader.model.trace import FaultKind, Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import DurationNs, seconds, within
+from grader.core.trace import Trace
 from grader.judging.findings import met, not_met
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns
 from grader.judging.values import JITTER_NS, published
 from grader.judging.wording import counted, fault_sentence, moment, number, span
-from grader.model.errors import HarnessError
-from grader.model.exercise import Finding
-from grader.model.quantities import DurationNs, seconds, within
-from grader.model.trace import Trace
 
 MarkName = Literal[
     "stream_starts", "stream_stops", "server_starts", "server_stops", "process_starts", "exited", "stop_signal"

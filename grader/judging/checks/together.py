@@ -10,15 +10,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import NS_PER_MS, seconds, within
+from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
 from grader.judging.findings import FAULT_KEY, met, not_met
 from grader.judging.lateness import steps_behind
 from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
 from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, published_numbers
 from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
-from grader.model.exercise import Finding
-from grader.model.problem import Problem, ProblemKind
-from grader.model.quantities import NS_PER_MS, seconds, within
-from grader.model.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
 
 #: An answer may belong to any input that was current so long before it.
 _CURRENT_NS = 250 * NS_PER_MS

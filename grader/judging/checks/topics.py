@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.exercise import Finding
+from grader.core.quantities import SLACK, seconds, within
+from grader.core.trace import Endpoint, Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.silence import explain_no_message, explain_no_subscription, student_endpoints
 from grader.judging.values import field, leaves, published
 from grader.judging.wording import counted, moment, number, quote
-from grader.model.exercise import Finding
-from grader.model.quantities import SLACK, seconds, within
-from grader.model.trace import Endpoint, Message, Trace
 
 
 @dataclass(frozen=True, slots=True)

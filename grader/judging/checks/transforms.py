@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.core.exercise import Finding
+from grader.core.quantities import Hertz, seconds, within
+from grader.core.trace import Message, Trace
 from grader.judging.findings import met, not_met
 from grader.judging.paths import number_at, text_at
 from grader.judging.silence import explain_no_message, fault_hint, first_fault
 from grader.judging.values import published
 from grader.judging.wording import counted, fault_sentence, listed, moment, number, numbers, quote
-from grader.model.exercise import Finding
-from grader.model.quantities import Hertz, seconds, within
-from grader.model.trace import Message, Trace
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("x", "y", "z", "w")

@@ -7,11 +7,10 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from grader.core.exercise import Check, Criterion, Location, ProblemKind
+from grader.core.report import Verdict
+from grader.core.trace import Fault, FaultKind, Trace
 from grader.judging.source import Source, first_line
-from grader.model.exercise import Check, Criterion, Location
-from grader.model.problem import ProblemKind
-from grader.model.report import Verdict
-from grader.model.trace import Fault, FaultKind, Trace
 
 _FRAME = re.compile(r"(?P<file>.*):(?P<line>\d+) in (?P<name>\S+)$")
 

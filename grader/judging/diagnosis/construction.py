@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 
+from grader.core.trace import Fault
 from grader.judging.diagnosis.case import Case, Cause, Clue, frames, lines_of
 from grader.judging.diagnosis.names import NODE_PROPERTIES, closest
 from grader.judging.diagnosis.wiring import Made, made
 from grader.judging.source import Source, chain, covers, first_line, last_name
-from grader.model.trace import Fault
 
 
 def _missing_qos(case: Case) -> Clue | None:

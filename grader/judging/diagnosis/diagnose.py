@@ -6,6 +6,10 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
+from grader.core.report import Verdict
+from grader.core.submission import Submission
+from grader.core.trace import Fault, Trace
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.rate import TopicRate
 from grader.judging.checks.sensor import RandomInRange
@@ -32,11 +36,6 @@ from grader.judging.diagnosis.syntax import SYNTAX
 from grader.judging.diagnosis.waiting import WAITING
 from grader.judging.findings import FAULT_KEY
 from grader.judging.source import Source, read
-from grader.model.exercise import Check, Criterion, Exercise, Outcome
-from grader.model.problem import ProblemKind
-from grader.model.report import Verdict
-from grader.model.submission import Submission
-from grader.model.trace import Fault, Trace
 
 #: Every cause there is; the first that applies is named.
 CAUSES: tuple[Cause, ...] = (

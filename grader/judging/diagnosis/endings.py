@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ast
 
+from grader.core.trace import Fault, FaultKind
 from grader.judging.diagnosis.case import Case, Cause, Clue, frames
 from grader.judging.diagnosis.wiring import made, reached
 from grader.judging.source import Loop, Source, chain, covers, first_line, last_name
-from grader.model.trace import Fault, FaultKind
 
 SPINS = ("spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete")
 _EXITS = ("exit", "quit", "_exit")

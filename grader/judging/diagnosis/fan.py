@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from grader.core.exercise import ProblemKind
+from grader.core.quantities import within
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
@@ -16,8 +18,6 @@ from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for,
 from grader.judging.source import Source, chain, last_name, subtree
 from grader.judging.values import published, published_numbers
 from grader.judging.wording import number
-from grader.model.problem import ProblemKind
-from grader.model.quantities import within
 
 _EXACT = 1e-6
 _ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)

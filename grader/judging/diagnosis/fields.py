@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from grader.core.trace import Message
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import Constant, constant
@@ -14,7 +15,6 @@ from grader.judging.diagnosis.wiring import made_for
 from grader.judging.source import Source, chain, first_line, last_name
 from grader.judging.values import field, leaves, published
 from grader.judging.wording import moment, number
-from grader.model.trace import Message
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 
+from grader.core.exercise import Outcome
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.checks.sensor import LogsReceived
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.output import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
-from grader.model.exercise import Outcome
 
 _HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
 _OPENS = ("open", "io.open", "codecs.open")

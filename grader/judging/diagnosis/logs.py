@@ -6,6 +6,8 @@ import ast
 import re
 from collections import Counter
 
+from grader.core.exercise import Location, Outcome, ProblemKind
+from grader.core.quantities import seconds
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
 from grader.judging.checks.sensor import LogsReceived
@@ -16,9 +18,6 @@ from grader.judging.diagnosis.wiring import Made, is_flag, is_log, made, made_fo
 from grader.judging.output import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
-from grader.model.exercise import Location, Outcome
-from grader.model.problem import ProblemKind
-from grader.model.quantities import seconds
 
 _COMMENTED_LOG = re.compile(r"^\s*#.*get_logger\(\)\.(info|warn|warning|error)\s*\(")
 

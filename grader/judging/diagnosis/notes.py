@@ -5,9 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 
+from grader.core.submission import Submission, main_not_called
 from grader.judging.source import Source, first_line, last_name, read, text_of
-from grader.model.notes import main_not_called
-from grader.model.submission import Submission
 
 
 def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:

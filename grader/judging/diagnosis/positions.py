@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 
+from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.logs import position_log
 from grader.judging.diagnosis.wiring import is_flag, made, reached, roots
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
-from grader.model.exercise import Outcome
 
 _POSITION = "msg.pose.pose.position"
 #: What the check found, and the parts of the message that may have been read instead of the position.

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from grader.core.exercise import ProblemKind
 from grader.judging.checks.rate import TopicRate
 from grader.judging.diagnosis.case import Case, Cause, Clue, lines_of
 from grader.judging.diagnosis.constants import Constant, constant
@@ -25,7 +26,6 @@ from grader.judging.diagnosis.wiring import (
 )
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
-from grader.model.problem import ProblemKind
 
 #: How far the rate that the text gives may lie from the measured one.
 _SAME = 0.03

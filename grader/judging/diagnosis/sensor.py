@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 
+from grader.core.exercise import ProblemKind
 from grader.judging.checks.sensor import RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.diagnosis.case import Case, Cause, Clue
@@ -13,7 +14,6 @@ from grader.judging.diagnosis.wiring import made, made_for, reached, roots
 from grader.judging.source import Source, chain, last_name
 from grader.judging.values import published_numbers
 from grader.judging.wording import number
-from grader.model.problem import ProblemKind
 
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
 _DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")

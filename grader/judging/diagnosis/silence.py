@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 
+from grader.core.exercise import Location, Outcome
+from grader.core.quantities import seconds
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
@@ -22,8 +24,6 @@ from grader.judging.silence import student_endpoints
 from grader.judging.source import Function, Source, argument, chain, covers, last_name
 from grader.judging.values import carries_number, published
 from grader.judging.wording import quote
-from grader.model.exercise import Location, Outcome
-from grader.model.quantities import seconds
 
 _COMMENTED_TIMER = re.compile(r"^\s*#.*\bcreate_timer\s*\(")
 #: A sleep longer than this before the node spins looks like the reason for its silence.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from grader.core.trace import Fault, FaultKind
 from grader.judging.diagnosis.case import Case, Cause, Clue
 from grader.judging.wording import quote
-from grader.model.trace import Fault, FaultKind
 
 _PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
 _OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from grader.core.chart import Look, Moment, Point, Series, Tone
+from grader.core.quantities import seconds
+from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.positions.numbers import clean
 from grader.judging.wording import quote
-from grader.model.figure import Look, Moment, Point, Series, Tone
-from grader.model.quantities import seconds
-from grader.model.trace import LogRecord, OutputLine, Trace
 
 #: Most points of a series: more than a screen has columns are not seen, and a flood must not swell a report.
 MOST_POINTS = 1200

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from grader.model.exercise import Location
-from grader.model.figure import Excerpt
-from grader.model.report import ExerciseReport
-from grader.model.submission import Submission
+from grader.core.chart import Excerpt
+from grader.core.exercise import Location
+from grader.core.report import ExerciseReport
+from grader.core.submission import Submission
 
 #: Lines shown before and after the one that is meant.
 AROUND = 3

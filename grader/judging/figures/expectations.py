@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from grader.core.exercise import Check
+from grader.core.quantities import seconds
 from grader.judging.checks.clients import ServiceCalls, WaitsForService
 from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
@@ -24,8 +26,6 @@ from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
 from grader.judging.printed import times
 from grader.judging.rules import told
 from grader.judging.wording import number, span, unit_of
-from grader.model.exercise import Check
-from grader.model.quantities import seconds
 
 
 def expectation(check: Check) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
+from grader.core.quantities import seconds, within
+from grader.core.trace import Message, Trace
 from grader.judging.checks.topics import FieldValues
 from grader.judging.figures.drawing import happenings, series
 from grader.judging.values import field, published
 from grader.judging.wording import counted, number
-from grader.model.figure import Chart, Level, Look, Panel, Point, Tone
-from grader.model.quantities import seconds, within
-from grader.model.trace import Message, Trace
 
 _TONES = (Tone.MAIN, Tone.SECOND, Tone.THIRD)
 _UNITS = {"linear": "m/s", "angular": "rad/s"}

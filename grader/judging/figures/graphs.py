@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from grader.core.chart import GraphFigure, Stage
+from grader.core.exercise import Exercise
+from grader.core.scenario import Scenario
+from grader.core.trace import GraphSnapshot, Trace
 from grader.judging.silence import on_student_topic
 from grader.judging.wording import counted
-from grader.model.exercise import Exercise
-from grader.model.figure import GraphFigure, Stage
-from grader.model.scenario import Scenario
-from grader.model.trace import GraphSnapshot, Trace
 
 
 def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:

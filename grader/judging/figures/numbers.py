@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from grader.core.chart import Band, Chart, Level, Look, Moment, Panel, Point, Series, Tone
+from grader.core.quantities import seconds
+from grader.core.trace import Trace
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.sensor import LogsReceived, RandomInRange
 from grader.judging.checks.together import AnswersTogether
@@ -11,9 +14,6 @@ from grader.judging.figures.drawing import happenings, plain_topic, series, writ
 from grader.judging.output import printed_lines, student_records
 from grader.judging.values import Reading, delivered_numbers, held, published_numbers
 from grader.judging.wording import counted, number, unit_of
-from grader.model.figure import Band, Chart, Level, Look, Moment, Panel, Point, Series, Tone
-from grader.model.quantities import seconds
-from grader.model.trace import Trace
 
 
 def range_chart(check: RandomInRange, trace: Trace) -> Chart | None:

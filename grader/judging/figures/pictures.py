@@ -7,6 +7,11 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+from grader.core.chart import Chart, Figure
+from grader.core.exercise import Criterion, Exercise
+from grader.core.report import ExerciseReport
+from grader.core.submission import Submission
+from grader.core.trace import Trace
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.odometry import LogPeriod, LogsPosition
@@ -22,11 +27,6 @@ from grader.judging.figures.numbers import range_chart, received_chart, response
 from grader.judging.figures.positions import path_chart, period_chart
 from grader.judging.figures.rates import rate_chart
 from grader.judging.figures.timeline import timeline_chart
-from grader.model.exercise import Criterion, Exercise
-from grader.model.figure import Chart, Figure
-from grader.model.report import ExerciseReport
-from grader.model.submission import Submission
-from grader.model.trace import Trace
 
 #: Check -> what draws it from a trace; a check that is not here is told in words only.
 MAKERS: Mapping[type, Callable[[Any, Trace], Chart | None]] = MappingProxyType(

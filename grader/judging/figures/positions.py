@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.trace import Trace
 from grader.judging.checks.odometry import LogPeriod, LogsPosition
 from grader.judging.figures.drawing import happenings, series
 from grader.judging.positions.analysis import Analysis, logged_positions, printed_positions
 from grader.judging.positions.track import Track, X, Y, track_of
 from grader.judging.wording import counted, moment, number, span
-from grader.model.figure import Band, Chart, Look, Panel, Point, Series, Tone
-from grader.model.quantities import NS_PER_S, seconds
-from grader.model.trace import Trace
 
 #: A logged pair further away than this many sizes of the path is told, not drawn: it would shrink the path to a dot.
 _FAR = 2.0

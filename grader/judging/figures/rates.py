@@ -6,13 +6,13 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
 
+from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
+from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.core.trace import Trace
 from grader.judging.checks.rate import TopicRate
 from grader.judging.figures.drawing import happenings, series
 from grader.judging.values import published
 from grader.judging.wording import counted, number
-from grader.model.figure import Band, Chart, Level, Look, Panel, Point, Tone
-from grader.model.quantities import NS_PER_MS, NS_PER_S, seconds
-from grader.model.trace import Trace
 
 #: The rate at a moment is that of so much time before it, or of so many periods if they are longer.
 _TRAILING_NS = NS_PER_S

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from grader.core.chart import Chart, Look, Moment, Panel, Series, Tone
+from grader.core.quantities import seconds
+from grader.core.trace import Request, Response, Trace
 from grader.judging.figures.drawing import series, written_in_lane
 from grader.judging.output import printed_lines
 from grader.judging.wording import counted, fault_sentence, quote
-from grader.model.figure import Chart, Look, Moment, Panel, Series, Tone
-from grader.model.quantities import seconds
-from grader.model.trace import Request, Response, Trace
 
 #: Lanes for services; a node's parameters and an action are several.
 MOST_SERVICES = 6

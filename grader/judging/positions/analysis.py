@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import ClockKind, LogRecord, OutputLine, Trace
 from grader.judging.output import printed_lines, student_records
 from grader.judging.positions.matching import Entry, Group, Text, blocks, grouped, matched, single_texts
 from grader.judging.positions.track import STALE_NS, Track
 from grader.judging.values import Same
-from grader.model.quantities import NS_PER_S
-from grader.model.trace import ClockKind, LogRecord, OutputLine, Trace
 
 #: Share of right texts from which on a template is taken for a position log.
 _POSITION_SHARE = 0.5

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from grader.core.quantities import NS_PER_MS
+from grader.core.trace import ClockKind, LogRecord, OutputLine
 from grader.judging.positions.labels import Layout, Pair, candidate_pairs, template_of
 from grader.judging.positions.numbers import SLACK_M, Printed, clean, printed_numbers, with_decimal_points
 from grader.judging.positions.track import Pose, Track
-from grader.model.quantities import NS_PER_MS
-from grader.model.trace import ClockKind, LogRecord, OutputLine
 
 #: Output written within this time is one block; in virtual time one instant is exact.
 _BLOCK_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 10 * NS_PER_MS}

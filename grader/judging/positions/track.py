@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from grader.core.quantities import NS_PER_MS
+from grader.core.trace import Delivery, Trace
 from grader.judging.values import JITTER_NS, delivered
 from grader.judging.values import field as number_in
-from grader.model.quantities import NS_PER_MS
-from grader.model.trace import Delivery, Trace
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop reads a queue.
 STALE_NS = 500 * NS_PER_MS

@@ -1,0 +1,86 @@
+"""Examines this machine: what `grade doctor` calls."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from grader.app.grade import Progress
+from grader.app.observe import ObserveRequest, observe
+from grader.core.checkup import NO_WALLS, Checkup, Exchange, Fact, TierReport
+from grader.core.errors import EnvironmentFault, GraderError
+from grader.core.limits import Limits
+from grader.core.quantities import NS_PER_S
+from grader.execution.byte_code import byte_code
+from grader.execution.machine import software, system
+from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
+from grader.execution.sandbox.tiers import is_for_others
+
+#: Messages of the trial node, one every tenth of a second from 0.1 s on, and how long it is observed.
+TRIAL_MESSAGES = 10
+TRIAL_NS = NS_PER_S + NS_PER_S // 20
+TRIAL_TOPIC = "/trial"
+TRIAL_NODE = f"""\
+import rclpy
+from std_msgs.msg import String
+
+rclpy.init()
+node = rclpy.create_node("trial")
+publisher = node.create_publisher(String, "{TRIAL_TOPIC}", 10)
+node.create_timer(0.1, lambda: publisher.publish(String(data="hello")))
+rclpy.spin(node)
+"""
+
+
+def examine(progress: Progress) -> Checkup:
+    """Return what this machine can do; a few seconds.
+
+    Args:
+        progress: Hears which step begins.
+    """
+    progress("looking for ROS 2")
+    ros, lack = _ros()
+    facts = (*software(ros), *lack, *system())
+    if ros is None:
+        return Checkup(facts, None, (), "", "", Limits())
+    progress("looking at the byte code")
+    facts += (byte_code(ros.runtime), sandbox_memory(ros))
+    progress("trying every sandbox")
+    tiers = inspect_tiers(ros)
+    used = next((tier.name for tier in tiers if tier.usable), "")
+    progress("exchanging messages")
+    exchange = _exchange(used or NO_WALLS, progress)
+    return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
+
+
+def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
+    """Return ROS, or what is wrong with it."""
+    try:
+        return find_ros(), ()
+    except EnvironmentFault as fault:
+        return None, (Fact("ROS 2", fault.message.removeprefix("ROS 2: "), fits=False, remedy=fault.hint),)
+
+
+def _remedy(tiers: Sequence[TierReport]) -> str:
+    """Return what would help; to become another user comes last, for that asks for the most."""
+    ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
+    return next((tier.remedy for tier in ordered if tier.remedy), "")
+
+
+def _exchange(tier: str, progress: Progress) -> Exchange:
+    """Observe a node of our own as a student's would be, and count what arrives."""
+    started = time.perf_counter()
+    arrived, problem = 0, ""
+    with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:
+        file = Path(folder) / "trial.py"
+        file.write_text(TRIAL_NODE, encoding="utf-8")
+        try:
+            summary = observe(ObserveRequest((file,), TRIAL_NS, isolation=tier), progress)
+            arrived = sum(topic.messages for topic in summary.topics if topic.name == TRIAL_TOPIC)
+            problem = "; ".join(fault.text for fault in summary.faults)
+        except GraderError as error:
+            problem = error.message
+    return Exchange(tier, TRIAL_MESSAGES, arrived, time.perf_counter() - started, problem)

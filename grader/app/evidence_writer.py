@@ -1,0 +1,77 @@
+"""Keeps what was recorded as evidence, beside the report that was made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from grader.app.request import Request
+from grader.core.exercise import Drawn, Exercise
+from grader.core.report import Report
+from grader.core.submission import Run
+from grader.execution.evidence.store import check_place, keep
+from grader.reporting.json_report import dumps
+from grader.rubrics.variants import Recorded
+
+
+class Keeper:
+    """Hears of a run while it is graded, and writes it down when its report has been delivered.
+
+    Args:
+        folders: Where to; checked at once, because grading takes long.
+        request: How grading was asked for.
+
+    Raises:
+        EvidenceError: Evidence cannot be kept in one of the folders.
+    """
+
+    def __init__(self, folders: Sequence[Path], request: Request) -> None:
+        for folder in folders:
+            check_place(folder)
+        self._folders = folders
+        self._request = request
+        self._heard: tuple[Run, Sequence[Exercise]] | None = None
+
+    def hear(self, run: Run, exercises: Sequence[Exercise]) -> None:
+        """Remember a whole run, and what was asked of it."""
+        self._heard = (run, exercises)
+
+    def write(self, report: Report) -> None:
+        """Write the run and its report; raises EvidenceError if that cannot be done."""
+        if self._heard is None or not self._folders:
+            return
+        run, exercises = self._heard
+        for folder in self._folders:
+            asked = request_to_json(self._request, exercises)
+            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
+
+
+def request_to_json(request: Request, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
+    """Return what a command to reproduce the report needs besides path, seed and rubrics, and what variants came to."""
+    return {
+        "exercises": list(request.exercises),
+        "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
+        "clock": request.clock,
+        "isolation": request.isolation,
+        "student": request.student,
+        "variant_key": None if request.variant_key is None else str(request.variant_key),
+        "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
+    }
+
+
+def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> Request:
+    """Return the request that would record a kept run again, to be judged by these rubrics."""
+    bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
+    return Request(
+        submission=submission,
+        exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
+        rubrics=rubrics,
+        seed=seed,
+        odom_bag=Path(str(bag)) if bag is not None else None,
+        clock=str(data.get("clock", "auto")),
+        isolation=str(data.get("isolation", "auto")),
+        student=student,
+        variant_key=None if key is None else Path(str(key)),
+        draw=Recorded(Drawn(student, data.get("variants", {}))),
+    )

@@ -1,0 +1,22 @@
+"""Exit codes of the command line, and what they say about a report."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from grader.core.report import Report
+
+ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def exit_code(report: Report, min_score: Fraction | None) -> int:
+    """Return what the exit code says about a report.
+
+    Args:
+        report: The result, as far as whoever sees the exit code may see it.
+        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
+    """
+    if not report.final:
+        return UNDECIDED
+    reached = report.all_met if min_score is None else report.score * 100 >= report.max_score * min_score
+    return ALL_MET if reached else NOT_ALL_MET

@@ -1,0 +1,231 @@
+"""Finds what `grade explain` is asked about: criteria and checks by name, with what their rubrics and manuals say."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from grader.app.grade import read_exercises
+from grader.app.request import Request
+from grader.core.errors import GraderError
+from grader.core.exercise import Criterion, Exercise
+from grader.core.explanation import CheckExplanation, CriterionExplanation, Parameter
+from grader.core.quantities import Unit, duration
+from grader.core.scenario import (
+    ActionGoal,
+    AnyOrder,
+    Count,
+    CountBetween,
+    MessageStream,
+    NumberStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    SomeOf,
+    Stimulus,
+    Time,
+    TimeBetween,
+    cases,
+)
+from grader.judging.asking import check_name
+from grader.judging.checks import CHECKS
+from grader.rubrics.loader import own_checks
+from grader.rubrics.manuals import Manual, manual_of
+from grader.rubrics.units import format_quantity
+from grader.rubrics.variants import First
+
+#: Names offered where none is known.
+OFFERED = 3
+
+
+def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what a name stands for: a criterion id, `exercise/criterion`, or the name of a check.
+
+    Args:
+        name: As typed.
+        rubrics: Where criteria are looked for; empty for the built-in rubrics.
+
+    Raises:
+        GraderError: Nothing has that name.
+        RubricError: A rubric cannot be used.
+    """
+    pairs = _pairs(rubrics)
+    found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
+    if found:
+        return list(found)
+    checks = {**CHECKS, **{check_name(c): type(c.check) for _, c in pairs}}
+    if name in checks:
+        return [_check(name, checks[name], [f"{e.id}/{c.id}" for e, c in pairs if check_name(c) == name])]
+    raise _unknown(name, [*(c.id for _, c in pairs), *checks])
+
+
+def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what every criterion of some rubrics asks; of the built-in ones if none is named.
+
+    Raises:
+        RubricError: A rubric cannot be used.
+    """
+    return [_criterion(e, c) for e, c in _pairs(rubrics)]
+
+
+def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+    """Return what every check asks, those of the rubrics' own included, and which criteria of the rubrics use it.
+
+    Raises:
+        RubricError: A rubric cannot be used.
+    """
+    pairs = _pairs(rubrics)
+    used: dict[str, list[str]] = {}
+    for e, c in pairs:
+        used.setdefault(check_name(c), []).append(f"{e.id}/{c.id}")
+    own = {name: kind for path in rubrics for name, kind in own_checks(path).items()}
+    return [_check(name, kind, used.get(name, [])) for name, kind in {**CHECKS, **own}.items()]
+
+
+def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
+    exercises = read_exercises(Request("", every=True, rubrics=rubrics, draw=First()))
+    return [(e, c) for e in exercises for c in e.criteria]
+
+
+def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
+    scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    name = check_name(criterion)
+    manual = manual_of(type(criterion.check))
+    return CriterionExplanation(
+        id=criterion.id,
+        title=criterion.title,
+        exercise=f"{exercise.number}, {exercise.title} ({exercise.id})",
+        points=criterion.points,
+        chapter=criterion.chapter,
+        needs=criterion.needs,
+        hint=criterion.hint,
+        situation=_situation(scenario),
+        check=name,
+        asks=manual.summary,
+        details=manual.details,
+        parameters=tuple(_parameter(f, type(criterion.check), manual, criterion.check) for f in _fields(criterion)),
+    )
+
+
+def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
+    manual = manual_of(kind)
+    parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
+    return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
+
+
+def _fields(criterion: Criterion) -> tuple[Field[Any], ...]:
+    return fields(criterion.check)  # type: ignore[arg-type]  # checks are dataclasses
+
+
+def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | None) -> Parameter:
+    """Return a parameter with its value in a check, or with its default if there is none."""
+    annotation = get_type_hints(kind, include_extras=True)[field.name]
+    value = field.default if check is None else getattr(check, field.name)
+    text = "" if value is MISSING else _written(value, annotation)
+    return Parameter(field.name, text, manual.parameters.get(field.name, ""), value is MISSING)
+
+
+def _written(value: Any, annotation: Any) -> str:
+    """Return a value as a rubric writes it."""
+    unit = _unit(annotation)
+    if value is None:
+        return "none"
+    if unit is not None:
+        return format_quantity(value, unit)
+    if isinstance(value, (Mapping, tuple)):
+        return _several(value)
+    if is_dataclass(value):
+        return _parts(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _several(values: Mapping[str, Any] | tuple[Any, ...]) -> str:
+    if isinstance(values, tuple):
+        return ", ".join(_written(inner, None) for inner in values) or "none"
+    return ", ".join(f"{key}: {_written(inner, None)}" for key, inner in values.items()) or "none"
+
+
+def _parts(value: Any) -> str:
+    """Return those parts of a parameter that a rubric gives, as it writes them."""
+    hints = get_type_hints(type(value), include_extras=True)
+    given = [f for f in fields(value) if getattr(value, f.name) not in (f.default, (), {}, None)]
+    parts = (f"{f.name}: {_written(getattr(value, f.name), hints[f.name])}" for f in given)
+    return f"{{{', '.join(parts)}}}"
+
+
+def _unit(annotation: Any) -> Unit | None:
+    """Return the unit of an annotation, also where `None` may stand instead of a quantity."""
+    for part in (annotation, *get_args(annotation)):
+        for mark in getattr(part, "__metadata__", ()):
+            if isinstance(mark, Unit):
+                return mark
+    return None
+
+
+def _situation(scenario: Scenario) -> str:
+    """Return in a sentence what runs, for how long, and what the grader publishes meanwhile."""
+    span = scenario.span
+    text = f"{' and '.join(scenario.processes)} observed for {_time(span.duration_ns)}"
+    if span.after_first_message_on:
+        text += f" from the first message on {span.after_first_message_on} on"
+        text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
+    return "; ".join([text, *map(_stimulus, scenario.stimuli)])
+
+
+def _stimulus(stimulus: Stimulus) -> str:
+    if isinstance(stimulus, NumberStream):
+        pace = f"one every {duration(stimulus.period_ns)}, each value for {_time(stimulus.hold_ns)}"
+        return f"the grader publishes {_cases(stimulus.values, 'values')} on {stimulus.topic}, {pace}"
+    if isinstance(stimulus, MessageStream):
+        pace = f"one every {duration(stimulus.period_ns)} from {_time(stimulus.start_ns)} on"
+        times = "" if stimulus.repeats == 1 else f", each {_count(stimulus.repeats)} times"
+        return f"the grader publishes {_cases(stimulus.values, 'messages')}{times} on {stimulus.topic}, {pace}"
+    if isinstance(stimulus, ServiceServer):
+        answers = f" with {_cases(stimulus.responses, 'responses')}" if _is_open(stimulus.responses) else ""
+        return f"the grader offers the service {stimulus.service}{answers} from {_time(stimulus.start_ns)} on"
+    if isinstance(stimulus, ServiceCalls):
+        who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
+        times = "once" if stimulus.calls == 1 else f"{_count(stimulus.calls)} times"
+        pace = f"{times} from {_time(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"
+        return f"{who} of the grader's calling {stimulus.service} {pace}"
+    if isinstance(stimulus, ActionGoal):
+        then = f", and cancels it {duration(stimulus.cancel_after_ns)} later" if stimulus.cancel_after_ns else ""
+        return f"a client of the grader's sends {stimulus.action} a goal at {_time(stimulus.start_ns)}{then}"
+    played = f"from {_time(stimulus.start_ns)} on for {_time(stimulus.duration_ns)}"
+    return f"the grader plays recorded odometry on {stimulus.topic}, {played}"
+
+
+def _time(time: Time) -> str:
+    """Return a time in words; of a drawn one, both ends."""
+    if not isinstance(time, TimeBetween):
+        return duration(time)
+    return f"{duration(time.low_ns)} to {duration(time.high_ns)} (drawn)"
+
+
+def _count(count: Count) -> str:
+    return f"{count.low} to {count.high} (drawn)" if isinstance(count, CountBetween) else str(count)
+
+
+def _cases(items: tuple[Any, ...], what: str) -> str:
+    """Return how many cases there are, and whether their order is drawn."""
+    low, high = cases(items)
+    order = " in a drawn order" if _is_open(items) else ""
+    return f"{low if low == high else f'{low} to {high}'} {what}{order}"
+
+
+def _is_open(items: tuple[Any, ...]) -> bool:
+    return any(isinstance(item, (AnyOrder, SomeOf)) for item in items)
+
+
+def _unknown(name: str, names: Sequence[str]) -> GraderError:
+    known = list(dict.fromkeys(names))
+    near = difflib.get_close_matches(name, known, n=OFFERED, cutoff=0.4)
+    parts = [k for k in known if name.casefold() in k and k not in near] if len(name) > 2 else []
+    offered = [*near, *parts][:OFFERED]
+    hint = f"the nearest are {', '.join(offered)}" if offered else f"there are {', '.join(known)}"
+    return GraderError(f"explain {name}: expected the id of a criterion or the name of a check, found neither", hint)

@@ -1,0 +1,257 @@
+"""Grades one submission from end to end: the visible list of stages."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+import grader
+from grader.app.reproducing import reproduction
+from grader.app.request import Request
+from grader.app.seeds import PRACTICE_NOTE
+from grader.app.spot_checks import SpotChecks, check
+from grader.core.errors import SubmissionError
+from grader.core.exercise import Exercise, exercise_name
+from grader.core.report import Environment, Report
+from grader.core.scenario import OdometryStream
+from grader.core.submission import Run, Submission
+from grader.core.trace import Trace
+from grader.execution.bag import Odometry, read_odometry
+from grader.execution.plan import plan_scenario
+from grader.execution.recording_session import AUTO, NO_ISOLATION, Studio, open_studio, planned_clock
+from grader.execution.supervisor import Job
+from grader.execution.worker import RealTimeBudget
+from grader.judging.whole import judge_run
+from grader.rubrics.builtin import builtin_headers, builtin_odometry, require_exercises
+from grader.rubrics.loader import read_rubric
+from grader.submissions.collected import listed, shown
+from grader.submissions.sources import read_reaches, read_sources
+from grader.submissions.submission import stage_collected, stage_submission
+
+#: Exercise id and scenario id.
+Key = tuple[str, str]
+
+
+class EarlyReports:
+    """Makes a partial report each time an exercise has been recorded and others have not.
+
+    Args:
+        exercises: What is graded, in the order of the report.
+        scenarios: What is recorded; an exercise of which nothing is recorded is judged as soon as any other is.
+        run: All that is known before recording.
+        hear: Hears each partial report.
+    """
+
+    def __init__(
+        self,
+        exercises: Sequence[Exercise],
+        scenarios: Collection[Key],
+        run: Run,
+        hear: Callable[[Report], None],
+    ) -> None:
+        self._exercises = exercises
+        self._awaited = set(scenarios)
+        self._run = run
+        self._hear = hear
+        self._traces: dict[Key, Trace] = {}
+        self._started = time.perf_counter()
+
+    def take(self, key: Key, trace: Trace) -> None:
+        """Take a recording; if it was the last of its exercise, but not of all, make a partial report."""
+        self._traces[key] = trace
+        self._awaited.discard(key)
+        pending = {exercise for exercise, _ in self._awaited}
+        if pending and key[0] not in pending:
+            duration_s = self._run.duration_s + time.perf_counter() - self._started
+            run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
+            self._hear(judge_run(self._exercises, run, pictures=False, pending=pending))
+
+
+#: ROS releases that the test suite passes on.
+TRIED_ON = ("jazzy", "kilted")
+
+
+class Progress(Protocol):
+    """Hears what is being done, in a short phrase such as `exercise 1: alone`."""
+
+    def __call__(self, step: str) -> None:
+        """Take note of the step that begins."""
+        ...
+
+
+def grade(
+    request: Request,
+    progress: Progress,
+    hear: Callable[[Run, Sequence[Exercise]], None] | None = None,
+    early: Callable[[Report], None] | None = None,
+    *,
+    pictures: bool = True,
+) -> Report:
+    """Grade one submission.
+
+    Args:
+        request: What is to be graded, and how.
+        progress: Hears which step begins.
+        hear: Hears what was recorded, and for which exercises.
+        early: Hears a partial report whenever an exercise is done and others are not.
+        pictures: Whether the report is to hold figures, which only some formats show.
+
+    Raises:
+        GraderError: Something that grading needs cannot be used; its class says who must act.
+    """
+    started = time.perf_counter()
+    with open_studio(request.isolation, request.workers, progress) as studio:
+        progress("reading the submission")
+        exercises = read_exercises(request)
+        root = studio.folder / "submission"
+        root.mkdir()
+        submission = _staged(request, exercises, root)
+        if request.every:
+            exercises, submission = _begun(exercises, submission)
+        odometry = read_recording(request, exercises)
+        seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
+        jobs = plan_jobs(request, exercises, submission, odometry, seed)
+        run = Run(
+            submission=submission,
+            traces={},
+            sources=read_sources(submission),
+            environment=_environment(studio),
+            seed=seed,
+            duration_s=time.perf_counter() - started,
+            notes=(
+                *submission.notes,
+                *_seed_notes(request),
+                *_release_notes(studio.ros.distro),
+                *_isolation_notes(studio),
+            ),
+            reproduce=reproduction(request, exercises, odometry, seed),
+        )
+        take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
+        checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
+        later = request.clock == AUTO and checks.certain
+        first = None if later else take
+        traces = studio.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
+        if request.clock == AUTO:
+            # what the grader itself wants to see twice takes nothing of a submission's time
+            record = partial(_record_one, studio, progress, RealTimeBudget(request.time_budget_s))
+            traces = check(checks, jobs, traces, record, take or _nobody_hears)
+        run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
+        if hear is not None:
+            hear(run, exercises)
+        return judge_run(exercises, run, pictures=pictures)
+
+
+def _record_one(studio: Studio, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
+    return studio.recorder.record([replace(job, budget=budget)], progress)[0]
+
+
+def _nobody_hears(key: tuple[str, str], trace: Trace) -> None:
+    """Stand for whoever would hear of a trace early."""
+
+
+def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[Exercise]:
+    """Return the exercises to grade, in rubric order.
+
+    Args:
+        request: What is to be graded.
+        submissions: What else students write, besides the submission; no check of a rubric's own is taken from there.
+
+    Raises:
+        RubricError: A rubric cannot be used, or none has an exercise that was asked for.
+    """
+    theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
+    paths = request.rubrics or _builtin(request)
+    exercises = [read_rubric(path, submissions=theirs, draw=request.draw) for path in paths]
+    require_exercises(request.exercises, [exercise.id for exercise in exercises])
+    return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
+
+
+def _builtin(request: Request) -> list[Path]:
+    """Return the files of the built-in rubrics that are asked for; the others need not be read."""
+    headers = builtin_headers()
+    require_exercises(request.exercises, [header.id for header in headers])
+    wanted = request.exercises or [h.id for h in headers if request.every or not h.by_request]
+    return [header.path for header in headers if header.id in wanted]
+
+
+def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:
+    """Return the /odom recording, if one was named or an exercise plays one."""
+    if request.odom_bag is not None:
+        return read_odometry(request.odom_bag)
+    stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
+    return read_odometry(builtin_odometry()) if any(isinstance(s, OdometryStream) for s in stimuli) else None
+
+
+def plan_jobs(
+    request: Request, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
+) -> dict[tuple[str, str], Job]:
+    """Return what has to be recorded, by exercise and scenario; a scenario with a missing file is left out."""
+    clock = planned_clock(request.clock)
+    return {
+        (exercise.id, scenario.id): Job(
+            f"{exercise_name(exercise.number).lower()}: {scenario.id.replace('_', ' ')}",
+            plan_scenario(exercise.id, scenario, submission, seed=seed, odometry=odometry, clock=clock),
+        )
+        for exercise in exercises
+        for scenario in exercise.scenarios
+        if all(submission.files[name].found for name in scenario.processes)
+    }
+
+
+def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
+    """Return the exercises of which a submission has a file, and the submission as they see it."""
+    begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
+    if not begun:
+        where = shown(submission.path, 500)
+        files = listed(wanted_files(exercises))
+        raise SubmissionError(f"{where}: expected a file of some exercise, found none", f"the files are {files}")
+    return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})
+
+
+def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
+    """Return the names of the files that exercises ask for."""
+    return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+
+
+def _staged(request: Request, exercises: Sequence[Exercise], root: Path) -> Submission:
+    wanted = wanted_files(exercises)
+    if request.collected is not None:
+        return stage_collected(request.collected, request.submission, wanted, root)
+    return stage_submission(request.submission, wanted, root)
+
+
+def _seed_notes(request: Request) -> tuple[str, ...]:
+    """Say that the drawn values could be known beforehand, if so."""
+    return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
+
+
+def _release_notes(distro: str) -> tuple[str, ...]:
+    """Say that nobody has tried this ROS release with the grader, if so."""
+    if distro in TRIED_ON:
+        return ()
+    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED_ON)}",)
+
+
+def _isolation_notes(studio: Studio) -> tuple[str, ...]:
+    """Say that the submission ran without walls, or what its sandbox does not hold back."""
+    if studio.isolation.name == NO_ISOLATION:
+        return ("the submission ran without a sandbox: as asked",)
+    open_ones = [str(found) for found in studio.containment if not found.holds]
+    return (f"sandbox {studio.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
+
+
+def _environment(studio: Studio) -> Environment:
+    return Environment(
+        grader=grader.__version__,
+        ros_distro=studio.ros.distro,
+        rclpy=studio.ros.rclpy_version,
+        rmw="rmw_fastrtps_cpp",
+        python=platform.python_version(),
+        isolation=studio.isolation.name,
+        containment=studio.containment,
+    )

@@ -1,0 +1,128 @@
+"""Runs nodes without a rubric, and says what they do: what `grade observe` calls."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.app.grade import Progress
+from grader.app.seeds import PRACTICE
+from grader.core.errors import HarnessError, SubmissionError
+from grader.core.quantities import NS_PER_S
+from grader.core.scenario import OdometryStream, Scenario, Span
+from grader.core.submission import Submission
+from grader.core.summary import Summary
+from grader.core.trace import Trace
+from grader.execution.bag import read_odometry
+from grader.execution.plan import plan_scenario
+from grader.execution.recording_session import open_studio, planned_clock
+from grader.execution.supervisor import Job
+from grader.judging.summary import summarise
+from grader.rubrics.builtin import builtin_odometry
+from grader.submissions.submission import stage_submission
+
+#: When a recording that was named begins to play; so long the nodes see no odometry.
+ODOMETRY_AFTER_NS = NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class ObserveRequest:
+    """What is to be observed, and how.
+
+    Attributes:
+        files: Python files, each of which runs as a process of its own.
+        duration_ns: How long they are observed.
+        odom_bag: An /odom recording to play to them, if any.
+        clock: `virtual`, `wall` or `auto`.
+        isolation: `auto` or `none`.
+    """
+
+    files: tuple[Path, ...]
+    duration_ns: int = 10 * NS_PER_S
+    odom_bag: Path | None = None
+    clock: str = "auto"
+    isolation: str = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What nodes did.
+
+    Attributes:
+        trace: All of it.
+        processes: Names of their files.
+        isolation: The sandbox tier.
+    """
+
+    trace: Trace
+    processes: tuple[str, ...]
+    isolation: str
+
+
+def observe(request: ObserveRequest, progress: Progress) -> Summary:
+    """Run the files together and return what they did.
+
+    Raises:
+        GraderError: Something that the run needs cannot be used.
+    """
+    watched = watch(request, progress)
+    return summarise(watched.trace, watched.processes, watched.isolation)
+
+
+def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
+    """Run the files together and return the trace.
+
+    Args:
+        request: What is to be run, and how.
+        progress: Hears which step begins.
+        scenario: What happens to them; None for nothing but the recording that is named, for the time that is.
+
+    Raises:
+        GraderError: Something that the run needs cannot be used.
+    """
+    names = _names(request.files)
+    if scenario is None:
+        scenario = _undisturbed(request, names)
+    plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
+    odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
+    with open_studio(request.isolation, progress=progress) as studio:
+        submission = _stage(request.files, names, studio.folder)
+        seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
+        plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
+        trace = studio.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+    if trace.harness_problem:
+        raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
+    return Watched(trace, tuple(names), studio.isolation.name)
+
+
+def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:
+    stream = OdometryStream("/odom", ODOMETRY_AFTER_NS, max(NS_PER_S, request.duration_ns - ODOMETRY_AFTER_NS))
+    return Scenario("observed", tuple(names), Span(request.duration_ns), (stream,) if request.odom_bag else ())
+
+
+def _names(files: tuple[Path, ...]) -> list[str]:
+    """Return the files' names, which must differ; raises SubmissionError for anything but .py files."""
+    for file in files:
+        if not file.is_file() or file.suffix != ".py":
+            raise SubmissionError(f"{file}: expected a .py file, found none", "name the files of the nodes to run")
+    names = [file.name for file in files]
+    for name in names:
+        if names.count(name) > 1:
+            raise SubmissionError(f"{name}: expected different file names, found it twice", "rename one of them")
+    return names
+
+
+def _stage(files: tuple[Path, ...], names: list[str], into: Path) -> Submission:
+    """Stage the folder that holds all files, so that their helper modules are there; a lone file may come alone."""
+    root = into / "submission"
+    root.mkdir()
+    folder = os.path.commonpath([file.resolve().parent for file in files])
+    try:
+        return stage_submission(folder, names, root)
+    except SubmissionError:
+        if len(files) > 1:
+            raise
+    alone = into / "alone"
+    alone.mkdir()
+    return stage_submission(str(files[0]), names, alone)

@@ -1,0 +1,240 @@
+"""Judges kept evidence again, without running anything: one submission as grading does, or a whole class at once."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from grader.app.evidence_writer import request_of
+from grader.app.exit_codes import UNUSABLE, exit_code
+from grader.app.grade import read_exercises
+from grader.app.reproducing import command_words
+from grader.app.request import Request
+from grader.core.errors import EvidenceError, GraderError
+from grader.core.exercise import Exercise
+from grader.core.report import Report
+from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
+from grader.judging.whole import judge_run
+from grader.reporting.audience import ANYBODY, Readers, told
+from grader.reporting.delivery import Output, write_whole
+from grader.reporting.formats import FORMATS, Layout, rendered
+from grader.reporting.json_report import dumps, report_to_json
+from grader.reporting.rejudged import Change, Result, change
+from grader.rubrics.variants import First
+
+#: Fewer submissions than this are judged in this process.
+WORTH_A_POOL = 16
+#: Thresholds of Python's collector while many recordings are read.
+COLLECTING = (200_000, 20, 20)
+_WIDTH = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """How evidence is to be judged.
+
+    Attributes:
+        exercises: What is asked: all that the rubrics have.
+        chosen: Exercise ids that were named; empty for those that were graded.
+        rubrics: Rubric files that were named; empty for the built-in ones.
+        pictures: Whether reports are to hold figures.
+        verify: Whether recordings are compared with what is judged.
+    """
+
+    exercises: tuple[Exercise, ...]
+    chosen: tuple[str, ...] = ()
+    rubrics: tuple[Path, ...] = ()
+    pictures: bool = False
+    verify: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is to be made of every report of a class.
+
+    Attributes:
+        files: Formats, each with the folder that its files go to.
+        reports: Whether results hold the report as JSON.
+        changes: Whether results hold what changed.
+        min_score: See `exit_code`.
+        readers: Who reads all that, and when.
+    """
+
+    files: tuple[Output, ...] = ()
+    reports: bool = False
+    changes: bool = False
+    min_score: Fraction | None = None
+    readers: Readers = ANYBODY
+
+
+def judgement(
+    chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
+) -> Judgement:
+    """Return how to judge; raises RubricError for a rubric that cannot be used or an exercise that none has."""
+    exercises = read_exercises(Request("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
+    return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
+
+
+def rejudge(evidence: Evidence, how: Judgement) -> Report:
+    """Return the report of one submission's evidence.
+
+    Raises:
+        EvidenceError: It is damaged, or holds no exercise that is asked for.
+    """
+    kept = evidence.manifest.run
+    request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
+    exercises = _as_recorded(_asked(evidence, how), request)
+    run = run_of(evidence, exercises, verify=how.verify)
+    if how.chosen:
+        request = replace(request, exercises=how.chosen)
+    again = replace(run.reproduce, command=command_words(request, kept.seed))
+    return judge_run(exercises, replace(run, reproduce=again), pictures=how.pictures)
+
+
+def what_changed(name: str, evidence: Evidence, report: Report) -> Change | None:
+    """Return what a new report changes for a submission; None if its first report is gone."""
+    before = first_report(evidence)
+    if before is None:
+        return None
+    try:
+        return change(name, before, report_to_json(report))
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
+    """Return name and folder of all evidence in and below some paths, in order.
+
+    Raises:
+        EvidenceError: There is none in one of them.
+    """
+    named: dict[Path, str] = {}
+    used: Counter[str] = Counter()
+    for path in paths:
+        folders = [path] if is_evidence(path) else found_under(path)
+        if not folders:
+            raise EvidenceError(f"{path}: expected kept evidence, found none", "keep it with -o evidence=FOLDER")
+        for folder in folders:
+            if folder not in named:
+                name = _name(folder, path)
+                used[name] += 1
+                named[folder] = name if used[name] == 1 else f"{name} ({used[name]})"
+    return [(name, folder) for folder, name in named.items()]
+
+
+def rejudge_class(
+    named: Sequence[tuple[str, Path]], how: Judgement, wanted: Wanted, *, jobs: int | None = None
+) -> list[Result]:
+    """Return one result for each submission, in the order given; one that cannot be judged keeps no other back.
+
+    Args:
+        named: Name and folder of evidence.
+        how: How to judge.
+        wanted: What to make of the reports.
+        jobs: Processes; None for one a core.
+    """
+    workers = min(jobs or len(os.sched_getaffinity(0)), max(1, len(named) // WORTH_A_POOL))
+    if workers == 1:
+        with _little_collecting():
+            return [_result(name, folder, how, wanted) for name, folder in named]
+    with ProcessPoolExecutor(workers, initializer=_prepare, initargs=(how, wanted)) as pool:
+        return list(pool.map(_result_there, named, chunksize=max(1, min(32, len(named) // (4 * workers)))))
+
+
+#: What a process of the pool was started for.
+_task: list[tuple[Judgement, Wanted]] = []
+
+
+def _prepare(how: Judgement, wanted: Wanted) -> None:
+    _task[:] = [(how, wanted)]
+    gc.freeze()
+    gc.set_threshold(*COLLECTING)
+
+
+@contextmanager
+def _little_collecting() -> Iterator[None]:
+    """Look for cyclic garbage seldom: reading a recording makes many objects and few cycles."""
+    usual = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(*COLLECTING)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+        gc.unfreeze()
+
+
+def _result_there(named: tuple[str, Path]) -> Result:
+    return _result(*named, *_task[0])
+
+
+def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Result:
+    try:
+        evidence = open_evidence(folder)
+        report = rejudge(evidence, how)
+        _write(name, report, wanted)
+    except GraderError as error:
+        return Result(name, problem=error.message, code=UNUSABLE)
+    except OSError as error:
+        return Result(name, problem=f"its report cannot be written: {error.strerror or error}", code=UNUSABLE)
+    seen = told(report, wanted.readers)
+    return Result(
+        name,
+        score=float(seen.score),
+        max_score=float(seen.max_score),
+        code=exit_code(seen, wanted.min_score),
+        change=what_changed(name, evidence, report) if wanted.changes else None,
+        report=dumps(seen) if wanted.reports else "",
+    )
+
+
+def _write(name: str, report: Report, wanted: Wanted) -> None:
+    for output in wanted.files:
+        if output.path is not None:
+            path = output.path / f"{name}{FORMATS[output.format].suffix}"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            text = rendered(output.format, report, Layout(_WIDTH, colour=False), wanted.readers)
+            write_whole(path, text.encode())
+
+
+def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:
+    """Return the exercises that evidence holds and that are asked for."""
+    held = evidence.exercises
+    known = [e.id for e in how.exercises]
+    missing = [id_ for id_ in (how.chosen or (() if how.rubrics else held)) if id_ not in held or id_ not in known]
+    if missing and how.chosen:
+        raise EvidenceError(f"{evidence.folder}: expected the exercise {missing[0]}, found {', '.join(held)}")
+    if missing or not set(held) & set(known):
+        what = (missing or list(held))[0]
+        message = f"{evidence.folder}: expected a rubric for {what}, found one for {', '.join(known)}"
+        raise EvidenceError(message, "name the rubric it was graded by with --rubric")
+    return [exercise for exercise in how.exercises if exercise.id in held]
+
+
+def _as_recorded(exercises: list[Exercise], request: Request) -> list[Exercise]:
+    """Return the exercises with the values that were this student's own when they were graded."""
+    if all(exercise.variant is None for exercise in exercises):
+        return exercises
+    wanted = tuple(exercise.id for exercise in exercises)
+    return read_exercises(replace(request, submission="", exercises=wanted))
+
+
+def _name(folder: Path, root: Path) -> str:
+    """Return what people call a folder of evidence: its path below the root, without a last part `evidence`."""
+    parts = list(folder.relative_to(root).parts) if folder != root else [folder.resolve().name]
+    if len(parts) > 1 and parts[-1] == "evidence":
+        parts.pop()
+    return "/".join(parts)
+
+
+def codes(results: Sequence[Result]) -> Iterator[int]:
+    """Yield the exit codes of all submissions, that which matters most first."""
+    order = (UNUSABLE, 3, 1, 0)
+    yield from sorted((r.code for r in results), key=order.index)

@@ -1,0 +1,215 @@
+"""Late days, other scores and what to ignore: decisions of the instructor, from a small YAML file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+
+from grader.core.errors import ClassError
+from grader.rubrics.mistakes import mistakes_of, nearest
+from grader.rubrics.yaml_tree import Mistake, YamlSyntaxError, YamlTree, read_yaml
+
+MAX_BYTES = 1 << 20
+_AMOUNT = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%|points?)")
+_Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """Points, or a share of the points earned."""
+
+    value: Fraction
+    percent: bool
+
+    def of(self, earned: Fraction) -> Fraction:
+        """Return the points that this is of what was earned."""
+        return earned * self.value / 100 if self.percent else self.value
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What was decided for one submission.
+
+    Attributes:
+        days_late: Days; each that has begun counts.
+        score: Score instead of that of the grader, late or not; None to leave it.
+        reason: Why.
+        ignore: Why the submission does not count at all; empty if it does.
+        where: Place in the file, for messages.
+    """
+
+    days_late: Fraction = Fraction(0)
+    score: Fraction | None = None
+    reason: str = ""
+    ignore: str = ""
+    where: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Adjustments:
+    """What a file of adjustments says.
+
+    Attributes:
+        per_day: What a late day costs; None if nothing.
+        at_most: What all late days together cost at most; None for all that was earned.
+        students: Name, user name, address or number -> decision.
+    """
+
+    per_day: Amount | None = None
+    at_most: Amount | None = None
+    students: Mapping[str, Decision] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Adjusted:
+    """A score with all that was decided about it; the raw one stays beside it.
+
+    Attributes:
+        raw: Points of the grader; None if there are none, or they are not final.
+        score: What counts in the end; None for no score.
+        days_late: Late days.
+        penalty: Points taken off for them.
+        override: The score that was set instead; None if none was.
+        reason: Why, or why the submission is ignored.
+        ignored: Whether the submission does not count.
+    """
+
+    raw: Fraction | None = None
+    score: Fraction | None = None
+    days_late: Fraction = Fraction(0)
+    penalty: Fraction = Fraction(0)
+    override: Fraction | None = None
+    reason: str = ""
+    ignored: bool = False
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything was decided that changes the score."""
+        return self.ignored or self.override is not None or self.penalty > 0
+
+
+def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adjusted:
+    """Return what a score becomes; late days cost each begun day, and never more than was earned.
+
+    Args:
+        raw: Points of the grader; None if there are none.
+        decision: What was decided for this submission.
+        rules: What late days cost.
+    """
+    penalty = Fraction(0)
+    if raw is not None and rules.per_day is not None:
+        days = -(-decision.days_late.numerator // decision.days_late.denominator)
+        most = raw if rules.at_most is None else min(raw, rules.at_most.of(raw))
+        penalty = min(most, days * rules.per_day.of(raw))
+    score = decision.score if decision.score is not None else (None if raw is None else raw - penalty)
+    return Adjusted(
+        raw=raw,
+        score=None if decision.ignore else score,
+        days_late=decision.days_late,
+        penalty=penalty,
+        override=decision.score,
+        reason=decision.ignore or decision.reason,
+        ignored=bool(decision.ignore),
+    )
+
+
+class _Late(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    per_day: str
+    at_most: str | None = None
+
+
+class _Student(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    days_late: Annotated[float, Field(ge=0, le=3650, allow_inf_nan=False, strict=False)] = 0.0
+    score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
+    reason: _Reason | None = None
+    ignore: _Reason | None = None
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    late: _Late | None = None
+    students: dict[str, _Student] = {}
+
+
+def read_adjustments(path: Path) -> Adjustments:
+    """Return what a file says.
+
+    Raises:
+        ClassError: It cannot be read, or something in it has no meaning; every mistake is told with its place.
+    """
+    tree = _tree(path)
+    try:
+        read = _File.model_validate(tree.data or {})
+    except ValidationError as error:
+        raise _refusal(path, mistakes_of(error, tree, _File)) from None
+    mistakes = [*tree.mistakes, *_without_reason(read, tree)]
+    amounts = {key: _amount(key, read, tree, mistakes) for key in ("per_day", "at_most")}
+    if mistakes:
+        raise _refusal(path, mistakes)
+    students = {name: _decision(name, student, path, tree) for name, student in read.students.items()}
+    return Adjustments(amounts["per_day"], amounts["at_most"], students)
+
+
+def _tree(path: Path) -> YamlTree:
+    try:
+        data = path.read_bytes()
+        if len(data) > MAX_BYTES:
+            raise ClassError(f"{path}: expected at most {MAX_BYTES >> 20} MiB, found more")
+        return read_yaml(data.decode("utf-8-sig"))
+    except OSError as error:
+        raise ClassError(f"{path}: expected a YAML file, found none that can be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ClassError(f"{path}: expected UTF-8, found another encoding") from None
+    except YamlSyntaxError as error:
+        raise _refusal(path, [error.mistake]) from None
+
+
+def _refusal(path: Path, mistakes: list[Mistake]) -> ClassError:
+    first, *others = sorted(mistakes)
+    more = f" (and {len(others)} more)" if others else ""
+    return ClassError(f"{path}:{first.line}:{first.column}: {first.text}{more}", first.hint)
+
+
+def _without_reason(read: _File, tree: YamlTree) -> list[Mistake]:
+    """Return a mistake for each score that was set without a word."""
+    return [
+        tree.keys["students", name].mistake("expected a `reason` for the `score`, found none")
+        for name, student in read.students.items()
+        if student.score is not None and not student.reason
+    ]
+
+
+def _amount(key: str, read: _File, tree: YamlTree, mistakes: list[Mistake]) -> Amount | None:
+    text = None if read.late is None else getattr(read.late, key)
+    if text is None:
+        return None
+    match = _AMOUNT.fullmatch(text.strip())
+    if match is None:
+        mistakes.append(tree.values["late", key].mistake(f"expected `10 %` or `5 points`, found `{text[:60]}`"))
+        return None
+    return Amount(Fraction(match[1]), match[2] == "%")
+
+
+def _decision(name: str, student: _Student, path: Path, tree: YamlTree) -> Decision:
+    place = tree.keys["students", name]
+    return Decision(
+        days_late=Fraction(str(student.days_late)),
+        score=None if student.score is None else Fraction(str(student.score)),
+        reason=student.reason or "",
+        ignore=student.ignore or "",
+        where=f"{path}:{place.line}:{place.column}",
+    )
+
+
+def unknown_student(decision: Decision, name: str, known: list[str]) -> ClassError:
+    """Return what to say where a file names somebody who is not in the class."""
+    message = f"{decision.where}: expected a submission or a person of the class, found `{name[:60]}`"
+    return ClassError(message, nearest(name, known))

@@ -1,0 +1,312 @@
+"""The page of a class as plain values, without a folder of this machine in them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+from grader.classroom.cache_key import Conditions
+from grader.classroom.gradebook import Classbook, Row, Status, exactly, number, remarks
+from grader.classroom.roster import Person, fold_name
+from grader.classroom.watching import clock_time
+from grader.reporting.class_page.contents import ClassPage, Entry, Listing, PageLink, RunFacts, Student, Tone
+
+
+@dataclass(frozen=True, slots=True)
+class RunOfClass:
+    """One run of the command over a class.
+
+    Attributes:
+        conditions: What the results depend on.
+        title: What the class is called.
+        written: When the run ended, as text.
+        jobs: Submissions at a time.
+        took_s: How long grading took.
+        graded: Submissions that were graded now.
+        kept: Submissions whose results were there already.
+        stopped: Whether it was stopped before everybody was graded.
+        folders: Folders of this machine, which no page names.
+    """
+
+    conditions: Conditions
+    title: str = ""
+    written: str = ""
+    jobs: int = 1
+    took_s: float = 0.0
+    graded: int = 0
+    kept: int = 0
+    stopped: bool = False
+    folders: tuple[str, ...] = ()
+
+
+def title_of(sources: Sequence[Path]) -> str:
+    """Return what a class is called: the names of its sources, without the folders that they lie in."""
+    return ", ".join(source.resolve().name for source in sources)
+
+
+def folders_of(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Return folders as they may stand in messages, the longest first."""
+    found = {str(path) for path in paths} | {str(path.resolve()) for path in paths}
+    return tuple(sorted((folder for folder in found if folder.startswith("/")), key=lambda f: (-len(f), f)))
+
+
+_MIB = 1 << 20
+
+
+def run_facts(book: Classbook, run: RunOfClass) -> RunFacts:
+    """Return what the header of the page says.
+
+    Args:
+        book: The class.
+        run: The run that writes the page.
+    """
+    reports = [row.report for row in book.rows if row.report is not None]
+    counts = [f"{book.count(status)} {status.value}" for status in Status if book.count(status)]
+    now = "" if run.stopped else f"graded now: {run.graded}, done before: {run.kept}"
+    parts = [", ".join(counts), now, f"took {clock_time(run.took_s)}", run.written]
+    line = "; ".join(part for part in parts if part)
+    return RunFacts(line, tuple(_rows(book, run, reports)), tuple(_warnings(run, reports)))
+
+
+def _rows(book: Classbook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    conditions = run.conditions
+    seed = conditions.seed
+    yield "grader", _counted(_versions(report) for report in reports) or conditions.grader
+    yield "rubrics", ", ".join(f"{id_} {digest}" for id_, digest in conditions.rubrics)
+    if conditions.recording:
+        yield "recording", conditions.recording
+    yield "clock", _clock(conditions.clock, reports)
+    yield "isolation", f"asked for: {conditions.isolation}; {_counted(_isolation(r) for r in reports) or 'nothing ran'}"
+    yield "seed", f"{seed} for everybody" if seed is not None else "follows from the seed key and the files handed in"
+    yield "jobs", str(run.jobs)
+    yield "cost", _cost(book)
+    yield "sources", ", ".join(f"{PurePath(source).name or source} ({layout})" for source, layout in book.layouts)
+
+
+def _warnings(run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    if run.stopped:
+        yield "This run was stopped before everybody was graded; the same command goes on where it was."
+    bare = sum(_isolation(report).startswith("none") for report in reports)
+    if bare:
+        yield f"No sandbox: {bare} of {len(reports)} submissions ran without walls around them."
+
+
+def _versions(report: Mapping[str, Any]) -> str:
+    made = report.get("environment", {})
+    names = ("grader", "rclpy", "ros_distro", "rmw", "python")
+    return ", ".join(f"{name} {made[name]}" for name in names if made.get(name))
+
+
+def _isolation(report: Mapping[str, Any]) -> str:
+    return str(report.get("environment", {}).get("isolation", ""))
+
+
+def _clock(asked: str, reports: Sequence[Mapping[str, Any]]) -> str:
+    walls = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
+    return f"asked for: {asked}; on the wall clock in part or whole: {walls} of {len(reports)}"
+
+
+def _cost(book: Classbook) -> str:
+    used = [row.standing for row in book.rows if row.standing is not None]
+    processor = sum(standing.usage.get("processor_s", 0.0) for standing in used)
+    peak = max((standing.usage.get("peak_bytes", 0.0) for standing in used), default=0.0)
+    return f"{processor:.1f} s of processor time in all, at most {peak / _MIB:.0f} MiB in one process"
+
+
+def _counted(texts: Iterable[str]) -> str:
+    """Return the different texts; where there are several, with how many have each."""
+    counts = Counter(text for text in texts if text)
+    if len(counts) <= 1:
+        return next(iter(counts), "")
+    return "; ".join(f"{text} ({count})" for text, count in sorted(counts.items()))
+
+
+_TONES = {
+    Status.GRADED: Tone.FINE,
+    Status.UNDECIDED: Tone.OURS,
+    Status.FAILED: Tone.OURS,
+    Status.REFUSED: Tone.THEIRS,
+    Status.NOT_RUN: Tone.NOTHING,
+    Status.MISSING: Tone.NOTHING,
+}
+_NOT_GRADED = (Status.REFUSED, Status.FAILED, Status.NOT_RUN)
+# A path of three parts or more in the problem of a submission is one of this machine; ROS names are shorter.
+_PATH = re.compile(r"(?<![\w.])/(?:[^/\s:'\"`]+/){2,}([^/\s:'\"`]+)")
+_ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not come back"}
+
+
+def class_page(book: Classbook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
+    """Return the page of a class.
+
+    Args:
+        book: The class.
+        run: The run that writes it.
+        links: Other pages in the folder for results.
+    """
+    rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
+    students = tuple(_student(row, run) for row in rows)
+    listings = [listing for listing in _listings(book, rows, run) if listing.entries]
+    return ClassPage(run.title, run_facts(book, run), students, tuple(listings), tuple(links))
+
+
+def _student(row: Row, run: RunOfClass) -> Student:
+    adjusted = row.adjusted
+    return Student(
+        folder=row.name,
+        name=_name(row),
+        also=tuple(dict.fromkeys(text for text in _also(row) if text and text != _name(row))),
+        status=row.status.value,
+        tone=_TONES[row.status],
+        raw=None if row.report is None else exactly(row.report["score"]),
+        max_score=row.max_score,
+        final=adjusted.score,
+        adjustments=tuple(_adjustments(row)),
+        remarks=tuple(without_folders(text, run.folders) for text in remarks(row)),
+        report=row.report,
+        less=row.handed_back is not None and row.handed_back != row.report,
+        counts=not adjusted.ignored,
+    )
+
+
+def _name(row: Row) -> str:
+    """Return what to call a row; an address that only a file name told is none."""
+    person = row.person
+    unsure = person is not None and person.row is None and person.name == person.email
+    return row.label if unsure else row.shown_name
+
+
+def _also(row: Row) -> Iterator[str]:
+    yield row.name
+    if row.person is not None:
+        yield from _told_by_roster(row.person)
+
+
+def _told_by_roster(person: Person) -> tuple[str, ...]:
+    return (person.user, person.id, person.email if person.row is not None else "")
+
+
+def _adjustments(row: Row) -> Iterator[str]:
+    adjusted = row.adjusted
+    if adjusted.ignored:
+        yield f"does not count: {adjusted.reason}"
+        return
+    if adjusted.days_late:
+        days = number(adjusted.days_late)
+        cost = f"\u2212{number(adjusted.penalty)} points" if adjusted.penalty else "no points off"
+        yield f"{days} {'day' if days == '1' else 'days'} late: {cost}"
+    if adjusted.override is not None:
+        yield f"set to {number(adjusted.override)}: {adjusted.reason}"
+    elif adjusted.reason:
+        yield adjusted.reason
+
+
+def _listings(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
+    """Yield all lists, empty ones too."""
+    undecided = [(k, row) for k, row in enumerate(rows) if row.status is Status.UNDECIDED]
+    yield Listing(
+        "undecided",
+        "Undecided",
+        "Not decided through no fault of the student. The same command with --rerun undecided tries again.",
+        tuple(entry for k, row in undecided for entry in _undecided(k, row, run)),
+    )
+    yield Listing(
+        "not-graded",
+        "Not graded",
+        "There is no report. What was refused is for the student to mend; --rerun failed tries again what failed here.",
+        tuple(
+            Entry(f"{row.status.value}{_problem(row, run)}", k)
+            for k, row in enumerate(rows)
+            if row.status in _NOT_GRADED
+        ),
+    )
+    yield Listing(
+        "faults",
+        "Crashed or ended early",
+        "Programs that raised, hung, or ended before they were told to.",
+        tuple(entry for k, row in enumerate(rows) for entry in _faults(k, row)),
+    )
+    yield from _roster(book, rows, run)
+
+
+def _roster(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
+    matching = book.matching
+    place = {row.name: k for k, row in enumerate(rows) if row.name}
+
+    def named(names: Sequence[str], text: str) -> tuple[Entry, ...]:
+        return tuple(Entry(text, place.get(name)) for name in names)
+
+    twins = tuple(Entry(" = ".join(names), place.get(names[0])) for names in matching.duplicates)
+    missing = tuple(Entry("nothing handed in", k) for k, row in enumerate(rows) if row.status is Status.MISSING)
+    outdated = [row.name for row in rows if row.outdated]
+    yield Listing(
+        "unmatched",
+        "Not on the roster",
+        "Nobody on the roster, or more than one person, goes with these submissions.",
+        named(matching.unmatched, "nobody goes with it") + named(matching.ambiguous, "several people go with it"),
+    )
+    yield Listing(
+        "duplicates",
+        "Several submissions",
+        "All of them are graded; say in the file of adjustments which to ignore.",
+        twins,
+    )
+    yield Listing("missing", "Nothing handed in", "People on the roster without a submission.", missing)
+    yield Listing(
+        "outdated", "Old results", "Of other files or of another rubric than now.", named(outdated, "graded before")
+    )
+    yield Listing("strays", "No submission", "What else lies in the sources.", _texts(book.strays, run))
+    yield Listing(
+        "foreign",
+        "Results of nobody",
+        "Results in this folder that belong to no submission of now.",
+        _texts(book.foreign, run),
+    )
+    yield Listing("remarks", "To know", "What else was noticed.", _texts(book.remarks, run))
+
+
+def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[Entry, ...]:
+    return tuple(Entry(without_folders(text, run.folders)) for text in texts)
+
+
+def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[Entry]:
+    for exercise in _exercises(row):
+        for criterion in exercise["criteria"]:
+            if criterion["outcome"] == "undecided":
+                said = without_folders(str(criterion["reason"]), run.folders)
+                yield Entry(f"{criterion['title']}: {said}", index, f"{exercise['id']}-{criterion['id']}")
+
+
+def _problem(row: Row, run: RunOfClass) -> str:
+    hint = row.standing.hint if row.standing is not None else ""
+    said = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
+    return f": {'; '.join(said)}" if said else ""
+
+
+def _faults(index: int, row: Row) -> Iterator[Entry]:
+    for exercise in _exercises(row):
+        for fault in exercise.get("faults", ()):
+            where = f"{fault['file']}:{fault['line']}" if fault["line"] else fault["file"] or "a node"
+            what = _ENDED.get(fault["kind"], str(fault["kind"]).replace("_", " "))
+            when = f" at t = {fault['t_s']:.3f} s" if fault["t_s"] else ""
+            text = str(fault["text"]).strip().rsplit("\n", 1)[-1]
+            yield Entry(f"{where}: {what}{when}: {text}", index, str(exercise["id"]))
+
+
+def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:
+    return () if row.report is None else row.report["exercises"]
+
+
+def without_folders(text: str, folders: Sequence[str]) -> str:
+    """Return a sentence in which paths of this machine begin where the class begins.
+
+    Args:
+        text: A sentence.
+        folders: Absolute paths that lead to it, the longest first; of any other path the last part is left.
+    """
+    for folder in folders:
+        text = text.replace(f"{folder}/", "").replace(folder, folder.rsplit("/", 1)[-1])
+    return _PATH.sub(r"\1", text)

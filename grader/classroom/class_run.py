@@ -1,0 +1,191 @@
+"""A class graded from end to end: the visible list of stages."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import grader
+from grader.app.grade import read_exercises, read_recording
+from grader.app.reproducing import recording_digest
+from grader.app.request import Request
+from grader.app.seeds import kept_key
+from grader.classroom.adjustments import Adjustments, read_adjustments
+from grader.classroom.cache_key import Conditions
+from grader.classroom.class_page import RunOfClass, folders_of, title_of
+from grader.classroom.gradebook import Classbook, ReportData, decisions_for, make_classbook
+from grader.classroom.grading import ClassRun
+from grader.classroom.intake import Entry, Intake, take_in
+from grader.classroom.local import LocalScheduler, MakeScheduler
+from grader.classroom.outputs import CLASS, class_files, exports
+from grader.classroom.request import Course, digest_of, due_now
+from grader.classroom.roster import Matching, match, read_roster
+from grader.classroom.similar import compare_class, link_of_before
+from grader.classroom.store import SEED_KEY, Store, open_store
+from grader.classroom.summary import Graded, summary_json
+from grader.classroom.variants import own_conditions, refuse_without_key, with_known_students
+from grader.classroom.watching import Watcher
+from grader.classroom.worker import GRADESCOPE, HANDED_BACK, REPORT
+from grader.core.errors import GraderError, HarnessError
+from grader.core.exercise import Exercise
+from grader.execution.temp_dirs import scratch_folder
+from grader.rubrics.variants import First
+
+
+def grade_class(
+    course: Course,
+    watcher: Watcher,
+    warn: Callable[[str], None],
+    make_scheduler: MakeScheduler = LocalScheduler,
+) -> Graded:
+    """Grade a class, or go on with it.
+
+    Args:
+        course: What is to be graded, and how.
+        watcher: Hears how it gets on.
+        warn: Hears what an instructor must know before it begins.
+        make_scheduler: Makes what grades so many submissions at a time.
+
+    Raises:
+        GraderError: Something that grading needs cannot be used; its class says who must act.
+    """
+    exercises = read_exercises(replace(course.grading, draw=First()), course.sources)
+    refuse_without_key(course, exercises)
+    conditions = conditions_of(course.grading, exercises)
+    roster = None if course.roster is None else read_roster(course.roster)
+    adjustments = Adjustments() if course.adjustments is None else read_adjustments(course.adjustments)
+    with open_store(course.results) as store:
+        intake = take_in(course.sources, course.results, layout=course.layout, pattern=course.pattern)
+        matching = match(intake.entries, roster)
+        intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
+        own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
+        decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
+        with scratch_folder() as scratch:
+            digests = {entry.name: _digest(entry, scratch) for entry in intake.entries}
+        own = _seeded(own, digests, course)
+        # Where a digest is not known, grading it, in a process of its own, will say why.
+        keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
+        due = due_now(store, intake.entries, keys, course.rerun)
+        before = len(intake.entries) - len(due)
+        watcher.begin(len(due), before)
+        run = ClassRun(course, exercises, own, store, watcher)
+        book = partial(_book, store, intake, matching, adjustments, keys)
+        began = time.monotonic()
+        try:
+            not_replaced = run.grade(due, warn, make_scheduler)
+            graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
+        except (KeyboardInterrupt, HarnessError):
+            with suppress(GraderError):  # what stopped the run says more
+                _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
+            raise
+        return _written(graded, _run(course, conditions, began, graded), store, course)
+
+
+def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions:
+    """Return what all results of a class depend on; raises RecordingError for a recording that cannot be used."""
+    odometry = read_recording(grading, exercises)
+    return Conditions(
+        grader=grader.__version__,
+        rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
+        recording="" if odometry is None else recording_digest(odometry),
+        seed=grading.seed,
+        clock=grading.clock,
+        isolation=grading.isolation,
+        time_budget_s=grading.time_budget_s,
+        spot_checks=grading.spot_checks,
+        every=grading.every,
+    )
+
+
+def _digest(entry: Entry, scratch: Path) -> str:
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
+        return digest_of(entry, Path(folder))
+
+
+def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: Course) -> dict[str, Conditions]:
+    """Return the conditions with the seed of each submission: what grades it is told the seed, never the key."""
+    if course.grading.seed is not None:
+        return dict(own)
+    key = course.seed_key or kept_key(course.results / SEED_KEY)
+    return {name: replace(conditions, seed=key.seed(digests[name])) for name, conditions in own.items()}
+
+
+def _book(
+    store: Store, intake: Intake, matching: Matching, adjustments: Adjustments, keys: Mapping[str, str]
+) -> Classbook:
+    names = {entry.name for entry in intake.entries}
+    return make_classbook(
+        intake,
+        matching,
+        adjustments,
+        kept={name: store.kept(name) for name in names},
+        keys=keys,
+        report_of=lambda name: _report(store.place(name) / REPORT),
+        handed_back_of=lambda name: _report(store.place(name) / HANDED_BACK),
+        foreign=[name for name in store.names() if name not in names],
+    )
+
+
+def _compared(graded: Graded, intake: Intake, course: Course, store: Store) -> Graded:
+    """Return the class with what is said of similar submissions, if that was asked for."""
+    if course.given is None:
+        return replace(graded, links=link_of_before(store))
+    found = compare_class(intake.entries, graded.book.rows, course.given, store)
+    return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
+
+
+def _run(course: Course, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
+    """Return what belongs to this run alone; without what was graded it is one that was stopped."""
+    return RunOfClass(
+        conditions=conditions,
+        title=title_of(course.sources),
+        written=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+        jobs=course.jobs or len(os.sched_getaffinity(0)),
+        took_s=time.monotonic() - began_s,
+        graded=0 if graded is None else graded.graded,
+        kept=0 if graded is None else graded.kept_before,
+        stopped=graded is None,
+        folders=folders_of([*course.sources, course.results, Path.cwd(), Path(tempfile.gettempdir())]),
+    )
+
+
+def _written(graded: Graded, run: RunOfClass, store: Store, course: Course) -> Graded:
+    """Write what is made for the whole class, and return the class with what was written."""
+    wanted = course.platforms
+    names = [row.name for row in graded.book.rows if row.report is not None] if wanted.gradescope else []
+    results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}
+    made = exports(graded.book, wanted, results)
+    left_out = {platform: export.left_out for platform, export in made.items() if export.left_out}
+    remarks = (*graded.remarks, *(export.remark for export in made.values() if export.remark))
+    graded = replace(graded, left_out=left_out, remarks=remarks)
+    files = class_files(graded.book, made, run, links=graded.links, standalone=course.standalone)
+    written = _write({CLASS: summary_json(graded).encode(), **files}, store)
+    return replace(graded, files=(*graded.files, *written))
+
+
+def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:
+    return tuple(store.write(name, data) for name, data in files.items())
+
+
+def _report(path: Path) -> ReportData | None:
+    try:
+        report: Any = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return report if isinstance(report, dict) and "exercises" in report else None
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""

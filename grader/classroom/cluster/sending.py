@@ -1,0 +1,136 @@
+"""Packs what a cluster is to grade, and takes in what it answers; knows nothing of how bytes travel."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from grader.app.grade import read_exercises, wanted_files
+from grader.app.request import Request
+from grader.classroom import store as kept
+from grader.classroom.cache_key import unusable_digest
+from grader.classroom.local import Attempt, Task
+from grader.classroom.messages import (
+    Answer,
+    Errand,
+    Files,
+    Terms,
+    files_below,
+    pack_collected,
+    travelling_name,
+    unpack,
+    write_answer,
+)
+from grader.classroom.store import Standing, State
+from grader.classroom.worker import PARTS
+from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
+from grader.rubrics.loader import own_check_files
+from grader.rubrics.variants import First
+from grader.submissions.submission import collect_submission
+
+AGAIN = "run the same command again"
+_PARTS = frozenset(PARTS)
+
+
+def terms_of(task: Task) -> Terms:
+    """Return what a class is graded with, of which this is one submission; raises GraderError for a lost file."""
+    return Terms(
+        conditions=replace(task.conditions, seed=None),  # each submission comes with its own
+        exercises=task.exercises,
+        rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
+        checks=tuple(checks_of(task.rubrics)),
+        odom_bag=b"" if task.odom_bag is None else travelling_name(task.odom_bag),
+        recording=() if task.odom_bag is None else _recording(task.odom_bag),
+        standalone=task.standalone,
+        deadline_s=task.deadline_s,
+    )
+
+
+def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
+    """Yield the files of checks that rubrics bring with them; they were looked at when the rubrics were read."""
+    for path in rubrics:
+        for file in own_check_files(path):
+            yield travelling_name(file.path), file.content
+
+
+def files_wanted(task: Task) -> Sequence[str]:
+    """Return the names of the files that a class is asked for, of which this is one submission."""
+    asked = Request("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
+    return wanted_files(read_exercises(asked))
+
+
+def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
+    """Return a submission as it travels, or at once what comes of it if it cannot be used.
+
+    Args:
+        task: The submission.
+        wanted: Names of the files that are asked for.
+    """
+    try:
+        with tempfile.TemporaryDirectory() as nowhere:
+            collected = collect_submission(str(task.submission), wanted, Path(nowhere))
+    except SubmissionError as error:
+        digest = unusable_digest(error)
+        key = task.conditions.key(digest)
+        return Attempt(task, Standing(State.REFUSED, key, digest, task.label, error.message, error.hint))
+    except (OSError, MemoryError, RecursionError) as error:
+        return failed(task, f"the submission cannot be read: {type(error).__name__}")
+    return Errand(
+        task.name,
+        os.fsencode(task.label),
+        travelling_name(task.submission),
+        pack_collected(collected),
+        task.conditions.variants,
+        task.conditions.seed,
+    )
+
+
+def taken_in(task: Task, answer: Answer) -> Attempt:
+    """Write down what a machine answers, in the folder that the task names."""
+    standing = kept.load(answer.standing)
+    if standing is None:
+        return failed(task, f"{answer.machine}: expected a result, found something else")
+    conditions = task.conditions
+    has_report = standing.state in (State.GRADED, State.UNDECIDED)
+    if has_report and standing.key != conditions.key(standing.digest):
+        return failed(task, f"{answer.machine}: graded by other rubrics or another recording than those here")
+    try:
+        if has_report:
+            write_answer(answer.files, task.into, _PARTS)
+    except HarnessError as error:
+        return failed(task, f"{answer.machine}: {error.message}")
+    except OSError as error:
+        return failed(task, f"the result cannot be written: {error.strerror}")
+    return Attempt(task, replace(standing, label=task.label))
+
+
+def answer_in(data: object, machine: str) -> Answer:
+    """Return the answer that a cluster hands over; one that is none says so itself."""
+    try:
+        if isinstance(data, bytes):
+            return unpack(data, Answer)
+    except HarnessError:
+        pass
+    return Answer(machine)
+
+
+def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+    """Return that grading failed through no fault of the student."""
+    return Attempt(task, Standing(State.FAILED, "", "", task.label, problem, hint))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RubricError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _recording(path: Path) -> Files:
+    try:
+        return files_below(path) if path.is_dir() else ((b"", path.read_bytes()),)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None

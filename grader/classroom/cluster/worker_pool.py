@@ -1,0 +1,164 @@
+"""The workers of a Dask cluster: how to reach them, which can grade, and how many submissions at a time."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable, Collection, Mapping, Sequence
+from importlib.util import find_spec
+from typing import Any
+
+from distributed import Client
+
+from grader.classroom.cluster import jobs
+from grader.classroom.messages import Fitness, unpack
+from grader.core.errors import EnvironmentFault, HarnessError
+
+LIBRARY = "distributed"
+
+
+def require_dask() -> None:
+    """Make sure that a cluster can be spoken to; raises EnvironmentFault with what to install."""
+    if find_spec(LIBRARY) is None:
+        message = f"--scheduler: expected the package {LIBRARY}, found none"
+        raise EnvironmentFault(message, "pip install 'rclpy-grader[dask]'")
+
+
+PACKAGE = "rclpy-grader"
+
+
+class Fleet:
+    """Knows which workers can grade; each is asked once, when it is seen first.
+
+    Args:
+        client: Speaks to the cluster.
+        version: Version of the grader that workers must have.
+        warn: Hears why a worker that joined later is not used.
+    """
+
+    def __init__(self, client: Client, version: str, warn: Callable[[str], None]) -> None:
+        self._client = client
+        self._version = version
+        self._warn = warn
+        self._known: dict[str, Fitness] = {}
+        self._isolation = ""
+
+    def inspect(self, isolation: str) -> Sequence[str]:
+        """Ask all workers that are there, and return what an instructor must know.
+
+        Args:
+            isolation: The sandbox that was asked for.
+
+        Raises:
+            EnvironmentFault: The scheduler lacks the package, or there are workers and none of them can grade.
+        """
+        self._isolation = isolation
+        self._check_scheduler()
+        threads = self._threads()
+        self._ask(threads)
+        found = [self._known[address] for address in threads if address in self._known]
+        unfit = [fitness for fitness in found if fitness.unfit]
+        if found and len(unfit) == len(found):
+            first = unfit[0]
+            raise EnvironmentFault(
+                f"cluster: expected a worker that can grade, found none among {len(found)} ({_told(first)})", first.hint
+            )
+        if not threads:
+            return ("cluster: there is no worker yet, grading begins when one joins",)
+        remarks = dict.fromkeys(f"{fitness.machine}: {remark}" for fitness in found for remark in fitness.remarks)
+        return (*(f"{_told(fitness)}; it is not used" for fitness in unfit), *remarks)
+
+    def look(self) -> Mapping[str, int]:
+        """Return the workers that can grade now, and how many threads each has; newcomers are asked first."""
+        threads = self._threads()
+        newcomers = [address for address in threads if address not in self._known]
+        if newcomers:
+            self._ask(newcomers)
+            for fitness in (self._known.get(address) for address in newcomers):
+                if fitness is not None and fitness.unfit:
+                    self._warn(f"{_told(fitness)}; it is not used")
+        return {address: count for address, count in threads.items() if self._fit(address)}
+
+    def only(self, fit: Collection[str]) -> tuple[str, ...]:
+        """Return the workers that a submission must go to; empty if any will do.
+
+        Args:
+            fit: Those that can grade now.
+        """
+        unfit = any(fitness.unfit for fitness in self._known.values())
+        return tuple(sorted(fit)) if unfit else ()
+
+    def rule_out(self, machine: str, problem: str, hint: str) -> None:
+        """Take note that a worker turned out to be unable to grade."""
+        for address in self._threads():
+            if f" {address} " in machine and self._fit(address):
+                self._known[address] = fitness = Fitness(machine, problem, hint)
+                self._warn(f"{_told(fitness)}; it is not used")
+
+    def forget(self, addresses: Collection[str]) -> None:
+        """Ask these workers again when they are seen next."""
+        for address in addresses:
+            self._known.pop(address, None)
+
+    def _fit(self, address: str) -> bool:
+        fitness = self._known.get(address)
+        return fitness is None or not fitness.unfit
+
+    def _threads(self) -> dict[str, int]:
+        try:
+            return dict(self._client.nthreads())
+        except (OSError, TimeoutError):
+            if self._client.status != "running":
+                raise lost() from None
+        # One connection of several was closed, perhaps with what a worker that ended had to do with it.
+        return self._threads_once_more()
+
+    def _threads_once_more(self) -> dict[str, int]:
+        try:
+            return dict(self._client.nthreads())
+        except (OSError, TimeoutError):
+            raise lost() from None
+
+    def _check_scheduler(self) -> None:
+        """Make sure that the scheduler can read what it is sent: it looks into it before it hands it on."""
+        try:
+            found = str(self._client.run_on_scheduler(importlib.metadata.version, PACKAGE))
+        except importlib.metadata.PackageNotFoundError:
+            found = ""
+        if found != self._version:
+            problem = jobs.other_version(self._version, found)
+            raise EnvironmentFault(f"scheduler of the cluster: {problem}", jobs.remedy(self._version))
+
+    def _ask(self, addresses: Collection[str]) -> None:
+        """Ask workers for their version, which needs no grader there, and those with the right one for the rest."""
+        right = []
+        for address, found in self._run(importlib.metadata.version, PACKAGE, addresses).items():
+            if found == self._version:
+                right.append(address)
+            elif isinstance(found, (str, importlib.metadata.PackageNotFoundError)):
+                problem = jobs.other_version(self._version, found if isinstance(found, str) else "")
+                self._known[address] = Fitness(f"worker {address}", problem, jobs.remedy(self._version))
+        for address, said in self._run(jobs.inspect, self._isolation, right).items():
+            if isinstance(said, bytes):
+                self._known[address] = unpack(said, Fitness)
+            elif not isinstance(said, OSError):  # such a one has left meanwhile
+                self._known[address] = Fitness(f"worker {address}", f"the grader failed: {type(said).__name__}")
+
+    def _run(self, function: Callable[..., object], argument: str, addresses: Collection[str]) -> dict[str, Any]:
+        if not addresses:
+            return {}
+        try:
+            return dict(self._client.run(function, argument, workers=list(addresses), on_error="return"))
+        except (OSError, TimeoutError):
+            raise lost() from None
+
+
+def lost() -> HarnessError:
+    """Return what to say when nobody answers any more."""
+    return HarnessError(
+        "cluster: expected the scheduler to answer, found it gone",
+        "what was graded is kept; when the scheduler is back, the same command goes on where it was",
+    )
+
+
+def _told(fitness: Fitness) -> str:
+    return f"{fitness.machine}: {fitness.unfit}"

@@ -1,0 +1,322 @@
+"""The gradebook of a class: one row for each submission and each person without one, also as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from fractions import Fraction
+from typing import Any
+
+from grader.classroom.adjustments import Adjusted, Adjustments, Decision, adjust, unknown_student
+from grader.classroom.intake import Entry, Intake
+from grader.classroom.roster import Matching, Person, fold_handle
+from grader.classroom.store import Kept, Standing, State
+from grader.reporting.escape import csv_cell, shown
+
+#: A report as JSON values.
+ReportData = Mapping[str, Any]
+
+
+class Status(str, Enum):
+    """How a row stands; the first four are the states of a result."""
+
+    GRADED = "graded"
+    UNDECIDED = "undecided"
+    REFUSED = "refused"
+    FAILED = "failed"
+    NOT_RUN = "not run"
+    MISSING = "nothing handed in"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One submission, or one person without one.
+
+    Attributes:
+        name: Name of the entry, under which its results lie; empty for a person without a submission.
+        label: As the source calls it.
+        person: Who handed it in; None if nobody on the roster goes with it.
+        status: See Status.
+        problem: Why there is no report, or why the last attempt came to nothing; may be empty.
+        standing: What lies in the folder for results; None if there is nothing.
+        report: Its report; None if there is none.
+        handed_back: Its report as far as students may see it; None if there is none.
+        adjusted: The score, with what was decided about it.
+        marked_late: Whether the platform marked it as late.
+        outdated: Whether the result is of other files or another rubric than those of now.
+        twin_of: Names of other submissions of the same person.
+    """
+
+    name: str
+    label: str
+    person: Person | None
+    status: Status
+    problem: str = ""
+    standing: Standing | None = None
+    report: ReportData | None = None
+    handed_back: ReportData | None = None
+    adjusted: Adjusted = field(default_factory=Adjusted)
+    marked_late: bool = False
+    outdated: bool = False
+    twin_of: tuple[str, ...] = ()
+
+    @property
+    def shown_name(self) -> str:
+        """The person's name, or what the submission is called."""
+        return self.person.name if self.person is not None else self.label
+
+    @property
+    def max_score(self) -> Fraction | None:
+        """Points to be had; None without a report."""
+        return None if self.standing is None or self.report is None else exactly(self.standing.max_score)
+
+
+@dataclass(frozen=True, slots=True)
+class Classbook:
+    """A class.
+
+    Attributes:
+        rows: Submissions by name, then people without one.
+        matching: Who could not be matched.
+        strays: What in the sources is no submission.
+        foreign: Names of results that belong to no submission of now.
+        layouts: Source and layout of each.
+        remarks: Sentences that an instructor must know.
+    """
+
+    rows: tuple[Row, ...]
+    matching: Matching = field(default_factory=Matching)
+    strays: tuple[str, ...] = ()
+    foreign: tuple[str, ...] = ()
+    layouts: tuple[tuple[str, str], ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def count(self, status: Status) -> int:
+        """Return how many rows stand like this."""
+        return sum(row.status is status for row in self.rows)
+
+    @property
+    def to_export(self) -> tuple[Row, ...]:
+        """Rows with a score for a person of whom only one submission counts: what platforms may be told."""
+        scored = [row for row in self.rows if row.adjusted.score is not None and row.person is not None]
+        count = Counter(id(row.person) for row in scored)
+        twins = {row.name for row in scored if any(t in {r.name for r in scored} for t in row.twin_of)}
+        return tuple(row for row in scored if count[id(row.person)] == 1 and row.name not in twins)
+
+
+def exactly(number: float) -> Fraction:
+    """Return a score of a report, which has at most six digits after the point, as what it was written as."""
+    return Fraction(str(round(number, 6)))
+
+
+def make_classbook(  # noqa: PLR0913  each comes from another place
+    intake: Intake,
+    matching: Matching,
+    adjustments: Adjustments,
+    *,
+    kept: Mapping[str, Kept],
+    keys: Mapping[str, str],
+    report_of: Callable[[str], ReportData | None],
+    handed_back_of: Callable[[str], ReportData | None],
+    foreign: Sequence[str] = (),
+) -> Classbook:
+    """Put a class together.
+
+    Args:
+        intake: The submissions.
+        matching: Whose they are.
+        adjustments: What was decided.
+        kept: Name -> what lies in the folder for results.
+        keys: Name -> what the key of a result of now is; empty if that is not known.
+        report_of: Reads the report of a submission.
+        handed_back_of: Reads it as far as students may see it.
+        foreign: Names of results of nobody.
+
+    Raises:
+        ClassError: A decision names nobody of this class.
+    """
+    decisions = decisions_for(intake.entries, matching, adjustments)
+    twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}
+    rows = []
+    for entry in intake.entries:
+        found = kept.get(entry.name, Kept())
+        report = report_of(entry.name) if _has_report(found.result) else None
+        rows.append(_row(entry, matching, found, report, keys.get(entry.name, "")))
+        raw = exactly(report["score"]) if report is not None and report["final"] else None
+        adjusted = adjust(raw, decisions.get(entry.name, Decision()), adjustments)
+        handed_back = handed_back_of(entry.name) if report is not None else None
+        rows[-1] = replace(rows[-1], handed_back=handed_back, adjusted=adjusted, twin_of=twins.get(entry.name, ()))
+    rows += [_missing(person, adjustments) for person in matching.missing]
+    late = [row.name for row in rows if row.marked_late and not row.adjusted.days_late]
+    remarks = [f"marked as late by the platform, but no late days are named: {', '.join(late)}"] if late else []
+    odd = [entry.name for entry in intake.entries if not entry.recognised]
+    remarks += [f"named otherwise than the layout names submissions: {', '.join(odd)}"] if odd else []
+    return Classbook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
+
+
+def decisions_for(entries: Sequence[Entry], matching: Matching, adjustments: Adjustments) -> dict[str, Decision]:
+    """Return name of an entry -> what was decided; raises ClassError for a decision about nobody of this class."""
+    found: dict[str, Decision] = {}
+    for who, decision in adjustments.students.items():
+        meant = [entry.name for entry in entries if fold_handle(who) in _called(entry, matching.people.get(entry.name))]
+        exact = [name for name in meant if name == who] or meant
+        absent = any(fold_handle(who) in _handles(person) for person in matching.missing)
+        if not exact and not absent:
+            raise unknown_student(decision, who, [entry.name for entry in entries])
+        found.update(dict.fromkeys(exact, decision))
+    return found
+
+
+def _called(entry: Entry, person: Person | None) -> set[str]:
+    own = {fold_handle(text) for text in (entry.name, entry.label, *entry.identity.values())}
+    return own | (_handles(person) if person is not None else set())
+
+
+def _handles(person: Person) -> set[str]:
+    return {*person.handles, *(fold_handle(t) for t in (person.name, person.user, person.email, person.id) if t)}
+
+
+def _has_report(standing: Standing | None) -> bool:
+    return standing is not None and standing.state in (State.GRADED, State.UNDECIDED)
+
+
+def _row(entry: Entry, matching: Matching, kept: Kept, report: ReportData | None, key: str) -> Row:
+    result, last = kept.result, kept.last
+    known = result is not None and (report is not None or not _has_report(result))
+    return Row(
+        name=entry.name,
+        label=entry.label,
+        person=matching.people.get(entry.name),
+        status=Status(result.state.value) if result is not None and known else Status.NOT_RUN,
+        problem="" if last is None else last.problem,
+        standing=result,
+        report=report,
+        marked_late=entry.late,
+        outdated=result is not None and bool(key) and result.state is not State.FAILED and result.key != key,
+    )
+
+
+def _missing(person: Person, adjustments: Adjustments) -> Row:
+    """Return the row of somebody who handed in nothing, who may have been given a score all the same."""
+    called = _handles(person)
+    decision = next((d for who, d in adjustments.students.items() if fold_handle(who) in called), Decision())
+    return Row("", person.name, person, Status.MISSING, adjusted=adjust(None, decision, adjustments))
+
+
+COLUMNS = (
+    "submission",
+    "name",
+    "username",
+    "email",
+    "id",
+    "status",
+    "score",
+    "max_score",
+    "raw_score",
+    "days_late",
+    "penalty",
+    "override",
+    "reason",
+    "remarks",
+    "report",
+)
+_TEXT_LIMIT = 2_000
+
+
+def render_gradebook(book: Classbook) -> str:
+    """Return the gradebook: one row for everybody, then points by exercise and criterion."""
+    exercises, criteria = _asked(book.rows)
+    header = [*COLUMNS, *exercises, *(f"{e}/{c}" for e, c in criteria)]
+    return table(header, (_cells(row, exercises, criteria) for row in book.rows))
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return CSV as spreadsheets and platforms read it; the cells have been made safe before."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def number(value: Fraction | float | None) -> str:
+    """Return points as digits; nothing where there are none."""
+    if value is None:
+        return ""
+    rounded = round(float(value), 6)
+    return str(int(rounded)) if rounded.is_integer() else repr(rounded)
+
+
+def text_cell(text: str) -> str:
+    """Return foreign text for a cell: one line, and no formula."""
+    return csv_cell(text, limit=_TEXT_LIMIT)
+
+
+def remarks(row: Row) -> list[str]:
+    """Return what somebody who reads this row must know."""
+    found = [shown(row.problem, limit=500)] if row.problem else []
+    if row.outdated:
+        found.append("the result is of other files or of another rubric than now")
+    if row.twin_of:
+        found.append(f"the same person as {', '.join(row.twin_of)}")
+    if row.name and row.person is None:
+        found.append("nobody on the roster goes with it for sure")
+    if row.marked_late:
+        found.append("marked as late by the platform")
+    if row.adjusted.ignored:
+        found.append("does not count")
+    if row.status.value == "undecided":
+        found.append("not final: a criterion was not decided, through no fault of the student")
+    return found
+
+
+def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
+    person, adjusted = row.person, row.adjusted
+    texts = [row.name, row.shown_name, *((person.user, person.email, person.id) if person else ("", "", ""))]
+    raw = None if row.report is None else row.report["score"]
+    return [
+        *map(text_cell, texts),
+        row.status.value,
+        number(adjusted.score),
+        number(row.max_score),
+        number(raw),
+        number(adjusted.days_late) if adjusted.days_late else "",
+        number(adjusted.penalty) if adjusted.penalty else "",
+        number(adjusted.override),
+        text_cell(adjusted.reason),
+        text_cell("; ".join(remarks(row))),
+        text_cell(f"students/{row.name}/report.html") if row.report is not None else "",
+        *_points(row.report, exercises, criteria),
+    ]
+
+
+def _asked(rows: Iterable[Row]) -> tuple[list[str], list[tuple[str, str]]]:
+    """Return all exercises and criteria that occur, in the order of the reports."""
+    exercises: dict[str, None] = {}
+    criteria: dict[tuple[str, str], None] = {}
+    for row in rows:
+        for exercise in _exercises(row.report):
+            exercises[exercise["id"]] = None
+            criteria.update({(exercise["id"], criterion["id"]): None for criterion in exercise["criteria"]})
+    return list(exercises), sorted(criteria, key=lambda pair: list(exercises).index(pair[0]))
+
+
+def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
+    by_exercise = {e["id"]: e for e in _exercises(report)}
+    found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
+    return [
+        *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
+        *("" if pair not in found or _open(found[pair]) else number(found[pair]["score"]) for pair in criteria),
+    ]
+
+
+def _open(criterion: Mapping[str, Any]) -> bool:
+    return bool(criterion["outcome"] == "undecided")
+
+
+def _exercises(report: ReportData | None) -> Sequence[Mapping[str, Any]]:
+    return () if report is None else report["exercises"]

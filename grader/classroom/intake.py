@@ -1,0 +1,272 @@
+"""Finds the submissions of a class in folders and downloads, and gives each a safe name."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.classroom.downloads import AUTO, PATTERNS, Layout, Named, layout_of, unpack_download
+from grader.core.errors import ClassError, HarnessError, SubmissionError
+from grader.submissions.archives import ARCHIVE_SUFFIXES
+from grader.submissions.collected import objection, passed_over_file, passed_over_folder, shown, unnoticed
+from grader.submissions.staging import read_start
+
+#: Longest name, in bytes of UTF-8; room is left for a mark that tells two apart.
+MAX_BYTES = 80
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+_KEPT = frozenset("._@+-")
+
+
+def safe_name(text: str) -> str:
+    """Return text as one part of a path on any system: letters, digits and `._@+-`, in lower case, never empty."""
+    plain = unicodedata.normalize("NFKC", text).casefold()
+    slug = "".join(c if c.isalnum() or c in _KEPT else "-" for c in unicodedata.normalize("NFC", plain))
+    slug = re.sub(r"-{2,}", "-", slug).strip("-. ")
+    slug = slug.encode("utf-8", "ignore")[:MAX_BYTES].decode("utf-8", "ignore").strip("-. ")
+    if not slug or _RESERVED.fullmatch(slug):
+        return f"{slug or 'unnamed'}-{_mark(text)}"
+    return slug
+
+
+def distinct_names(wishes: Sequence[tuple[str, str]]) -> list[str]:
+    """Return one safe name for each wish, no two the same.
+
+    A name does not depend on the order: all that wish for the same one get a mark that follows from what they are.
+
+    Args:
+        wishes: The name wished for, and what tells this one from all others, such as its path in the download.
+    """
+    names = [safe_name(wish) for wish, _ in wishes]
+    count = Counter(names)
+    return [name if count[name] == 1 else f"{name}-{_mark(own)}" for name, (_, own) in zip(names, wishes, strict=True)]
+
+
+def _mark(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:6]
+
+
+#: Largest file of a student that lies beside those of others.
+MAX_FILE_BYTES = 64 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One submission of a class.
+
+    Attributes:
+        name: Safe in paths and different from all others; results lie under it.
+        label: As the source calls it.
+        path: What is graded.
+        identity: What the name says of the student: `user`, `id`, `email`, `name`.
+        late: Whether the platform marked it as late.
+        recognised: Whether the layout knows names like this one.
+        problem: Why it cannot be graded at all; empty if it can.
+    """
+
+    name: str
+    label: str
+    path: Path
+    identity: Mapping[str, str] = field(default_factory=dict)
+    late: bool = False
+    recognised: bool = True
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Intake:
+    """What was found in the sources.
+
+    Attributes:
+        entries: The submissions, ordered by name.
+        layouts: Source and layout of each, as text.
+        strays: What is no submission, and why; one line each.
+    """
+
+    entries: tuple[Entry, ...]
+    layouts: tuple[tuple[str, str], ...]
+    strays: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Found:
+    """A submission before it has a name of its own; several files may belong to it."""
+
+    own: str
+    label: str
+    wish: str
+    path: Path
+    named: Named
+    problem: str = ""
+    files: list[tuple[str, Path]] = field(default_factory=list)
+
+
+_ByStudent = dict[tuple[str, ...], _Found]
+
+
+def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
+    """Find all submissions.
+
+    Args:
+        sources: Folders of submissions, or downloads.
+        results: The folder for results; downloads are unpacked in it.
+        layout: How submissions are named, one of `LAYOUTS`.
+        pattern: A regular expression for the names, instead.
+
+    Raises:
+        ClassError: A source cannot be used, or holds no submission.
+    """
+    found: list[_Found] = []
+    strays: list[str] = []
+    layouts: list[tuple[str, str]] = []
+    called = distinct_names([(source.resolve().name, str(source)) for source in sources])
+    for source, own in zip(sources, called, strict=True):
+        top, refused = _opened(source, results / "unpacked" / own, strays)
+        children = [child for child in _children(top, strays) if child.resolve() != results.resolve()]
+        used = _layout(children, top, layout, pattern)
+        here = _submissions(children, own, used, strays)
+        for name, problem in refused.items():
+            _refuse(here, top / name, own, used, problem)
+        layouts.append((str(source), used.name))
+        found += here.values()
+        if not here:
+            hint = "name the folder that holds one folder or archive for each student"
+            raise ClassError(f"{source}: expected submissions, found none", hint)
+    names = distinct_names([(one.wish, one.own) for one in found])
+    entries = [_entry(one, name, results) for one, name in zip(found, names, strict=True)]
+    return Intake(tuple(sorted(entries, key=lambda entry: entry.name)), tuple(layouts), tuple(strays))
+
+
+def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[str, str]]:
+    """Return the folder that holds the submissions of a source, and what of it had to be refused."""
+    if source.is_dir():
+        return source, {}
+    if not source.is_file():
+        raise ClassError(f"{source}: expected a folder of submissions or a download, found nothing there")
+    unpacked = unpack_download(source, into)
+    strays += [f"{source}: {stray}" for stray in unpacked.strays]
+    return unpacked.folder, unpacked.refused
+
+
+def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> Layout:
+    """Return how the submissions in a folder are named; single files count only where there is nothing else."""
+    names = [child.name for child in children if child.is_dir() or _is_archive(child)]
+    return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
+
+
+def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: list[str]) -> _ByStudent:
+    found: _ByStudent = {}
+    for child in children:
+        if child.is_symlink():
+            strays.append(f"{shown(str(child), 200)}: a link, which is not followed")
+            continue
+        named, label = _read(layout, child)
+        if not child.is_dir() and not _is_archive(child) and not named.file:
+            strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
+            continue
+        key = _student(child.name, named, layout)
+        one = found.setdefault(key, _found(child, label, own, named))
+        if one.path != child:  # of the same student: files go together under their own names
+            one.files = [*(one.files or [(one.named.file, one.path)]), (named.file, child)]
+    return found
+
+
+def _read(layout: Layout, child: Path) -> tuple[Named, str]:
+    """Return what a name says, with or without the ending of an archive, and the name without it."""
+    whole = layout.read(child.name)
+    label = child.name if child.is_dir() else _stem(child.name)
+    if whole.recognised and (whole.file or child.is_dir()):
+        return whole, label
+    return layout.read(label), label
+
+
+def _student(name: str, named: Named, layout: Layout) -> tuple[str, ...]:
+    """Return what tells students of one source apart: who they are where a platform deals in files, else the name."""
+    who = tuple(f"{key}={value}" for key, value in sorted(named.identity.items()))
+    return who if who and (named.file or layout.name in PATTERNS) else ("", name)
+
+
+def _found(path: Path, label: str, own: str, named: Named) -> _Found:
+    wish = "-".join(named.identity.values()) or label
+    files = [(named.file, path)] if named.file else []
+    return _Found(f"{own}/{path.name}", wish if named.file else label, wish, path, named, files=files)
+
+
+def _refuse(found: _ByStudent, path: Path, own: str, layout: Layout, problem: str) -> None:
+    """Take note of a submission of which something was not unpacked; then nothing of it is graded."""
+    named = layout.read(path.name)
+    one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named))
+    one.problem = problem
+
+
+def _entry(one: _Found, name: str, results: Path) -> Entry:
+    path, problem = one.path, one.problem
+    if one.files and not problem:
+        path = results / "unpacked" / "together" / name
+        problem = _put_together(one.files, path)
+    return Entry(name, one.label, path, one.named.identity, one.named.late, one.named.recognised, problem)
+
+
+def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
+    """Copy the files of one student into a folder under their own names; return why that cannot be, if so."""
+    counted = Counter(name for name, _ in files if name)
+    wrong = next((f"found {objection(name)}: {shown(name)}" for name, _ in files if name and objection(name)), "")
+    twice = next((f"found {shown(name)} twice" for name, count in counted.items() if count > 1), "")
+    if wrong or twice:
+        return f"expected files with different plain names, {wrong or twice}"
+    try:
+        shutil.rmtree(into, ignore_errors=True)
+        into.mkdir(parents=True)
+        for name, path in files:
+            if path.is_dir():
+                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True)
+            else:
+                target = into / (name or path.name)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(read_start(path, MAX_FILE_BYTES, where=shown(str(path), 200)))
+    except SubmissionError as error:
+        return error.message
+    except shutil.Error:
+        return "expected plain files, found something that cannot be copied"
+    except OSError as error:
+        raise HarnessError(f"{into}: the submission cannot be copied: {error.strerror}", "free some space") from None
+    return ""
+
+
+def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
+    """Yield what lies in a folder in the order of names, without what systems and tools leave there.
+
+    What is left out but may be somebody's work becomes a stray.
+    """
+    try:
+        names = sorted(os.listdir(folder), key=os.fsencode)  # noqa: PTH208  names, in the order of their bytes
+    except OSError as error:
+        raise ClassError(f"{folder}: the folder cannot be read: {error.strerror}") from None
+    for name in names:
+        path = folder / name
+        is_folder = path.is_dir()
+        why = unnoticed(name, is_folder=is_folder)
+        if why:
+            strays.append(f"{shown(str(path), 200)}: {why}, so it is not graded")
+        elif not (passed_over_folder(name) if is_folder else passed_over_file(name)):
+            yield path
+
+
+def _is_archive(path: Path) -> bool:
+    return path.is_file() and path.name.casefold().endswith(ARCHIVE_SUFFIXES)
+
+
+def _stem(name: str) -> str:
+    """Return a file name without the endings of archives."""
+    stem = name
+    while True:
+        ending = next((end for end in ARCHIVE_SUFFIXES if stem.casefold().endswith(end) and len(stem) > len(end)), "")
+        if not ending:
+            return stem
+        stem = stem[: -len(ending)]

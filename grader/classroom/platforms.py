@@ -1,0 +1,260 @@
+"""Scores as Canvas, Moodle and Gradescope take them; who cannot be told is named instead."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from grader.classroom.gradebook import Classbook, ReportData, Row, number, table, text_cell
+from grader.classroom.roster import Person, columns_of, fold_handle, person_of, read_table
+from grader.core.errors import ClassError
+from grader.reporting.escape import shown as safe
+from grader.reporting.json_report import json_text
+from grader.submissions.collected import listed, shown
+
+#: The columns that Canvas wants before the scores, in its order.
+CANVAS_COLUMNS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
+#: The columns that Moodle may know people by, the surest first.
+MOODLE_COLUMNS = ("Email address", "Username", "ID number")
+GRADESCOPE_COLUMNS = ("Name", "SID", "Email", "Total Score", "Max Points", "Status")
+_POSSIBLE = "points possible"
+_FEEDBACK = 4_000
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """A file for a platform.
+
+    Attributes:
+        files: Name below the folder for results -> content.
+        left_out: Who is not in it, and why; one line each.
+        remark: What else an instructor must know; may be empty.
+    """
+
+    files: Mapping[str, str] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+    remark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Users:
+    """A table that a platform exported: the people it knows.
+
+    Attributes:
+        path: Where it was read from.
+        header: Its columns.
+        rows: Column -> value.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    rows: tuple[Mapping[str, str], ...]
+
+
+def read_users(path: Path) -> Users:
+    """Return a table of people; raises ClassError if it cannot be read."""
+    header, rows = read_table(path)
+    return Users(path, tuple(header), tuple(rows))
+
+
+def export_canvas(book: Classbook, assignment: str, gradebook: Users | None) -> Export:
+    """Return the scores for Canvas.
+
+    Only people with a score are in it, and only this one column: what was changed in Canvas since stays.
+
+    Args:
+        book: The class.
+        assignment: Number of the assignment in Canvas, or its title and number in parentheses.
+        gradebook: The gradebook that Canvas exported; None if the roster has Canvas' numbers.
+
+    Raises:
+        ClassError: The gradebook has no such assignment, or nobody has a number that Canvas knows.
+    """
+    title = _canvas_title(assignment, gradebook)
+    rows: list[list[str]] = []
+    left_out: list[str] = []
+    maxima = {row.max_score for row in book.to_export if row.max_score is not None}
+    for row in _counted(book, left_out):
+        found = _canvas_row(row, gradebook)
+        if found is None or not found.get("ID", "").strip():
+            where = "the roster" if gradebook is None else gradebook.path.name
+            left_out.append(f"{row.shown_name}: {where} has no Canvas number (column ID) for this person")
+        else:
+            rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), number(row.adjusted.score)])
+    possible = _possible(gradebook, title) or number(max(maxima, default=None))
+    ours = listed([number(points) for points in sorted(maxima)] or [possible])
+    remark = "" if ours == possible else _line(f"{title} has {possible} points in Canvas, the reports have {ours}")
+    header = [*CANVAS_COLUMNS, text_cell(title)]
+    points = ["    Points Possible", *[""] * (len(CANVAS_COLUMNS) - 1), text_cell(possible)]
+    return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)), remark)
+
+
+def export_moodle(book: Classbook, users: Users) -> Export:
+    """Return grades and feedback for Moodle's grade import, side by side: the one without the other wipes grades.
+
+    Who is not in the table of users is left out, because one unknown user makes Moodle refuse all.
+
+    Args:
+        book: The class.
+        users: The participants or grades that Moodle exported.
+
+    Raises:
+        ClassError: The table has no column that Moodle knows people by.
+    """
+    by_name = {name.strip().casefold(): name for name in users.header}
+    column = next((name for name in MOODLE_COLUMNS if name.casefold() in by_name), None)
+    if column is None:
+        found = listed([shown(name, 30) for name in users.header[:6]], "and")
+        raise ClassError(f"{users.path}:1: expected a column {listed(MOODLE_COLUMNS)}, found {found}")
+    rows: list[list[str]] = []
+    left_out: list[str] = []
+    for row in _counted(book, left_out):
+        found_row = _user(row, users)
+        value = "" if found_row is None else found_row[by_name[column.casefold()]].strip()
+        if not value:
+            left_out.append(f"{row.shown_name}: nobody with this name, address or number in {users.path.name}")
+        elif text_cell(value) != value:
+            left_out.append(f"{row.shown_name}: {column} looks like a formula of a spreadsheet")
+        else:
+            rows.append([value, number(row.adjusted.score), text_cell(html.escape(feedback(row), quote=False))])
+    return Export({"moodle.csv": table([column, "Grade", "Feedback"], rows)}, tuple(map(_line, left_out)))
+
+
+def export_gradescope(book: Classbook, results: Mapping[str, str]) -> Export:
+    """Return one results.json for each submission, as an autograder leaves it, and a table of all scores.
+
+    Args:
+        book: The class.
+        results: Name of an entry -> the results.json of its report.
+    """
+    files: dict[str, str] = {}
+    rows: list[list[str]] = []
+    left_out: list[str] = []
+    for row in _counted(book, left_out):
+        person = row.person or Person(row.label)
+        texts = [text_cell(text) for text in (person.name, person.id, person.email)]
+        rows.append([*texts, number(row.adjusted.score), number(row.max_score), "Graded"])
+        if row.name in results:
+            files[f"gradescope/{row.name}/results.json"] = _decided(results[row.name], row)
+    return Export({"gradescope.csv": table(GRADESCOPE_COLUMNS, rows), **files}, tuple(map(_line, left_out)))
+
+
+def feedback(row: Row) -> str:
+    """Return what a student is told in one line: the score, what was decided, and each lost point with its reason.
+
+    The score is the mark, which the platform shows as well; reasons are those that students may see.
+    """
+    parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points." if row.report else ""]
+    parts.append(_decision(row))
+    parts += [
+        _lost(criterion)
+        for exercise in (row.handed_back or _NOTHING)["exercises"]
+        for criterion in exercise["criteria"]
+    ]
+    return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
+
+
+_NOTHING: ReportData = {"exercises": ()}
+
+
+def _decision(row: Row) -> str:
+    """Say what stands between the raw score and the one that counts; empty if nothing does."""
+    adjusted = row.adjusted
+    if adjusted.override is not None:
+        raw = f" instead of {number(adjusted.raw)}" if adjusted.raw is not None else ""
+        return f"The score was set to {number(adjusted.override)}{raw}: {adjusted.reason}."
+    if adjusted.penalty:
+        days = number(adjusted.days_late)
+        return f"{number(adjusted.raw)} points, less {number(adjusted.penalty)} for {days} days late."
+    return ""
+
+
+def _lost(criterion: Mapping[str, Any]) -> str:
+    if criterion["outcome"] == "met":
+        return ""
+    points = f"{number(criterion['score'])}/{number(criterion['max_score'])}"
+    return f"[{points}] {criterion['title']}: {criterion['reason']}"
+
+
+def _counted(book: Classbook, left_out: list[str]) -> Sequence[Row]:
+    """Return the rows to export; name everybody else who handed something in."""
+    to_export = book.to_export
+    chosen = {id(row) for row in to_export}
+    for row in book.rows:
+        if id(row) in chosen or row.adjusted.ignored or not row.name:
+            continue
+        if row.person is None:
+            why = "nobody on the roster goes with it for sure"
+        elif row.adjusted.score is None:
+            why = f"no score: {row.status.value}"
+        else:
+            why = f"the same person as {', '.join(row.twin_of)}; say which one to `ignore`"
+        left_out.append(f"{row.name}: {why}")
+    return to_export
+
+
+def _canvas_title(assignment: str, gradebook: Users | None) -> str:
+    """Return the header of the assignment's column, which Canvas knows by the number in parentheses."""
+    number_ = re.fullmatch(r"(?:.*\()?(\d+)\)?", assignment.strip(), re.DOTALL)
+    if number_ is None:
+        hint = "open the assignment in Canvas: the number is at the end of its address"
+        raise ClassError(f"--canvas: expected an assignment's number, found {shown(assignment)}", hint)
+    if gradebook is None:
+        return assignment.strip() if "(" in assignment else f"Assignment ({number_[1]})"
+    title = next((name for name in gradebook.header if name.rstrip().endswith(f"({number_[1]})")), None)
+    if title is None:
+        raise ClassError(f"{gradebook.path}:1: expected a column that ends in ({number_[1]}), found none")
+    return title
+
+
+def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
+    """Return a row of Canvas' gradebook for somebody; without one, what the roster says of Canvas."""
+    if gradebook is not None:
+        return _user(row, gradebook)
+    person = row.person
+    return person.row if person is not None else None
+
+
+def _user(row: Row, users: Users) -> Mapping[str, str] | None:
+    """Return the only row of a table that is of somebody, by what is sure and then by name; None if none is."""
+    columns = columns_of(users.header)
+    person = row.person
+    if person is None:
+        return None
+    handles = person.handles | {fold_handle(t) for t in (person.user, person.email, person.id) if t}
+    exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
+    found = [r for r in users.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
+    if not found:
+        found = [r for r in users.rows if _named(r, columns) & person.names]
+    return found[0] if len(found) == 1 else None
+
+
+def _named(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> frozenset[str]:
+    return person_of(row, columns).names
+
+
+def _possible(gradebook: Users | None, title: str) -> str:
+    """Return the points that an assignment has in Canvas; empty if that is not known."""
+    for row in gradebook.rows if gradebook is not None else ():
+        if next(iter(row.values())).strip().casefold() == _POSSIBLE:
+            return row[title].strip()
+    return ""
+
+
+def _decided(results: str, row: Row) -> str:
+    """Return a results.json with the score that counts, and the raw one beside it."""
+    data = json.loads(results)
+    if row.adjusted.changed:
+        data["extra_data"]["raw_score"] = data["score"]
+        data["score"] = float(row.adjusted.score or 0)
+        data["output"] = f"{safe(_decision(row), limit=600)}\n{data['output']}"
+    return json_text(data)
+
+
+def _line(text: str) -> str:
+    return safe(text, limit=300)

@@ -1,0 +1,156 @@
+"""The process that grades one submission of a class: reads a task, leaves results in a folder, says how it ended."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import date
+from typing import Any
+
+import msgspec
+
+from grader.app.evidence_writer import Keeper
+from grader.app.grade import Progress, grade
+from grader.app.request import Request
+from grader.classroom import store as kept
+from grader.classroom.cache_key import Conditions, unusable_digest
+from grader.classroom.local import Task
+from grader.classroom.messages import read_collected
+from grader.classroom.store import Standing, State
+from grader.core.errors import GraderError, SubmissionError
+from grader.core.report import Report, Reproduction
+from grader.reporting.audience import for_student
+from grader.reporting.delivery import write_whole
+from grader.reporting.html.render import render_html
+from grader.reporting.json_report import dumps
+from grader.reporting.platforms.gradescope import render_gradescope
+from grader.rubrics.variants import Recorded
+
+REPORT, PAGE, EVIDENCE = "report.json", "report.html", "evidence"
+#: What students may be given: what the rubric lets them see on the day of grading.
+HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE = "feedback.json", "feedback.html", "gradescope.json"
+#: All that a result consists of.
+PARTS = (REPORT, PAGE, EVIDENCE, HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE)
+#: Where a page in `students/NAME/` finds the files that all pages share.
+ASSETS = "../../assets"
+_SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
+
+
+def main() -> None:
+    """Grade the task on standard input; one JSON object a line on standard output tells steps, the last one the end."""
+    ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    request = json.loads(sys.stdin.buffer.readline())
+    if os.getppid() != request["parent"]:  # it ended before the system was asked to tell
+        return
+    os.chdir(request["folder"])
+    task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
+    standing = attempt(task, _step)
+    _say({"done": json.loads(kept.dump(standing))})
+
+
+def attempt(task: Task, progress: Progress) -> Standing:
+    """Grade a submission, write what came of it, and return how it stands; never raises for anything in it."""
+    started = time.perf_counter()
+    try:
+        standing = _graded(task, progress)
+    except SubmissionError as error:
+        standing = _without_report(task, State.REFUSED, error.message, error.hint, unusable_digest(error))
+    except GraderError as error:
+        standing = _without_report(task, State.FAILED, error.message, error.hint)
+    except OSError as error:
+        standing = _without_report(task, State.FAILED, f"the result cannot be written: {error.strerror}")
+    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+        standing = _without_report(task, State.FAILED, f"the grader failed: {type(error).__name__}: {error}")
+    return replace(standing, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
+
+
+def _graded(task: Task, progress: Progress) -> Standing:
+    conditions, own = task.conditions, task.conditions.variants
+    request = Request(
+        submission=str(task.submission),
+        exercises=task.exercises,
+        every=conditions.every,
+        rubrics=task.rubrics,
+        seed=conditions.seed,
+        odom_bag=task.odom_bag,
+        clock=conditions.clock,
+        isolation=conditions.isolation,
+        time_budget_s=conditions.time_budget_s,
+        spot_checks=conditions.spot_checks,
+        workers=task.workers,
+        collected=None if task.collected is None else read_collected(task.collected.read_bytes()),
+        student=own.student if own is not None else "",
+        variant_key=task.variant_key if own is not None else None,
+        draw=Recorded(own) if own is not None else None,
+    )
+    task.into.mkdir()
+    keeper = Keeper([task.into / EVIDENCE], request)
+    report = grade(request, progress, keeper.hear)
+    progress("writing the results")
+    today = date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+    for name, text in _files(report, task, today).items():
+        write_whole(task.into / name, text.encode())
+    keeper.write(report)
+    key = _used(conditions, report.reproduce).key(report.digest)
+    return Standing(
+        state=State.GRADED if report.final else State.UNDECIDED,
+        key=key,
+        digest=report.digest,
+        label=task.label,
+        score=float(report.score),
+        max_score=float(report.max_score),
+    )
+
+
+def _used(conditions: Conditions, given: Reproduction) -> Conditions:
+    """Return the conditions with what was really read; of what a submission has no file of, as it was found before."""
+    if not conditions.every:
+        return replace(conditions, rubrics=given.rubrics, recording=given.recording)
+    read = dict(given.rubrics)
+    rubrics = tuple((id_, read.get(id_, digest)) for id_, digest in conditions.rubrics)
+    return replace(conditions, rubrics=rubrics, recording=given.recording or conditions.recording)
+
+
+def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
+    assets = None if task.standalone else ASSETS
+    page, seen = render_html(report, assets=assets), for_student(report, today)
+    return {
+        REPORT: dumps(report),
+        PAGE: page,
+        HANDED_BACK: dumps(seen),
+        HANDED_BACK_PAGE: page if seen is report else render_html(seen, assets=assets),
+        GRADESCOPE: render_gradescope(report, day=today),
+    }
+
+
+def _without_report(task: Task, state: State, problem: str, hint: str = "", digest: str = "") -> Standing:
+    return Standing(state, task.conditions.key(digest) if digest else "", digest, task.label, problem, hint)
+
+
+def _usage() -> dict[str, float]:
+    """Return what this process and all that it started have cost so far."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
+        "peak_bytes": 1024 * max(u.ru_maxrss for u in used),
+    }
+
+
+def _step(step: str) -> None:
+    _say({"step": step})
+
+
+def _say(message: Mapping[str, Any]) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

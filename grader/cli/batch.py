@@ -1,0 +1,193 @@
+"""The command `grade batch`: grade a whole class."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from grader.app.exit_codes import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
+from grader.classroom.cluster.worker_pool import require_dask
+from grader.cli.options import PATH, drawn_with, parse_share, time_budget_option
+from grader.core.checkup import TIERS
+from grader.reporting.escape import encoded, shown
+from grader.similarity.library import require_library
+
+if TYPE_CHECKING:
+    from grader.classroom.local import MakeScheduler
+    from grader.classroom.summary import Graded
+
+_LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
+_RERUNS = ("changed", "failed", "undecided", "all")
+
+
+@click.command(name="batch")
+@click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
+@click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
+@click.option("--pattern", default="", metavar="REGEX", help="Names, with groups name, user, email, id, late, file.")
+@click.option("--roster", type=PATH, metavar="CSV", help="The people of the class, as any platform exports them.")
+@click.option("--adjust", "adjustments", type=PATH, metavar="YAML", help="Late days, other scores, what to ignore.")
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Submissions at a time; by default one a core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Grade on the Dask cluster of this scheduler, or scheduler file.")
+@click.option("--rerun", type=click.Choice(_RERUNS), default="changed", help="What is graded again besides the new.")
+@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which a student has a file.")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw everybody's values from N.")
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
+@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for one submission.")
+@click.option("--isolation", type=click.Choice(["auto", *TIERS]), default="auto", help="As for one submission.")
+@time_budget_option
+@click.option(
+    "--spot-checks",
+    metavar="P%",
+    default="5%",
+    show_default=True,
+    callback=parse_share,
+    help="Share of the class that is drawn and checked on the wall clock as well.",
+)
+@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key; whose variant it is, the roster says.")
+@click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
+@click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
+@click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
+@click.option("--moodle", type=PATH, metavar="CSV", help="Write moodle.csv for the users in this export of Moodle.")
+@click.option("--gradescope", is_flag=True, help="Write gradescope.csv, and results.json for each submission.")
+@click.option("--similarity", is_flag=True, help="List submissions that are alike; no score depends on it.")
+@click.option(
+    "--template",
+    "templates",
+    type=PATH,
+    metavar="FOLDER",
+    multiple=True,
+    help="What students were given, taken out before comparing; repeatable; by default the project's own templates.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the class as JSON, and nothing else.")
+@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+def command(  # noqa: PLR0913  one parameter an option
+    *,
+    sources: tuple[Path, ...],
+    results: Path,
+    layout: str,
+    pattern: str,
+    roster: Path | None,
+    adjustments: Path | None,
+    jobs: int | None,
+    scheduler: str | None,
+    rerun: str,
+    exercises: tuple[str, ...],
+    every: bool,
+    rubrics: tuple[Path, ...],
+    seed: int | None,
+    seed_key: Path | None,
+    odom_bag: Path | None,
+    clock: str,
+    isolation: str,
+    time_budget_s: float,
+    spot_checks: float,
+    variant_key: Path | None,
+    standalone: bool,
+    canvas: str | None,
+    canvas_gradebook: Path | None,
+    moodle: Path | None,
+    gradescope: bool,
+    similarity: bool,
+    templates: tuple[Path, ...],
+    as_json: bool,
+    no_progress: bool,
+) -> int:
+    """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
+
+    The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
+    what was undecided, or all.
+
+    Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
+    used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
+    """
+    if scheduler is not None:
+        require_dask()
+    if similarity:
+        require_library()
+    from grader.app.request import Request  # noqa: PLC0415  as above
+    from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
+    from grader.classroom.outputs import platforms  # noqa: PLC0415  as above
+    from grader.classroom.request import Course  # noqa: PLC0415  as above
+    from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
+    from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
+    from grader.similarity.finding import read_given  # noqa: PLC0415  as above
+
+    if canvas_gradebook is not None and canvas is None:
+        raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
+    if templates and not similarity:
+        raise click.BadParameter("--template needs --similarity")
+    course = Course(
+        sources=sources,
+        results=results,
+        layout=layout,
+        pattern=pattern,
+        roster=roster,
+        adjustments=adjustments,
+        grading=Request(
+            "",
+            exercises=tuple(dict.fromkeys(exercises)),
+            every=every,
+            rubrics=rubrics,
+            seed=seed,
+            odom_bag=odom_bag,
+            clock=clock,
+            isolation=isolation,
+            time_budget_s=time_budget_s,
+            spot_checks=spot_checks,
+            variant_key=variant_key,
+        ),
+        jobs=jobs,
+        rerun=rerun,
+        seed_key=drawn_with(seed, seed_key),
+        standalone=standalone,
+        platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
+        given=read_given(templates or (shipped_templates(),)) if similarity else None,
+    )
+    try:
+        with _graders(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
+            graded = grade_class(course, watcher, _warn, make)
+    except KeyboardInterrupt:
+        click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
+        return INTERRUPTED
+    _print(graded, as_json=as_json)
+    return _code(graded)
+
+
+def _graders(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
+    """Return what grades: this machine, or a cluster for as long as it is needed."""
+    if scheduler is None:
+        from grader.classroom.local import LocalScheduler  # noqa: PLC0415  as above
+
+        return nullcontext(LocalScheduler)
+    from grader.classroom.cluster.dispatcher import connected  # noqa: PLC0415  an optional library
+
+    return connected(scheduler, jobs, _warn)
+
+
+def _print(graded: Graded, *, as_json: bool) -> None:
+    from grader.classroom.summary import render_summary, summary_json  # noqa: PLC0415  as above
+
+    text = summary_json(graded) if as_json else render_summary(graded)
+    sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))
+    sys.stdout.flush()
+
+
+def _code(graded: Graded) -> int:
+    """Return the exit code: what is ours or the machine's comes first, then what a student must mend."""
+    from grader.classroom.gradebook import Status  # noqa: PLC0415  as above
+
+    if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
+        return UNDECIDED
+    return NOT_ALL_MET if graded.book.count(Status.REFUSED) else ALL_MET
+
+
+def _warn(line: str) -> None:
+    click.echo(f"warning: {shown(line)}", err=True)

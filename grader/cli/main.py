@@ -1,0 +1,285 @@
+"""The command line: what is asked for, what is printed where, and the exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+import grader
+from grader.app.exit_codes import ALL_MET, INTERRUPTED, UNDECIDED, UNUSABLE, exit_code
+from grader.app.progress import shown_progress
+from grader.cli import batch, doctor, explain, export, rejudge, rubric, selftest
+from grader.cli.options import (
+    EVIDENCE,
+    PATH,
+    audience_options,
+    drawn_by,
+    drawn_with,
+    parse_outputs,
+    parse_percent,
+    parse_share,
+    readers,
+    time_budget_option,
+)
+from grader.core.checkup import TIERS, missing
+from grader.core.errors import GraderError, HarnessError, RubricError
+from grader.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.reporting.escape import encoded, shown
+from grader.reporting.formats import FORMATS
+
+_EPILOG = (
+    "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
+    "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
+)
+_TIERS = ("auto", *TIERS)
+# Stands for "no subcommand was named"; no argument of a process can hold a NUL.
+_EVERYDAY = "\0"
+
+
+class CommandLine(click.Group):
+    """Subcommands, and the everyday command that runs when the first argument names none of them."""
+
+    def __init__(self, everyday: click.Command, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.everyday = everyday
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Mark the arguments that no subcommand claims."""
+        named = bool(args) and args[0] in self.commands
+        return super().parse_args(ctx, args if named else [_EVERYDAY, *args])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command to run, its name and its arguments."""
+        if args[0] == _EVERYDAY:
+            return None, self.everyday, args[1:]
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> None:
+        """Run the command and leave with its exit code; every problem becomes a line on standard error."""
+        ctx.exit(_guarded(lambda: super(CommandLine, self).invoke(ctx)))
+
+    def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Describe the everyday command, then the others."""
+        formatter.write_usage(ctx.command_path, "[OPTIONS] SUBMISSION")
+        self.everyday.format_help_text(ctx, formatter)
+        self.everyday.format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
+        self.everyday.format_epilog(ctx, formatter)
+
+
+class _Everyday(click.Command):
+    def get_help(self, ctx: click.Context) -> str:
+        return ctx.parent.get_help() if ctx.parent else super().get_help(ctx)
+
+
+@click.command(cls=_Everyday, epilog=_EPILOG)
+@click.argument("submission")
+@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
+@click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draw values from N, as a report names it.")
+@click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key and the files handed in.")
+@click.option("--odom-bag", type=PATH, help="Play this /odom recording, not the built-in one.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON, and nothing else.")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FORMAT=PATH",
+    multiple=True,
+    callback=parse_outputs,
+    help=f"Write a report ({', '.join(FORMATS)}), `-` is standard output; or keep evidence=FOLDER; repeatable.",
+)
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option(
+    "--min-score",
+    type=float,
+    metavar="P",
+    callback=parse_percent,
+    help="Exit with 0 if the score is at least P percent.",
+)
+@click.option(
+    "--clock",
+    type=click.Choice(["virtual", "wall", "auto"]),
+    default="auto",
+    help="The clock of the student's nodes; auto: virtual, and wall where that cannot hold.",
+)
+@click.option(
+    "--isolation",
+    type=click.Choice(_TIERS),
+    default="auto",
+    help="auto: the strongest sandbox that holds here; none: run the student's code without one.",
+)
+@time_budget_option
+@click.option(
+    "--spot-checks",
+    metavar="P%",
+    default="0%",
+    show_default=True,
+    callback=parse_share,
+    help="Share of submissions that are drawn and checked on the wall clock as well.",
+)
+@click.option("--student", metavar="ID", default="", help="Grade by the variant of this student; see --variant-key.")
+@click.option("--variant-key", type=PATH, metavar="FILE", help="The course key that rubrics draw variants from.")
+@audience_options
+@click.option("--no-progress", is_flag=True, help="Say nothing while grading.")
+@click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
+def _grade(  # noqa: PLR0913  one parameter an option
+    *,
+    submission: str,
+    exercises: tuple[str, ...],
+    every: bool,
+    seed: int | None,
+    seed_key: Path | None,
+    odom_bag: Path | None,
+    as_json: bool,
+    outputs: tuple[Output, ...],
+    rubrics: tuple[Path, ...],
+    min_score: Fraction | None,
+    clock: str,
+    isolation: str,
+    time_budget_s: float,
+    spot_checks: float,
+    student: str,
+    variant_key: Path | None,
+    audience: str | None,
+    as_of: str,
+    no_progress: bool,
+) -> int:
+    """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
+
+    A folder with the name of a command is graded as ./NAME.
+    """
+    rendered = tuple(output for output in outputs if output.format != EVIDENCE)
+    wanted = prepared((*rendered, Output("json")) if as_json else rendered)
+    for_whom = readers(audience, as_of)
+    from grader.app import (  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+        evidence_writer,
+        grade,
+    )
+    from grader.app.request import Request  # noqa: PLC0415  as above
+    from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
+    from grader.reporting.audience import told  # noqa: PLC0415  as above
+
+    key = drawn_with(seed, seed_key)
+    request = Request(
+        submission=submission,
+        exercises=tuple(dict.fromkeys(exercises)),
+        every=every,
+        rubrics=rubrics,
+        seed=seed,
+        seed_key=key or PRACTICE,
+        odom_bag=odom_bag,
+        clock=clock,
+        isolation=isolation,
+        time_budget_s=time_budget_s,
+        spot_checks=spot_checks,
+        student=student.strip(),
+        variant_key=variant_key,
+        draw=drawn_by(student, variant_key),
+    )
+    folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
+    keeper = evidence_writer.Keeper(folders, request)
+    pictures = any(FORMATS[output.format].illustrated for output in wanted)
+    with shown_progress(wanted=not no_progress) as progress:
+        report = grade.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
+    for found in missing(report.environment.containment):
+        _warn(f"sandbox {report.environment.isolation}: {found}")
+    if report.environment.ros_distro not in grade.TRIED_ON:
+        _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
+    deliver(report, wanted, for_whom)
+    seen = told(report, for_whom)
+    if folders and seen is not report:
+        _warn("the evidence is not kept: it holds what the rubric withholds from students")
+    else:
+        keeper.write(report)
+    return exit_code(seen, min_score)
+
+
+@click.command(name="observe")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.option("--duration", type=click.FloatRange(0.1, 600), default=10.0, show_default=True, help="Seconds observed.")
+@click.option("--odom-bag", type=PATH, metavar="PATH", help="A recording to play on /odom from the first second on.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(_TIERS), default="auto", help="As for grading.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on standard output.")
+def _observe(  # noqa: PLR0913  one parameter an option
+    *, files: tuple[Path, ...], duration: float, odom_bag: Path | None, clock: str, isolation: str, as_json: bool
+) -> int:
+    """Run nodes together, without a rubric, and say what they do.
+
+    Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
+    """
+    from grader.app import observe  # noqa: PLC0415  as for grading
+    from grader.reporting.observed import render_summary, summary_to_json  # noqa: PLC0415
+
+    request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
+    with shown_progress(wanted=True) as progress:
+        summary = observe.observe(request, progress)
+    text = summary_to_json(summary) if as_json else render_summary(summary)
+    sys.stdout.buffer.write(encoded(text, sys.stdout.encoding or "utf-8"))
+    sys.stdout.flush()
+    return ALL_MET
+
+
+#: The command `grade`; further subcommands are added to it.
+app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
+_grade.context_settings = app.context_settings
+app.add_command(_observe)
+app.add_command(rejudge.command)
+app.add_command(batch.command)
+app.add_command(explain.command)
+app.add_command(doctor.command)
+app.add_command(export.command)
+app.add_command(rubric.command)
+app.add_command(selftest.command)
+
+
+def main() -> None:
+    """Run the command line of this process, and exit."""
+    app(prog_name="grade")
+
+
+def _guarded(run: Callable[[], object]) -> int:
+    """Return the exit code of a command, whatever becomes of it."""
+    try:
+        code = run()
+    except click.exceptions.Exit:
+        raise
+    except click.ClickException as error:
+        _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
+        return UNUSABLE
+    except GraderError as error:
+        # A rubric may have several mistakes, one a line; in any other message a line break comes from a hostile name.
+        lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
+        _complain(*lines, hint=error.hint)
+        return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted: no report was made", err=True)
+        return INTERRUPTED
+    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+        if os.environ.get("GRADER_DEBUG") == "1":
+            traceback.print_exc()
+        _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
+        return UNDECIDED
+    return code if isinstance(code, int) else ALL_MET
+
+
+def _complain(*lines: str, hint: str) -> None:
+    for line in lines:
+        click.echo(f"error: {shown(line)}", err=True)
+    if hint:
+        click.echo(f"hint: {shown(hint)}", err=True)
+
+
+def _warn(*lines: str) -> None:
+    for line in lines:
+        click.echo(f"warning: {shown(line)}", err=True)

@@ -1,0 +1,145 @@
+"""What the commands of the command line share: how options are read, and which files they name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from datetime import date
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from grader.core.exercise import Audience
+from grader.core.limits import TIME_BUDGET_S
+from grader.reporting.audience import Readers
+from grader.reporting.delivery import Output
+from grader.reporting.formats import FORMATS
+
+if TYPE_CHECKING:
+    from grader.app.seeds import SeedKey
+    from grader.app.variants import ByKey
+
+#: What `-o` calls the folder of recordings that a report rests on.
+EVIDENCE = "evidence"
+PATH = click.Path(path_type=Path)
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+#: How long all recordings of one submission may take together, in seconds.
+time_budget_option = click.option(
+    "--time-budget",
+    "time_budget_s",
+    type=click.FloatRange(min=1),
+    default=TIME_BUDGET_S,
+    show_default=True,
+    metavar="SECONDS",
+    help="Real time that the recordings of one submission may take together; what is left then is not met.",
+)
+
+
+def audience_options(command: _Command) -> _Command:
+    """Add the options that say who reads the reports, and when."""
+    day = click.option(
+        "--as-of",
+        metavar="DATE",
+        callback=_parse_day,
+        help="Show students what a rubric lets them see on this day, as 2026-12-01; by default today.",
+    )
+    audience = click.option(
+        "--audience",
+        type=click.Choice([audience.value for audience in Audience]),
+        help="Who reads all reports; by default students read those for platforms, and instructors the others.",
+    )
+    return audience(day(command))
+
+
+def readers(audience: str | None, day: str) -> Readers:
+    """Return who reads the reports, as the options of `audience_options` say."""
+    return Readers(None if audience is None else Audience(audience), day)
+
+
+def drawn_by(student: str, key: Path | None) -> ByKey | None:
+    """Return what draws a student's variants; None if neither option is given.
+
+    Raises:
+        GraderError: The key or the id cannot be used.
+    """
+    if not student and key is None:
+        return None
+    if key is None or not student:
+        raise click.BadParameter("--student and --variant-key need each other")
+    from grader.app.variants import by_key  # noqa: PLC0415  reading, which --help does not need
+
+    return by_key(key, student)
+
+
+def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
+    """Return the key that drawn values follow from; None if none is given, or a seed that needs none.
+
+    Raises:
+        KeyFileError: The key cannot be used.
+    """
+    if seed is not None and path is not None:
+        raise click.BadParameter("--seed and --seed-key exclude each other: a seed needs no key")
+    from grader.app.seeds import seed_key  # noqa: PLC0415  reading, which --help does not need
+
+    return seed_key(path)
+
+
+def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
+    del ctx, param
+    if value is None:
+        return date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+    try:
+        if date.fromisoformat(value).isoformat() == value:
+            return value
+    except ValueError:
+        pass
+    raise click.BadParameter(f"expected a date such as 2026-12-01, found {value!r}")
+
+
+def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
+    """Return what `-o FORMAT=PATH` asks for; for click."""
+    del ctx, param
+    return tuple(_parse_output(value) for value in values)
+
+
+def _parse_output(value: str) -> Output:
+    format_, equals, path = value.partition("=")
+    if not equals or not path:
+        raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}")
+    if format_ not in (*FORMATS, EVIDENCE):
+        raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
+    if format_ == EVIDENCE and path == "-":
+        raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
+    return Output(format_, None if path == "-" else Path(path))
+
+
+def parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
+    """Return what `--min-score P` asks for; for click."""
+    del ctx, param
+    if value is None:
+        return None
+    if not 0 <= value <= 100:  # NaN loses
+        raise click.BadParameter(f"expected 0 to 100, found {value}")
+    return Fraction(str(value))
+
+
+def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
+    """Return what `--spot-checks 5%` asks for, from 0 to 1; for click."""
+    del ctx, param
+    try:
+        percent = float(value.removesuffix("%"))
+    except ValueError:
+        percent = -1.0
+    if not 0 <= percent <= 100:  # NaN loses
+        raise click.BadParameter(f"expected a share from 0% to 100%, found {value!r}")
+    return percent / 100
+
+
+def nearest(found: str, known: Sequence[str]) -> str:
+    """Return the end of a sentence that names what was probably meant, or all there is."""
+    near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
+    return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"

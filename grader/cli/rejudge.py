@@ -1,0 +1,120 @@
+"""The command `grade rejudge`: judge kept evidence again, without running anything."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from grader.app.exit_codes import exit_code
+from grader.cli.options import EVIDENCE, PATH, audience_options, parse_outputs, parse_percent, readers
+from grader.reporting.delivery import Output, deliver, prepared, show
+from grader.reporting.formats import FORMATS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from grader.app.rejudge import Judgement, Wanted
+    from grader.reporting.audience import Readers
+
+
+@click.command(name="rejudge")
+@click.argument("evidence", metavar="EVIDENCE...", nargs=-1, required=True, type=PATH)
+@click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Judge only this exercise; repeatable.")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="FORMAT=PATH",
+    multiple=True,
+    callback=parse_outputs,
+    help=f"Write a report ({', '.join(FORMATS)}); of a class, one file a submission in the folder PATH; repeatable.",
+)
+@click.option(
+    "--min-score",
+    type=float,
+    metavar="P",
+    callback=parse_percent,
+    help="Exit with 0 if every score is at least P percent.",
+)
+@click.option("--diff", "show_changes", is_flag=True, help="Print what changed since grading, dropped marks first.")
+@click.option("--verify", is_flag=True, help="Make sure that recordings show what is judged; slower.")
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes for a class; by default one a core.")
+@audience_options
+def command(  # noqa: PLR0913  one parameter an option
+    *,
+    evidence: tuple[Path, ...],
+    exercises: tuple[str, ...],
+    rubrics: tuple[Path, ...],
+    as_json: bool,
+    outputs: tuple[Output, ...],
+    min_score: Fraction | None,
+    show_changes: bool,
+    verify: bool,
+    jobs: int | None,
+    audience: str | None,
+    as_of: str,
+) -> int:
+    """Judge kept EVIDENCE again, of one submission or of a whole class, without running anything.
+
+    EVIDENCE is a folder that `grade SUBMISSION -o evidence=FOLDER` kept, or one that holds many of them. The same
+    rubric gives the same report; a changed one gives new scores.
+
+    Exit codes are those of grading; 2 also where a part of a class had to be refused.
+    """
+    from grader.app import rejudge  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+    from grader.execution.evidence.store import is_evidence  # noqa: PLC0415
+
+    if any(output.format == EVIDENCE for output in outputs):
+        raise click.BadParameter("evidence is kept while grading, not while judging again")
+    for_whom = readers(audience, as_of)
+    if show_changes and for_whom.only_students:
+        raise click.BadParameter("--diff tells reasons as they are: it is for instructors")
+    how = rejudge.judgement(
+        tuple(dict.fromkeys(exercises)),
+        rubrics,
+        pictures=any(FORMATS[output.format].illustrated for output in outputs),
+        verify=verify,
+    )
+    one = len(evidence) == 1 and is_evidence(evidence[0])
+    if one and not show_changes:
+        return _one(evidence[0], how, (*outputs, Output("json")) if as_json else outputs, min_score, for_whom)
+    wanted = rejudge.Wanted(
+        tuple(outputs),
+        reports=as_json and not show_changes,
+        changes=show_changes,
+        min_score=min_score,
+        readers=for_whom,
+    )
+    return _class(evidence, how, wanted, as_json=as_json, jobs=jobs)
+
+
+def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
+    """Deliver the report of one submission as grading does."""
+    from grader.app import rejudge  # noqa: PLC0415  as above
+    from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
+    from grader.reporting.audience import told  # noqa: PLC0415
+
+    wanted = prepared(outputs)
+    report = rejudge.rejudge(open_evidence(folder), how)
+    deliver(report, wanted, for_whom)
+    return exit_code(told(report, for_whom), min_score)
+
+
+def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None) -> int:
+    """Print what became of every submission, and write one file for each of them and each format."""
+    from grader.app import rejudge  # noqa: PLC0415  as above
+    from grader.reporting.rejudged import render_changes, render_results, results_to_json  # noqa: PLC0415  as above
+
+    if any(output.path is None for output in wanted.files):
+        raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
+    results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
+    if as_json:
+        show(lambda _: results_to_json(results, changes=wanted.changes), for_people=False)
+    else:
+        show(lambda _: render_changes(results) if wanted.changes else render_results(results), for_people=True)
+    return next(rejudge.codes(results))

@@ -1,0 +1,149 @@
+"""The commands `grade rubric ...`: what authors of rubrics need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from grader.app.exit_codes import ALL_MET, UNUSABLE
+from grader.app.progress import shown_progress
+from grader.cli.options import PATH
+from grader.core.checkup import TIERS
+from grader.core.errors import GraderError, RubricError
+from grader.reporting.delivery import show, write_whole
+from grader.reporting.escape import shown
+
+
+@click.group(name="rubric")
+def command() -> None:
+    """Write, check and explain rubrics."""
+
+
+@command.command(name="check")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+def _check(*, files: tuple[Path, ...]) -> int:
+    """Say whether rubrics can be used, with line and column of every mistake, and what is odd about them.
+
+    Exit code 2 if one of them cannot be used; what is merely odd is a warning.
+    """
+    from grader.authoring.checking import check_rubric, complaints  # noqa: PLC0415  reading, which --help does not need
+
+    code = ALL_MET
+    for path in files:
+        try:
+            checked = check_rubric(path)
+        except RubricError as error:
+            code = UNUSABLE
+            for line in complaints(error):
+                click.echo(shown(line), err=True)
+            continue
+        for warning in checked.warnings:
+            click.echo(f"warning: {shown(warning)}", err=True)
+        click.echo(shown(checked.summary))
+    return code
+
+
+@command.command(name="schema")
+@click.argument("rubric", metavar="[FILE]", required=False, type=PATH)
+def _schema(*, rubric: Path | None) -> int:
+    """Print the JSON Schema of rubrics, with which editors complete and check them.
+
+    That for a rubric FILE knows the checks of its own as well.
+    """
+    from grader.judging.checks import CHECKS  # noqa: PLC0415  as above
+    from grader.rubrics.loader import own_checks  # noqa: PLC0415
+    from grader.rubrics.schema import schema_text  # noqa: PLC0415
+
+    text = schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))})
+    show(lambda _: text, for_people=False)
+    return ALL_MET
+
+
+@command.command(name="variant")
+@click.argument("rubric", metavar="FILE", type=PATH)
+@click.option("--key-file", "key", type=PATH, metavar="KEY", required=True, help="The course key.")
+@click.option("--student", metavar="ID", required=True, help="Whose values; the same id as on the roster.")
+@click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
+def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
+    """Print the values that a rubric has for one student, for the task sheet."""
+    from grader.app.variants import sheet  # noqa: PLC0415
+    from grader.reporting.task_sheet import render_sheet, sheet_to_json  # noqa: PLC0415  as above
+
+    exercise = sheet(rubric, key, student)
+    show(lambda _: sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise), for_people=False)
+    return ALL_MET
+
+
+@command.command(name="explain")
+@click.argument("files", metavar="[FILE]...", nargs=-1, type=PATH)
+@click.option("--checks", "checks", is_flag=True, help="List the checks that rubrics can use, one line each.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
+    """Explain what each criterion of rubrics asks, in which situation, and how it is measured.
+
+    Without a FILE the rubrics that come with the grader are explained.
+    """
+    from grader.app.explain import explain_checks, explain_rubrics  # noqa: PLC0415  as above
+    from grader.reporting.explained import (  # noqa: PLC0415  as above
+        explanations_to_json,
+        list_checks,
+        render_explanations,
+    )
+
+    found = explain_checks(files) if checks else explain_rubrics(files)
+    if as_json:
+        show(lambda _: explanations_to_json(found), for_people=False)
+    elif checks:
+        show(lambda layout: list_checks(found, width=layout.width), for_people=True)
+    else:
+        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+    return ALL_MET
+
+
+@command.command(name="new")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, metavar="PATH", help="Write it there; by default it is printed.")
+@click.option("--id", "id_", default="", metavar="ID", help="Id of the exercise; by default made of the first file.")
+@click.option(
+    "--send", "sent", metavar="TOPIC={FIELD: VALUE}", multiple=True, help="A message to send to them; repeatable."
+)
+@click.option("--duration", type=click.FloatRange(4, 600), default=10.0, show_default=True, help="Seconds observed.")
+@click.option("--clock", type=click.Choice(["virtual", "wall", "auto"]), default="auto", help="As for grading.")
+@click.option("--isolation", type=click.Choice(("auto", *TIERS)), default="auto", help="As for grading.")
+def _new(  # noqa: PLR0913  one parameter an option
+    *,
+    files: tuple[Path, ...],
+    output: Path | None,
+    id_: str,
+    sent: tuple[str, ...],
+    duration: float,
+    clock: str,
+    isolation: str,
+) -> int:
+    """Run the FILEs of a reference solution, and write a rubric that asks for what they do.
+
+    It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
+    """
+    from grader.app.observe import ObserveRequest  # noqa: PLC0415
+    from grader.authoring.starting import new_rubric  # noqa: PLC0415  as above
+
+    if output is not None and output.exists():
+        raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
+    with shown_progress(wanted=True) as progress:
+        request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
+        skeleton = new_rubric(request, progress, id_=id_, sent=sent)
+    for remark in skeleton.remarks:
+        click.echo(f"warning: {shown(remark)}", err=True)
+    if output is None:
+        show(lambda _: skeleton.text, for_people=False)
+    else:
+        try:
+            write_whole(output, skeleton.text.encode())
+        except OSError as error:
+            raise GraderError(f"{output}: it cannot be written: {error.strerror or error}") from error
+        rows = "criterion" if skeleton.criteria == 1 else "criteria"
+        click.echo(
+            f"{shown(str(output))}: {skeleton.criteria} {rows}, all of them met; {skeleton.left_out} in comments"
+        )
+    return ALL_MET

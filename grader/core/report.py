@@ -1,0 +1,206 @@
+"""Reports: the judged result of a submission, ready to be shown; version 1 of the report format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from grader.core.chart import Excerpt, Figure
+from grader.core.checkup import Property
+from grader.core.exercise import Feedback, Location, Outcome, Problem, Variant
+from grader.core.trace import ClockKind, GraphSnapshot, Start
+
+SCHEMA = "grader/report/v1"
+#: How the reason of a criterion begins that waits for another one.
+NOT_JUDGED = "not judged: "
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What one criterion came to.
+
+    Attributes:
+        id: Criterion id.
+        title: Criterion title.
+        outcome: See Outcome.
+        score: Points earned.
+        max_score: Points to be had.
+        reason: One sentence, no markup.
+        hint: One thing to do; empty if there is none.
+        location: Place in the student's file.
+        evidence: Plain JSON values.
+        blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
+        missing_file: The missing file that both need, where that is why; empty otherwise.
+        same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
+        problem: What its check found wrong, for diagnosis; no report shows this.
+    """
+
+    id: str
+    title: str
+    outcome: Outcome
+    score: Fraction
+    max_score: Fraction
+    reason: str
+    hint: str = ""
+    location: Location | None = None
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    blocked_by: str = ""
+    missing_file: str = ""
+    same_cause_as: str = ""
+    problem: Problem | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedFault:
+    """A fault as the report shows it; `t_ns` since the start of its scenario, `frames` the student's own."""
+
+    kind: str
+    file: str
+    line: int
+    text: str
+    t_ns: int
+    scenario: str
+    frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ExerciseReport:
+    """One exercise's part of a report.
+
+    Attributes:
+        id: Exercise id.
+        number: Number in the chapter, as text.
+        title: Exercise title.
+        required: Whether the chapter requires it.
+        clock: The wall clock if any of its scenarios ran on it.
+        clock_reason: Why it was not the virtual one; empty if it was.
+        verdicts: In rubric order.
+        faults: In order of scenario and time.
+        notes: Sentences a reader must know.
+        graph: The live graph that the exercise is about, if one was recorded with all its processes.
+        figures: Pictures of what the nodes did; reports of plain text and data leave them out.
+        excerpts: The source around the places that verdicts and faults name.
+        expected: Criterion id -> what it asks for, in one phrase.
+        feedback: Criterion id -> how much of its result a student is shown; no report shows this.
+        situations: Criterion id -> scenario that it is judged on; no report shows this.
+        variant: The values that were this student's own; None if there are none.
+        starts: How each file was started; empty in reports on kept evidence of earlier versions.
+    """
+
+    id: str
+    number: str
+    title: str
+    required: bool
+    clock: ClockKind
+    clock_reason: str
+    verdicts: tuple[Verdict, ...]
+    faults: tuple[ReportedFault, ...] = ()
+    notes: tuple[str, ...] = ()
+    graph: GraphSnapshot | None = None
+    figures: tuple[Figure, ...] = ()
+    excerpts: tuple[Excerpt, ...] = ()
+    expected: Mapping[str, str] = field(default_factory=dict)
+    feedback: Mapping[str, Feedback] = field(default_factory=dict)
+    situations: Mapping[str, str] = field(default_factory=dict)
+    variant: Variant | None = None
+    starts: tuple[Start, ...] = ()
+
+    @property
+    def score(self) -> Fraction:
+        """Points earned."""
+        return sum((v.score for v in self.verdicts), Fraction(0))
+
+    @property
+    def max_score(self) -> Fraction:
+        """Points to be had."""
+        return sum((v.max_score for v in self.verdicts), Fraction(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """What a report was made with.
+
+    Attributes:
+        grader: Version of the grader.
+        ros_distro: ROS release.
+        rclpy: Version of rclpy.
+        rmw: The middleware.
+        python: Version of Python.
+        isolation: Name of the sandbox tier; `none` without walls.
+        containment: What the tier held back, as the self-test found it; empty without walls.
+    """
+
+    grader: str
+    ros_distro: str
+    rclpy: str
+    rmw: str
+    python: str
+    isolation: str
+    containment: tuple[Property, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What gives a report again, with the versions of its environment and its seed.
+
+    Attributes:
+        command: Its words, before a shell's quoting; empty if the report came from no command.
+        rubrics: Exercise id and digest of its rubric, in the order graded.
+        recording: Digest of the /odom recording that was played; empty if none was.
+    """
+
+    command: tuple[str, ...] = ()
+    rubrics: tuple[tuple[str, str], ...] = ()
+    recording: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The result of grading one submission.
+
+    Attributes:
+        name: Submission name.
+        path: Where it came from, as the user typed it.
+        digest: Submission digest.
+        environment: What it was made with.
+        seed: The seed of every drawn value, printed so that a run can be repeated; None where a reader is not told.
+        exercises: In the order graded.
+        duration_s: Wall time of the run; the only figure that differs between two runs.
+        notes: Sentences about the intake.
+        reproduce: What gives this report again.
+        pending: Ids of the exercises that were still to be graded when the report was made; their criteria are
+            undecided. Empty for a whole report.
+    """
+
+    name: str
+    path: str
+    digest: str
+    environment: Environment
+    seed: int | None
+    exercises: tuple[ExerciseReport, ...]
+    duration_s: float
+    notes: tuple[str, ...] = ()
+    reproduce: Reproduction = Reproduction()
+    pending: tuple[str, ...] = ()
+
+    @property
+    def score(self) -> Fraction:
+        """Points earned."""
+        return sum((e.score for e in self.exercises), Fraction(0))
+
+    @property
+    def max_score(self) -> Fraction:
+        """Points to be had."""
+        return sum((e.max_score for e in self.exercises), Fraction(0))
+
+    @property
+    def final(self) -> bool:
+        """Whether every criterion was decided."""
+        return all(v.outcome is not Outcome.UNDECIDED for e in self.exercises for v in e.verdicts)
+
+    @property
+    def all_met(self) -> bool:
+        """Whether every criterion is fully met."""
+        return all(v.outcome is Outcome.MET for e in self.exercises for v in e.verdicts)

@@ -1,0 +1,352 @@
+"""Scenarios: one simulated situation with its duration, stimuli and limits; no marks and no answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from grader.core.limits import Limits
+from grader.core.quantities import NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class TimeBetween:
+    """A time drawn from the seed: whole milliseconds in [low_ns, high_ns]."""
+
+    low_ns: int
+    high_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class CountBetween:
+    """A count drawn from the seed, in [low, high]."""
+
+    low: int
+    high: int
+
+
+Time = int | TimeBetween
+Count = int | CountBetween
+
+
+def shortest(time: Time) -> int:
+    """Return the least that a time may come to, in nanoseconds."""
+    return time.low_ns if isinstance(time, TimeBetween) else time
+
+
+def longest(time: Time) -> int:
+    """Return the most that a time may come to, in nanoseconds."""
+    return time.high_ns if isinstance(time, TimeBetween) else time
+
+
+def fewest(count: Count) -> int:
+    """Return the least that a count may come to."""
+    return count.low if isinstance(count, CountBetween) else count
+
+
+def most(count: Count) -> int:
+    """Return the most that a count may come to."""
+    return count.high if isinstance(count, CountBetween) else count
+
+
+@dataclass(frozen=True, slots=True)
+class InOrder:
+    """Cases that follow each other as they are written, wherever among others they come."""
+
+    items: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SomeOf:
+    """A drawn number of cases, each one of several kinds."""
+
+    items: tuple[Any, ...]
+    count: Count
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOrder:
+    """Cases in an order drawn from the seed, each of them present; those of a SomeOf are scattered among the others."""
+
+    items: tuple[Any, ...]
+
+
+def cases(items: tuple[Any, ...]) -> tuple[int, int]:
+    """Return how many cases a list of items comes to, the fewest and the most."""
+    each = [_cases(item) for item in items]
+    return sum(low for low, _ in each), sum(high for _, high in each)
+
+
+def _cases(item: Any) -> tuple[int, int]:
+    if isinstance(item, SomeOf):
+        return fewest(item.count), most(item.count)
+    return cases(item.items) if isinstance(item, (InOrder, AnyOrder)) else (1, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """How long a scenario is observed.
+
+    Attributes:
+        duration_ns: Observed time.
+        after_first_message_on: If set, observation starts with the first message on this topic.
+        wait_at_most_ns: How long that first message is waited for.
+    """
+
+    duration_ns: Time
+    after_first_message_on: str | None = None
+    wait_at_most_ns: int = 60 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class Between:
+    """A number drawn from the seed, uniform in [low, high]; whole if the student's type is."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class JustAbove:
+    """The limit plus the smallest step worth asking about in the student's type: 0.001, or 1 for whole numbers."""
+
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class JustBelow:
+    """The limit minus the smallest step worth asking about in the student's type: 0.001, or 1 for whole numbers."""
+
+    limit: float
+
+
+NumberSpec = float | Between | JustAbove | JustBelow
+#: A number, or several in an order of their own.
+NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
+
+
+@dataclass(frozen=True, slots=True)
+class NumberStream:
+    """A stimulus: numbers published on a topic, each held for a while, in the type that the student's node takes.
+
+    Attributes:
+        topic: Topic name, absolute.
+        type: Message type used while no subscription tells another, e.g. `std_msgs/msg/Float32`.
+        values: Numbers in order.
+        period_ns: Time between two messages.
+        hold_ns: How long each number is repeated; where that is drawn, for each number anew, the last one is repeated
+            until the end of an observation that begins with the scenario.
+        start_ns: Time of the first message since scenario start.
+    """
+
+    topic: str
+    type: str
+    values: tuple[NumberItem, ...]
+    period_ns: int
+    hold_ns: Time
+    start_ns: Time
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryStream:
+    """A stimulus: the recorded odometry, played with its own timing by a publisher that then disappears.
+
+    Attributes:
+        topic: Topic name, absolute.
+        start_ns: When the publisher appears and the first message is sent.
+        duration_ns: How much of the recording is played; which part is drawn from the seed.
+    """
+
+    topic: str
+    start_ns: Time
+    duration_ns: Time
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """One of several values, drawn from the seed."""
+
+    options: tuple[str | int | float | bool, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A text with a drawn number in place of `{}`: `Battery: {}% remaining`.
+
+    Attributes:
+        text: Holds `{}` once.
+        number: What is drawn.
+        decimals: How many decimals are written.
+    """
+
+    text: str
+    number: Between
+    decimals: int = 1
+
+
+#: What a field of a planned message may hold; mappings are nested messages, tuples are sequences. Mappings have no
+#: hash: stimuli that differ in nothing else share theirs, and are told apart by comparing them.
+FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
+#: The fields of one message, or of several in an order of their own.
+FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
+
+
+@dataclass(frozen=True, slots=True)
+class MessageStream:
+    """A stimulus: messages of one type with given fields, one a period, by a publisher that may disappear again.
+
+    Attributes:
+        topic: Topic name, absolute.
+        type: e.g. `std_msgs/msg/String`; fixed, unlike a number stream's.
+        values: Fields of each message; fields left out keep the type's defaults.
+        period_ns: Time between two messages.
+        start_ns: Time of the first message.
+        repeats: How often each is sent, one a period; where that is drawn, for each anew.
+        stop_ns: When the publisher disappears; 0 for never.
+        best_effort: Whether it offers best effort only.
+        latched: Whether it offers transient local.
+    """
+
+    topic: str
+    type: str
+    values: tuple[FieldsItem, ...] = field(hash=False)
+    period_ns: int
+    start_ns: Time = 0
+    repeats: Count = 1
+    stop_ns: int = 0
+    best_effort: bool = False
+    latched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceServer:
+    """A stimulus: a reference server that answers a student's client.
+
+    Attributes:
+        service: Absolute name.
+        type: e.g. `std_srvs/srv/Trigger`.
+        responses: Fields of each response in order; an empty tuple never answers.
+        start_ns: When it appears.
+        stop_ns: When it disappears; 0 for never.
+        delay_ns: Time from a request to its response.
+        cycle: Whether the responses begin again after the last one; otherwise the last one is repeated.
+        answers: After so many responses it takes one more request, and disappears without a response; 0 for never.
+    """
+
+    service: str
+    type: str
+    responses: tuple[FieldsItem, ...] = field(hash=False)
+    start_ns: Time = 0
+    stop_ns: int = 0
+    delay_ns: Time = 0
+    cycle: bool = False
+    answers: Count = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceCalls:
+    """A stimulus: reference clients that call a student's server.
+
+    Attributes:
+        service: Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions
+            are calls of the services behind them.
+        type: e.g. `std_srvs/srv/Trigger`.
+        requests: Fields of each request in order, repeated from the first one if there are fewer than calls.
+        calls: How many requests each client sends.
+        clients: How many clients there are; the k-th call of all of them is sent at the same instant.
+        period_ns: Time between two calls of a client; it does not wait for the response.
+        start_ns: When the clients appear and call first; a request waits for the server as a real client would.
+    """
+
+    service: str
+    type: str
+    requests: tuple[FieldsItem, ...] = field(hash=False)
+    calls: Count = 1
+    clients: int = 1
+    period_ns: int = NS_PER_S
+    start_ns: Time = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ActionGoal:
+    """A stimulus: a reference client that sends one goal to a student's action server.
+
+    In the trace its parts are calls of the services behind an action, `/NAME/_action/send_goal`, `get_result` and
+    `cancel_goal`; what the server publishes are messages on `/NAME/_action/feedback` and `status`.
+
+    Attributes:
+        action: Absolute name.
+        type: e.g. `test_msgs/action/Fibonacci`.
+        goal: Fields of the goal.
+        start_ns: When the client appears and sends the goal; it waits for the server as a real client would.
+        cancel_after_ns: Time from the goal's acceptance until it asks to cancel it; 0 for never.
+    """
+
+    action: str
+    type: str
+    goal: Mapping[str, FieldSpec] = field(hash=False)
+    start_ns: Time = 0
+    cancel_after_ns: int = 0
+
+
+Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
+
+
+def longest_course_ns(stimulus: Stimulus) -> int:
+    """Return when a stimulus has shown all of its cases at the latest; for a server, when it appears."""
+    start_ns = longest(stimulus.start_ns)
+    if isinstance(stimulus, NumberStream):
+        return start_ns + cases(stimulus.values)[1] * longest(stimulus.hold_ns)
+    if isinstance(stimulus, MessageStream):
+        return start_ns + cases(stimulus.values)[1] * most(stimulus.repeats) * stimulus.period_ns
+    if isinstance(stimulus, ServiceCalls):
+        return start_ns + most(stimulus.calls) * stimulus.period_ns
+    return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, OdometryStream) else start_ns
+
+
+def is_open(stimulus: Stimulus) -> bool:
+    """Return whether anything but values is left to the seed."""
+    parts = [getattr(stimulus, name) for name in stimulus.__slots__]
+    inside = [item for part in parts if isinstance(part, tuple) for item in part]
+    return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One situation that is recorded once.
+
+    Attributes:
+        id: Unique within the exercise.
+        processes: File names of the student processes that run in it, in start order.
+        span: How long it is observed.
+        stimuli: What the grader publishes.
+        limits: How much the processes may use, and how much is recorded.
+        starts_ns: `(process, t_ns)` of processes that start late; the others start at 0.
+        may_exit: Processes that are free to end by themselves: with code 0 that is no fault.
+        shutdown_ns: How long the processes may take to end after the stop signal, if that is looked at; 0 if not.
+    """
+
+    id: str
+    processes: tuple[str, ...]
+    span: Span
+    stimuli: tuple[Stimulus, ...] = ()
+    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    starts_ns: tuple[tuple[str, Time], ...] = ()
+    may_exit: tuple[str, ...] = ()
+    shutdown_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TimedMessage:
+    """A recorded message to be played.
+
+    Attributes:
+        t_ns: Time since the start of the stream.
+        cdr: The message as it goes over the wire (CDR with its 4-byte header).
+        value: The decoded fields that judging reads.
+    """
+
+    t_ns: int
+    cdr: bytes
+    value: Mapping[str, Any]

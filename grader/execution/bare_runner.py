@@ -1,0 +1,163 @@
+"""Runs a plan on the wall clock with nothing of the grader in the students' processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import time
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from grader.core.limits import Limits
+from grader.core.quantities import NS_PER_S
+from grader.core.trace import LogRecord, Observation, OutputLine
+from grader.execution.console import Logged, last_traceback, read_console, thread_tracebacks
+from grader.execution.ending import reported_fault
+from grader.execution.observer import Observer
+from grader.execution.plan import Plan
+from grader.execution.sandbox.protocol import Command
+from grader.execution.student_process import Student
+from grader.execution.wall_runner import LOOK_S, WallConductor
+
+#: The sandbox's own program, which starts the student's.
+SANDBOX = "bwrap"
+#: How many processes deep the student's is in its sandbox at most.
+DEEP = 8
+INTERRUPTED = 128 + signal.SIGINT
+
+
+class BareStudent(Student):
+    """A process that has no line to the grader: it is started at once, watched, and stopped by a signal."""
+
+    @classmethod
+    def begin(cls, name: str, root: str, command: Command, limits: Limits) -> BareStudent:
+        """Start the process."""
+        ours, nobodys = socket.socketpair()
+        student = cls.start(name, root, command, ours, limits)
+        assert isinstance(student, cls)
+        student.nobodys = nobodys
+        return student
+
+    #: The other end of the line, which nobody has.
+    nobodys: socket.socket | None = None
+    _told_end = False
+
+    def tell(self, answer: Mapping[str, Any]) -> None:
+        """Send the stop signal, if that is what it is to be told; there is nobody to tell anything else."""
+        if answer.get("stop") and not self._has_ended():
+            with contextlib.suppress(OSError):
+                os.kill(self._program(), signal.SIGINT)
+
+    def reports(self) -> list[dict[str, Any] | None]:
+        """Return how it ended, once it has; None for the end by a signal or a limit."""
+        if self._told_end or not self._has_ended():
+            return []
+        self._told_end = True
+        self.drain()
+        code = self.process.returncode
+        if self.stopped or not (0 <= code <= 128 or code in (INTERRUPTED, -signal.SIGINT)):
+            return [None]
+        report: dict[str, Any] = {"kind": "exited", "code": INTERRUPTED if code == -signal.SIGINT else code}
+        fault = last_traceback(self._last.decode("utf-8", "backslashreplace"), self.root) if code == 1 else None
+        return [{**report, "fault": fault} if fault else report]
+
+    def close(self) -> None:
+        """Free the descriptors of a process that has ended."""
+        super().close()
+        if self.nobodys is not None:
+            self.nobodys.close()
+
+    def _has_ended(self) -> bool:
+        return self.process.poll() is not None
+
+    def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
+        """Return what it wrote as lines; records are found in them at the end."""
+        return [*self._lines(t_ns, stream, text)]
+
+    def _program(self) -> int:
+        """Return the process of the student's program, which the sandbox's own processes are around."""
+        pid = self.process.pid
+        for _ in range(DEEP):
+            children = _children(pid)
+            if _name(pid) != SANDBOX or not children:
+                break
+            pid = children[0]
+        return pid
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
+    except (OSError, ValueError):
+        return []
+
+
+def _name(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/comm").read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return ""
+
+
+#: How long, in real time, the first node is waited for.
+FIRST_NODE_NS = 15 * NS_PER_S
+#: A program whose first node comes later than this after its start does something else before: then time begins when
+#: its imports should be done.
+PROMPT_NS, IMPORTS_NS = NS_PER_S // 5, NS_PER_S // 2
+#: How often the graph is looked at until the first node has been seen.
+FIRST_LOOK_NS = 10_000_000
+
+
+class BareConductor(WallConductor):
+    """Runs one plan on the real clock, with programs that know nothing of it; see `WallConductor`."""
+
+    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+        super().__init__(plan, students, observer)
+        self._logs: list[Logged] = []
+        observer.hear_logs()
+
+    def _begin(self) -> None:
+        """Wait for the first node, and start the clock."""
+        begin_ns = time.monotonic_ns()
+        deadline_ns = begin_ns + (IMPORTS_NS if self._plan.first_node_ns > PROMPT_NS else FIRST_NODE_NS)
+        next_ns = 0
+        while not self._tape.graph.nodes and not self._finished() and (now_ns := time.monotonic_ns()) < deadline_ns:
+            if now_ns >= next_ns:
+                self._look_at_graph(0)
+                next_ns = now_ns + FIRST_LOOK_NS
+            for student in self._students:
+                self._hear(student, 0)
+            time.sleep(LOOK_S)
+        self._started = time.monotonic_ns()
+
+    def _look(self, now_ns: int) -> None:
+        super()._look(now_ns)
+        room = self._plan.limits.lines - len(self._logs)
+        self._logs += self._observer.logs()[: max(0, room)]
+
+    def _observations(self) -> tuple[Observation, ...]:
+        self._logs += self._observer.logs()
+        return tuple(self._read())
+
+    def _read(self) -> Iterator[Observation]:
+        """Yield what was observed, with log records and the faults of threads as lines tell of them."""
+        seen = self._tape.observations
+        read: dict[int, list[Observation]] = {}
+        for student in self._students:
+            lines = [o for o in seen if isinstance(o, OutputLine) and o.process == student.name]
+            found = read_console(lines, self._logs, partial(_relative, student.root))
+            read |= {id(line): [] if one is None else [one] for line, one in zip(lines, found, strict=True)}
+            errors = [o for o in found if isinstance(o, OutputLine) and o.stream == "stderr"]
+            for number, fault in thread_tracebacks([line.text for line in errors], student.root).items():
+                line = errors[number]
+                read[id(line)].append(reported_fault(student.name, line.t_ns, fault, self._plan.limits, student.places))
+        for observation in seen:
+            yield from read.get(id(observation), [observation])
+
+
+def _relative(root: str, path: str) -> str:
+    return path[len(root) + 1 :] if path.startswith(f"{root}/") else ""

@@ -1,0 +1,321 @@
+"""Waits, in real time, until endpoints that belong together have found each other, so that nothing sent is lost."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from grader.core.trace import GraphSnapshot
+from grader.execution.exchanges import PlannedCalls, PlannedMessages
+from grader.execution.machine import Patience
+from grader.execution.observer import Observer
+from grader.execution.service_ends import BACKGROUND_TYPES
+from grader.execution.service_peers import Desk
+from grader.execution.student_process import Student
+from grader.execution.trace_recorder import NAME_CHARACTERS, Tape
+
+#: Nobody sends more messages than this between two reports.
+COUNT = 1_000_000
+#: Names and types as ROS has them; nothing else that a process calls a name is ever shown.
+_NAME = re.compile(r"/[A-Za-z0-9_/]{0,299}")
+_TYPE = re.compile(r"[A-Za-z0-9_]+(?:/[A-Za-z0-9_]+){1,2}")
+_PARAMETER = re.compile(r"/[A-Za-z0-9_/]{0,150}:[^\s]{1,150}")
+
+
+def is_name(name: Any) -> bool:
+    """Return whether a value is the whole name of a topic, a service or a node."""
+    return isinstance(name, str) and _NAME.fullmatch(name) is not None
+
+
+def counts(data: Any) -> dict[str, int]:
+    """Return numbers of messages by channel; what is no channel, or no number of them, is left out."""
+    if not isinstance(data, dict):
+        return {}
+    channels = {name: count for name, count in data.items() if is_name(str(name).partition(" ")[2])}
+    return {str(name): min(count, COUNT) for name, count in channels.items() if isinstance(count, int) and count > 0}
+
+
+def is_claim(claim: Any) -> bool:
+    """Return whether a value describes an endpoint, or a parameter, with everything that is asked of it."""
+    if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
+        return False
+    kind, name = claim["kind"], claim["name"]
+    if kind == "parameter":
+        return _PARAMETER.fullmatch(name) is not None
+    if not is_name(name) or (kind != "node" and _TYPE.fullmatch(claim["type"]) is None):
+        return False
+    ends = kind in ("publisher", "subscription")
+    bools = all(isinstance(claim.get(k), bool) for k in ("reliable", "latched", "manual"))
+    return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
+
+
+def readers_of(student: Student, topic: str) -> list[dict[str, Any]]:
+    """Return the subscriptions that a process says it has on a topic."""
+    return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
+
+
+def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
+    """Return whether a publisher's offer satisfies a subscription's request (reliability and durability)."""
+    return (
+        (writer["name"], writer["type"]) == (reader["name"], reader["type"])
+        and (writer["reliable"] or not reader["reliable"])
+        and (writer["latched"] or not reader["latched"])
+        and (reader["deadline_ns"] == 0 or 0 < writer["deadline_ns"] <= reader["deadline_ns"])
+        and (writer["manual"] or not reader["manual"])
+    )
+
+
+def offered(stream: PlannedMessages) -> dict[str, Any]:
+    """Return the publisher of a stimulus of a fixed type as a process would claim it."""
+    return {
+        "name": stream.topic,
+        "type": stream.type,
+        "reliable": not stream.best_effort,
+        "latched": stream.latched,
+        "deadline_ns": 0,
+        "manual": False,
+    }
+
+
+def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
+    """Return whether a claim means that a service is there: its server, or the node that every such service has."""
+    if claim["kind"] == "node":
+        return interface.startswith(BACKGROUND_TYPES) and claim["name"] == service.rpartition("/")[0]
+    return (claim["kind"], claim["name"], claim["type"]) == ("service", service, interface)
+
+
+def takes_ordinary(reader: dict[str, Any]) -> bool:
+    """Return whether a subscription takes what a stimulus offers: no deadline, automatic liveliness."""
+    return reader["deadline_ns"] == 0 and not reader["manual"]
+
+
+def announce(arrivals: dict[str, int], channel: str, count: int) -> None:
+    """Note that messages are on their way to somebody."""
+    arrivals[channel] = arrivals.get(channel, 0) + count
+
+
+#: How long, in real time, something that has gone is waited for to leave the graph.
+DEPARTURE_S = 2.0
+#: Looking at the graph costs much: not so often that it holds up what is looked for.
+GRAPH_PAUSE_S = 0.003
+#: A process that names more than this as unmatched does not talk like the host.
+WORDS = 10_000
+
+
+#: Kind, name and type of an endpoint as the graph counts it: it counts servers and clients by their names alone.
+Key = tuple[str, str, str]
+
+
+class Matching:
+    """Knows which endpoints there are on both sides.
+
+    Args:
+        students: The processes.
+        observer: The grader's node.
+        tape: Where the graph is taken down.
+        desk: The grader's servers and clients.
+        bury: Called with a process that no longer answers.
+
+    Attributes:
+        streams: The topics that stimuli publish on now, with their types.
+        fixed: Those whose type a rubric has fixed.
+        said: How many messages each of those has sent.
+        patience: How long whatever was announced is waited for.
+    """
+
+    def __init__(
+        self,
+        students: list[Student],
+        observer: Observer,
+        tape: Tape,
+        desk: Desk,
+        bury: Callable[[Student], None],
+    ) -> None:
+        self._students = students
+        self._observer = observer
+        self._tape = tape
+        self._desk = desk
+        self._bury = bury
+        self.patience = Patience()
+        self._departures = Patience(DEPARTURE_S)
+        self._served: set[tuple[str, str]] = set()
+        self._known: set[Key] = set()
+        self._strangers: Counter[Key] = Counter()
+        self.streams: dict[str, str] = {}
+        self.fixed: dict[str, PlannedMessages] = {}
+        self.said: Counter[str] = Counter()
+
+    def match(self, now_ns: int) -> None:
+        """Wait until the graph holds what the processes have and nothing that has gone, and all of it is matched."""
+        claims = self._claims()
+        if not self.patience.wait(lambda: self._holds(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._tape.note("an endpoint that a node created was not seen in the graph")
+        if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
+            self._strangers = self._strangers + self._surplus(now_ns, claims)
+        self.look(now_ns)
+        unknown = self._observer.watch(self._tape.graph)
+        self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
+        writers = [c for c in claims if c["kind"] == "publisher"]
+        self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
+        self.patience.wait(lambda: all(map(self.is_heard, self.streams)))
+        self._announce_kept()
+        self.tell_all()
+
+    def _announce_kept(self) -> None:
+        """Tell processes of what publishers have kept for subscriptions that come late and ask for it."""
+        for topic, stream in self.fixed.items():
+            for student in self._students:
+                asks = any(c["latched"] and compatible(offered(stream), c) for c in readers_of(student, topic))
+                if asks and self.said[topic] and (student.name, topic) not in self._served:
+                    self._served.add((student.name, topic))
+                    announce(student.arrivals, f"topic {topic}", self.said[topic])
+
+    def is_heard(self, topic: str) -> bool:
+        """Return whether the publisher of a stimulus has found every subscription that takes what it offers."""
+        stream, interface = self.fixed.get(topic), self.streams[topic]
+        best_effort = stream is not None and stream.best_effort
+        own = sum(not (reliable and best_effort) for reliable in self._observer.watching(topic, interface))
+        asking = [c for s in self._students if not s.ended for c in readers_of(s, topic)]
+        # numbers are latched only where the first subscription asks for it
+        readers = sum(self._takes(c, topic) for c in asking if stream is not None or not c["latched"])
+        return self._observer.subscribers_matched(topic) >= readers + own
+
+    def _takes(self, reader: dict[str, Any], topic: str) -> bool:
+        """Return whether a subscription takes what a stimulus offers on a topic."""
+        fixed = self.fixed.get(topic)
+        fits = takes_ordinary(reader) if fixed is None else compatible(offered(fixed), reader)
+        return bool(self.streams.get(topic) == reader["type"] and fits)
+
+    def see_off(self, now_ns: int) -> None:
+        """Wait until a process that has left the graph before it ended is gone for all the others."""
+        if any(not student.ended for student in self._students):
+            self.match(now_ns)
+
+    def lose(self, student: Student) -> None:
+        """Note that a process ended without leaving the graph, where its endpoints stay for a while, as in reality."""
+        self._strangers += Counter(map(_key, student.claims))
+
+    def _claims(self) -> list[dict[str, Any]]:
+        return [c for s in self._students if not s.ended for c in s.claims]
+
+    def tell_all(self) -> None:
+        """Have every process wait for the counterparts of its endpoints."""
+        claims = self._claims()
+        graph = self._observer.counts() if any(s.sees_graph for s in self._students) else {}
+        for student in self._students:
+            if not student.ended and (student.claims or student.told):
+                self._tell_matches(student, claims, graph)
+
+    def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
+        """Return whether the graph holds what the processes claim."""
+        wanted = _wanted(claims)
+        self._known |= wanted.keys()
+        graph = self._graph_at(now_ns)
+        found = self._found(graph)
+        offered = {(e.kind, e.service, e.type) for e in graph.services}
+        exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
+        return exchanging <= offered and all(found[key] >= count for key, count in wanted.items())
+
+    def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:
+        """Count what the graph still holds of what has gone, but for what is known to stay."""
+        wanted, found = _wanted(claims), self._found(self._graph_at(now_ns))
+        return +Counter({key: found[key] - wanted[key] - self._strangers[key] for key in self._known})
+
+    def _found(self, graph: GraphSnapshot) -> Counter[Key]:
+        """Count in the graph whatever a process has ever claimed."""
+        found = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
+        found.update(("node", name, "") for name in self._observer.students_nodes())
+        for kind, name, _ in self._known:
+            if kind in ("service", "client"):
+                found[kind, name, ""] = self._observer.ends_of(kind, name) - self._desk.ends_of(kind, name)
+        return found
+
+    def _graph_at(self, now_ns: int) -> GraphSnapshot:
+        """Return the live graph, with services where a process has said that it has any."""
+        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
+        return self._observer.graph(now_ns, services=services or bool(self._tape.graph.services))
+
+    def is_served(self, calls: PlannedCalls) -> bool:
+        """Return whether the server that some calls need is there and matched."""
+        service = self._desk.resolved(calls.service)
+        claims = [c for s in self._students if not s.ended for c in s.claims]
+        if service is None or not any(serves(c, service, calls.type) for c in claims):
+            return False
+        self._desk.meet(calls)
+        if self.patience.wait(lambda: self._observer.services.met(service)):
+            return True
+        self._tape.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
+        return False
+
+    def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
+        same = [
+            w
+            for w in writers
+            if (w["name"], w["type"], w["reliable"]) == (claim["name"], claim["type"], claim["reliable"])
+        ]
+        matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
+        if not self._observer.reads(claim["name"]):
+            return True
+        # A reader that takes best effort also matches reliable writers: it may see more than its own.
+        most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
+        return len(same) <= matched and (matched <= most or not claim["reliable"])
+
+    def _tell_matches(self, student: Student, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
+        """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
+        expected: dict[str, dict[str, list[int]]] = {}
+        for claim in student.claims:
+            count = self._counterparts(claim, claims)
+            if count:
+                expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
+        if student.sees_graph:
+            expected["graph"] = {name: [count] for name, count in graph.items()}
+        gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
+        if expected == student.told and not (student.renewed and expected):
+            return
+        student.told, student.renewed = expected, False
+        student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
+        answer = student.report()
+        if answer is None or answer.get("kind") != "matched":
+            self._bury(student)
+            return
+        student.nudged = True  # a match is an event that a node may have a callback for
+        missing = answer.get("missing")
+        if missing:
+            self.patience.lose()
+        for name in filter(is_name, missing[:WORDS] if isinstance(missing, list) else ()):
+            self._tape.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
+
+    def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
+        kind, name = claim["kind"], claim["name"]
+        if kind == "publisher":
+            students = sum(compatible(claim, c) for c in claims if c["kind"] == "subscription")
+            return students + sum(
+                1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
+            )
+        if kind == "subscription":
+            return self._takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
+        if kind == "service":
+            asking = ("client", name, claim["type"])
+            students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)
+            return students + self._desk.ends_of("client", name)
+        if kind != "client":
+            return 0
+        return int(
+            self._desk.serves(name, claim["type"])
+            or any((c["kind"], c["name"], c["type"]) == ("service", name, claim["type"]) for c in claims)
+        )
+
+    def look(self, now_ns: int) -> None:
+        """Take down the graph where it has changed."""
+        self._tape.look(self._graph_at(now_ns), self._observer.participants())
+
+
+def _wanted(claims: list[dict[str, Any]]) -> Counter[Key]:
+    return Counter(_key(c) for c in claims if c["kind"] != "parameter")
+
+
+def _key(claim: dict[str, Any]) -> Key:
+    exchanges = claim["kind"] in ("service", "client", "node")
+    return claim["kind"], claim["name"], "" if exchanges else claim["type"]

@@ -1,0 +1,287 @@
+"""A folder of evidence and its manifest: what was handed in, with what it was recorded, and all digests."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import re
+import secrets
+import stat
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import MISSING, fields, is_dataclass
+from enum import Enum
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from grader.core.errors import EvidenceError
+from grader.core.scenario import Scenario
+
+#: What the run was and which recordings belong to it; written last.
+MANIFEST = "evidence.json"
+#: The report that was made of the recordings at first.
+REPORT = "report.json"
+METADATA = "metadata.yaml"
+_ID = "[a-z][a-z0-9_]{0,99}"
+_OWN = re.compile(rf"{MANIFEST}|{REPORT}|({_ID})\.({_ID})/(?:\1\.\2_0\.mcap|{METADATA})")
+
+
+def recording_name(exercise: str, scenario: str) -> str:
+    """Return the path of a scenario's recording inside the folder; its folder is a rosbag2 recording."""
+    return f"{exercise}.{scenario}/{exercise}.{scenario}_0.mcap"
+
+
+def metadata_name(exercise: str, scenario: str) -> str:
+    """Return the path of what rosbag2 wants beside the recording."""
+    return f"{exercise}.{scenario}/{METADATA}"
+
+
+def is_own(name: str) -> bool:
+    """Return whether a path inside the folder is one that the grader writes."""
+    return _OWN.fullmatch(name) is not None
+
+
+def is_recording(folder: Path) -> bool:
+    """Return whether a folder is named as that of a recording is, and holds one."""
+    return is_own(f"{folder.name}/{METADATA}") and (folder / f"{folder.name}_0.mcap").is_file()
+
+
+def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> None:
+    """Raise EvidenceError if a file would be replaced that is not the grader's own.
+
+    Args:
+        folder: Where evidence is to be kept; need not exist.
+        names: What is to be written into it.
+        own: What a manifest in it says is the grader's.
+    """
+    known = set(own)
+    for name in names:
+        path = folder / name
+        inner = path.parent
+        if inner != folder and inner.is_symlink():
+            raise EvidenceError(f"{inner}: expected a folder, found a link", "name another folder for the evidence")
+        if os.path.lexists(path) and (name not in known or not stat.S_ISREG(path.lstat().st_mode)):
+            message = f"{path}: expected nothing or evidence kept before, found a file of somebody else"
+            raise EvidenceError(message, "name another folder for the evidence")
+
+
+def write(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files, each whole or not at all.
+
+    Raises:
+        EvidenceError: One cannot be written.
+    """
+    for name, data in files.items():
+        path = folder / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _write_whole(path, data)
+        except OSError as error:
+            raise EvidenceError(f"{path}: the evidence cannot be written: {error.strerror or error}") from error
+
+
+def remove(folder: Path, names: Iterable[str]) -> None:
+    """Remove files of the grader's own, and the folders that they leave empty."""
+    for name in filter(is_own, names):
+        with suppress(OSError):
+            (folder / name).unlink()
+        if "/" in name:
+            with suppress(OSError):
+                (folder / name).parent.rmdir()
+
+
+def read(path: Path, most: int) -> bytes:
+    """Return the bytes of a plain file; links are not followed.
+
+    Raises:
+        EvidenceError: It is not there, is no plain file, cannot be read or is longer than `most` bytes.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(descriptor, "rb") as file:
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
+                raise EvidenceError(f"{path}: expected a file, found something that is no plain one")
+            # one byte more than there is tells whether it grows; to ask for `most` sets memory aside for all of it
+            data = file.read(min(status.st_size, most) + 1)
+    except OSError as error:
+        found = "nothing there" if error.errno in (errno.ENOENT, errno.ENOTDIR) else (error.strerror or str(error))
+        raise EvidenceError(f"{path}: expected a file of kept evidence, found {found}") from error
+    if len(data) > most:
+        raise EvidenceError(f"{path}: expected at most {most >> 20} MiB, found more")
+    return data
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    fresh = path.parent / f".grade-{secrets.token_hex(8)}.tmp"
+    descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            fresh.unlink()
+        raise
+
+
+FORMAT = "grader/evidence/v1"
+#: A longer manifest is none that the grader wrote.
+MOST_BYTES = 64 << 20
+
+
+class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A mapping with fixed keys."""
+
+
+class KeptFile(_Strict, frozen=True):
+    """One file that an exercise asked for; see `grader.core.submission.StudentFile`."""
+
+    wanted: str
+    found: str | None
+    similar: tuple[str, ...]
+    others: tuple[str, ...]
+
+
+class KeptSubmission(_Strict, frozen=True):
+    """What was handed in; see `grader.core.submission.Submission`."""
+
+    name: str
+    digest: str
+    files: tuple[KeptFile, ...]
+    notes: tuple[str, ...]
+
+
+class KeptProperty(_Strict, frozen=True):
+    """One thing that the sandbox held back; see `grader.core.checkup.Property`."""
+
+    name: str
+    holds: bool
+    mechanism: str
+    found: str
+
+
+class KeptEnvironment(_Strict, frozen=True):
+    """What the recordings were made with; see `grader.core.report.Environment`."""
+
+    grader: str
+    ros_distro: str
+    rclpy: str
+    rmw: str
+    python: str
+    isolation: str
+    containment: tuple[KeptProperty, ...]
+
+
+class KeptRecording(_Strict, frozen=True):
+    """One scenario's recording.
+
+    Attributes:
+        scenario: Scenario id.
+        asked: Digest of the scenario as the rubric described it.
+        digest: `sha256:` of the file; None if the scenario could not be recorded for want of a file.
+        at: Where in the file the trace begins that judging takes, in bytes.
+        size: How long it is there.
+    """
+
+    scenario: str
+    asked: str
+    digest: str | None = None
+    at: int = 0
+    size: int = 0
+
+
+class KeptExercise(_Strict, frozen=True):
+    """One exercise that was graded; `rubric` is the digest of its rubric at that time."""
+
+    id: str
+    rubric: str
+    recordings: tuple[KeptRecording, ...]
+
+
+class KeptRun(_Strict, frozen=True):
+    """What belongs to this one run: what was typed, and how long it took."""
+
+    path: str
+    seed: int
+    duration_s: float
+    notes: tuple[str, ...]
+    recording: str
+    request: dict[str, Any]
+
+
+class Manifest(_Strict, frozen=True):
+    """Everything but the recordings; `files` are the grader's own, `complete` is false while they are written."""
+
+    format: str
+    complete: bool
+    files: tuple[str, ...]
+    submission: KeptSubmission
+    run: KeptRun
+    environment: KeptEnvironment
+    exercises: tuple[KeptExercise, ...]
+    sources: dict[str, str]
+
+
+def dump(manifest: Manifest) -> bytes:
+    """Return a manifest as JSON text; the same manifest gives the same bytes."""
+    return json.dumps(msgspec.to_builtins(manifest), indent=1, allow_nan=False).encode() + b"\n"
+
+
+def parse(data: bytes) -> Manifest:
+    """Return the manifest that a text holds.
+
+    Raises:
+        EvidenceError: It holds none, or one of another version.
+    """
+    try:
+        found = json.loads(data)
+        version = found.get("format") if isinstance(found, dict) else None
+        if version != FORMAT:
+            what = f"the format {version[:40]}" if isinstance(version, str) else "none"
+            raise EvidenceError(f"expected evidence of the format {FORMAT}, found {what}")
+        return msgspec.convert(found, Manifest)
+    except (ValueError, RecursionError) as error:
+        raise EvidenceError(f"expected {FORMAT}, found something else ({type(error).__name__})") from error
+
+
+def scenario_digest(scenario: Scenario) -> str:
+    """Return a digest of everything that shapes a recording; fields at their defaults do not count."""
+    try:
+        return _known_digest(scenario)
+    except TypeError:  # one with fields of messages cannot be a key
+        return _digest(scenario)
+
+
+@lru_cache(maxsize=256)
+def _known_digest(scenario: Scenario) -> str:
+    return _digest(scenario)
+
+
+def _digest(scenario: Scenario) -> str:
+    return sha256(json.dumps(_plainly(scenario), sort_keys=True).encode())
+
+
+def sha256(data: bytes) -> str:
+    """Return the digest of bytes as manifests name it."""
+    return f"sha256:{hashlib.sha256(data).hexdigest()}"
+
+
+def _plainly(value: Any) -> Any:
+    if is_dataclass(value):
+        kept = {f.name: getattr(value, f.name) for f in fields(value)}
+        defaults = {f.name: f.default for f in fields(value) if f.default is not MISSING}
+        changed = {n: _plainly(v) for n, v in kept.items() if n not in defaults or v != defaults[n]}
+        return {type(value).__name__: changed}
+    if isinstance(value, Mapping):
+        return {str(key): _plainly(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plainly(item) for item in value]
+    return value.value if isinstance(value, Enum) else value

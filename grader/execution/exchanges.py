@@ -1,0 +1,255 @@
+"""Planned messages, servers, calls and goals: stimuli whose every field is drawn, as plain JSON values."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from grader.core.quantities import NS_PER_MS
+from grader.core.scenario import (
+    ActionGoal,
+    AnyOrder,
+    Between,
+    Choose,
+    Count,
+    CountBetween,
+    FieldSpec,
+    InOrder,
+    MessageStream,
+    ServiceCalls,
+    ServiceServer,
+    SomeOf,
+    Time,
+    TimeBetween,
+    Written,
+)
+
+
+def drawn_time(time: Time, draw: random.Random) -> int:
+    """Return a time in nanoseconds; one that is fixed takes nothing from the source."""
+    if not isinstance(time, TimeBetween):
+        return time
+    # the ends as they are written are inside, also where they are no whole milliseconds
+    return min(time.high_ns, time.low_ns + NS_PER_MS * draw.randint(0, -(-(time.high_ns - time.low_ns) // NS_PER_MS)))
+
+
+def drawn_count(count: Count, draw: random.Random) -> int:
+    """Return a count; one that is fixed takes nothing from the source."""
+    return draw.randint(count.low, count.high) if isinstance(count, CountBetween) else count
+
+
+def in_drawn_order(items: Sequence[Any], draw: random.Random) -> list[Any]:
+    """Return the cases one by one; a list in which nothing is open comes back as it is and takes nothing."""
+    return [case for item in items for block in _blocks(item, draw) for case in block]
+
+
+def _blocks(item: Any, draw: random.Random) -> list[list[Any]]:
+    """Return what an item comes to: cases that belong together are one list."""
+    if isinstance(item, InOrder):
+        return [list(item.items)]
+    if isinstance(item, SomeOf):
+        return [[draw.choice(item.items)] for _ in range(drawn_count(item.count, draw))]
+    if isinstance(item, AnyOrder):
+        blocks = [block for inner in item.items for block in _blocks(inner, draw)]
+        draw.shuffle(blocks)
+        return blocks
+    return [[item]]
+
+
+Planned = TypeVar("Planned", bound="PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal")
+Fields = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMessages:
+    """A message stream with every field drawn; see `grader.core.scenario.MessageStream`."""
+
+    topic: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    period_ns: int
+    repeats: int
+    best_effort: bool
+    latched: bool
+    values: tuple[Fields, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedServer:
+    """A server with every response drawn; see `grader.core.scenario.ServiceServer`."""
+
+    service: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    delay_ns: int
+    cycle: bool
+    answers: int
+    responses: tuple[Fields, ...]
+
+    def response(self, index: int) -> Fields | None:
+        """Return the fields of the response to a request, counted from 0; None if there is none."""
+        if not self.responses or (self.answers and index >= self.answers):
+            return None
+        return self.responses[index % len(self.responses) if self.cycle else min(index, len(self.responses) - 1)]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCalls:
+    """Calls with every request drawn, `clients` of them for each call in turn; see `ServiceCalls`."""
+
+    service: str
+    type: str
+    start_ns: int
+    period_ns: int
+    clients: int
+    requests: tuple[Fields, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One request that is to be sent.
+
+    Attributes:
+        calls: What it is one of.
+        index: Which of them, from 0.
+        then: Requests that follow if the response accepts this one, each with its time from then on.
+    """
+
+    calls: PlannedCalls
+    index: int
+    then: tuple[tuple[int, Call], ...] = ()
+
+    @property
+    def client(self) -> int:
+        """Which client of these calls sends it, from 0."""
+        return self.index % self.calls.clients
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedGoal:
+    """A goal with every field drawn, and the identifier it goes by; see `grader.core.scenario.ActionGoal`."""
+
+    action: str
+    type: str
+    start_ns: int
+    cancel_after_ns: int
+    goal: Fields
+    uuid: tuple[int, ...]
+
+
+def goal_call(goal: PlannedGoal) -> Call:
+    """Return the request that sends a goal, and those that follow: for its result, and perhaps to cancel it."""
+    name, identity = f"{goal.action}/_action", {"uuid": list(goal.uuid)}
+
+    def once(service: str, interface: str, request: Fields) -> PlannedCalls:
+        return PlannedCalls(f"{name}/{service}", interface, goal.start_ns, 1, 1, (request,))
+
+    then = [(0, Call(once("get_result", f"{goal.type}_GetResult", {"goal_id": identity}), 0))]
+    if goal.cancel_after_ns:
+        asked = once("cancel_goal", "action_msgs/srv/CancelGoal", {"goal_info": {"goal_id": identity}})
+        then.append((goal.cancel_after_ns, Call(asked, 0)))
+    sent = once("send_goal", f"{goal.type}_SendGoal", {"goal_id": identity, "goal": goal.goal})
+    return Call(sent, 0, tuple(then))
+
+
+def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:
+    """Return a message stream with every field drawn, and the order and number of messages where they are open."""
+    start_ns, values, repeats = drawn_time(stream.start_ns, draw), in_drawn_order(stream.values, draw), stream.repeats
+    each = [(value, drawn_count(repeats, draw)) for value in values] if isinstance(repeats, CountBetween) else []
+    planned = [drawn_fields(value, draw) for value in values]
+    if each:
+        planned = [fields for fields, (_, times) in zip(planned, each, strict=True) for _ in range(times)]
+    return PlannedMessages(
+        topic=stream.topic,
+        type=stream.type,
+        start_ns=start_ns,
+        stop_ns=stream.stop_ns,
+        period_ns=stream.period_ns,
+        repeats=1 if isinstance(repeats, CountBetween) else repeats,
+        best_effort=stream.best_effort,
+        latched=stream.latched,
+        values=tuple(planned),
+    )
+
+
+def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
+    """Return a server with every response drawn, each once: one that is given again is the same again."""
+    return PlannedServer(
+        service=server.service,
+        type=server.type,
+        start_ns=drawn_time(server.start_ns, draw),
+        stop_ns=server.stop_ns,
+        delay_ns=drawn_time(server.delay_ns, draw),
+        cycle=server.cycle,
+        answers=drawn_count(server.answers, draw),
+        responses=tuple(drawn_fields(response, draw) for response in in_drawn_order(server.responses, draw)),
+    )
+
+
+def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
+    """Return calls with every request drawn, for each call and client anew."""
+    start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
+    requests = in_drawn_order(calls.requests, draw)
+    wanted = [requests[call % len(requests)] for call in range(count) for _ in range(calls.clients)]
+    return PlannedCalls(
+        service=calls.service,
+        type=calls.type,
+        start_ns=start_ns,
+        period_ns=calls.period_ns,
+        clients=calls.clients,
+        requests=tuple(drawn_fields(request, draw) for request in wanted),
+    )
+
+
+def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
+    """Return a goal with every field drawn."""
+    return PlannedGoal(
+        action=goal.action,
+        type=goal.type,
+        start_ns=drawn_time(goal.start_ns, draw),
+        cancel_after_ns=goal.cancel_after_ns,
+        goal=drawn_fields(goal.goal, draw),
+        uuid=tuple(draw.randbytes(16)),
+    )
+
+
+def drawn_fields(fields: Mapping[str, FieldSpec], draw: random.Random) -> Fields:
+    """Return the fields of a message with every value drawn."""
+    return {name: _drawn(value, draw) for name, value in fields.items()}
+
+
+def _drawn(value: FieldSpec, draw: random.Random) -> Any:
+    if isinstance(value, Mapping):
+        return drawn_fields(value, draw)
+    if isinstance(value, tuple):
+        return [_drawn(item, draw) for item in value]
+    if isinstance(value, Choose):
+        return draw.choice(value.options)
+    if isinstance(value, Written):
+        number = draw.uniform(value.number.low, value.number.high)
+        return value.text.replace("{}", f"{number:.{value.decimals}f}")
+    return drawn_number(value, draw) if isinstance(value, Between) else value
+
+
+def drawn_number(spec: Between, draw: random.Random) -> int | float:
+    """Return a number: a whole one between whole ones, otherwise one of as many decimals as tell a hundredth apart."""
+    if float(spec.low).is_integer() and float(spec.high).is_integer():
+        return draw.randint(int(spec.low), int(spec.high))
+    decimals = max(2, 2 - math.floor(math.log10(spec.high - spec.low)))
+    return round(draw.uniform(spec.low, spec.high), decimals)
+
+
+def to_json(planned: PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal) -> dict[str, Any]:
+    """Return a planned stimulus as plain JSON values."""
+    return {name: getattr(planned, name) for name in type(planned).__slots__}
+
+
+def from_json(kind: Callable[..., Planned], data: Mapping[str, Any]) -> Planned:
+    """Return the planned stimulus that `to_json` was given; the supervisor's word is trusted."""
+    fields: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
+    return kind(**fields)

@@ -1,0 +1,116 @@
+"""Message and service types of this machine: their classes, messages as plain values, and plain values as messages."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from grader.core.errors import HarnessError
+
+TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)(_[A-Z][A-Za-z]*)?")
+#: What an action is made of, as its parts are called on the wire.
+ACTION_PARTS = {"_SendGoal": "SendGoalService", "_GetResult": "GetResultService", "_FeedbackMessage": "FeedbackMessage"}
+
+
+def message_class(interface: str) -> Any:
+    """Return the class of a message type, or None if this machine has no such type."""
+    return interface_class(interface, "msg")
+
+
+def interface_class(interface: str, kind: str) -> Any:
+    """Return the class of a type, or None if this machine has no such type.
+
+    Args:
+        interface: e.g. `std_srvs/srv/Trigger` or `test_msgs/action/Fibonacci_SendGoal`.
+        kind: `msg`, `srv` or `action`; the parts of actions are messages and services.
+    """
+    match = TYPE_NAME.fullmatch(interface)
+    if match is None:
+        return None
+    package, room, name, part = match.groups()
+    asked = kind if part is None else "action"
+    if room != asked or (part is not None and kind != ("msg" if part == "_FeedbackMessage" else "srv")):
+        return None
+    try:
+        found = getattr(importlib.import_module(f"{package}.{room}"), name, None)
+    except ImportError:
+        return None
+    return found if part is None or found is None else getattr(found.Impl, ACTION_PARTS.get(part, ""), None)
+
+
+def wanted_class(interface: str, kind: str, where: str) -> Any:
+    """Return the class of a type that a rubric needs; raises HarnessError if this machine lacks it."""
+    found = interface_class(interface, kind)
+    if found is None:
+        package = interface.partition("/")[0]
+        raise HarnessError(f"{where}: expected the type {interface} on this machine, found none: install {package}")
+    return found
+
+
+def plain_fields(message: Any) -> Any:
+    """Return a message's fields as plain values, nested by name."""
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: plain_fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, (bool, int, float, str)):
+        return message
+    if isinstance(message, bytes):
+        return list(message)
+    if hasattr(message, "tolist"):
+        return message.tolist()
+    return [plain_fields(item) for item in message]
+
+
+def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
+    """Return a message of a class with some fields; the others have their defaults.
+
+    Args:
+        message: The class.
+        fields: Plain values, nested by name; whole numbers may stand where the type has a fraction.
+        where: What the message of an error begins with.
+
+    Raises:
+        HarnessError: The type has no such field, or the field takes no such value.
+    """
+    made = message(check_fields=True)
+    kinds = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
+    for name, value in fields.items():
+        if name not in kinds:
+            known = ", ".join(kinds) or "no fields"
+            raise HarnessError(f"{where}: expected a field of {_name(message)} ({known}), found `{name}`")
+        try:
+            part = type(getattr(made, name))
+            setattr(made, name, _value(kinds[name], value, part, f"{where}, {name}"))
+        except (AssertionError, ValueError, TypeError, OverflowError) as error:
+            kind = message.get_fields_and_field_types()[name]
+            text = f"{where}: expected a value of the type {kind} in `{name}`, found {str(value)[:80]!r}"
+            raise HarnessError(text) from error
+    return made
+
+
+def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
+    """Return a plain value as a field of a kind takes it; `part` is the class that the field holds now."""
+    if hasattr(kind, "value_type"):
+        if not isinstance(value, (list, tuple)):
+            raise TypeError(value)
+        element = kind.value_type
+        if hasattr(element, "namespaces"):
+            part = getattr(importlib.import_module(".".join(element.namespaces)), element.name)
+        return [_value(element, item, part, where) for item in value]
+    if hasattr(kind, "namespaces"):
+        if not isinstance(value, Mapping):
+            raise TypeError(value)
+        return built(part, value, where)
+    typename = getattr(kind, "typename", "")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    if typename in ("float", "double", "long double"):
+        return float(value)
+    if typename == "octet":
+        return bytes([int(value)])
+    return int(value) if float(value).is_integer() else value
+
+
+def _name(message: Any) -> str:
+    return f"{message.__module__.split('.')[0]}/{message.__name__}"

@@ -1,0 +1,192 @@
+"""What this machine is made of and how busy it is, as far as grading depends on it."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import grader
+from grader.core.checkup import Fact
+from grader.core.quantities import GIB, MIB
+from grader.execution.observer import wait_until
+from grader.execution.ros_installation import RosInstallation
+from grader.execution.sandbox.properties import confined, install_command, setting_command
+
+#: How long an endpoint or a message that was announced is waited for.
+SETTLE_S = 5.0
+#: On a busy machine, so many times as long as there are processes that want each processor, up to this.
+MOST_BUSY = 4.0
+#: After so many that never came, later ones are waited for only briefly.
+LOSSES, BRIEF_S = 3, 0.05
+
+
+def load_per_processor() -> float:
+    """Return how many processes want each processor, from 1 to `MOST_BUSY`; 1 if the system does not say."""
+    try:
+        return min(MOST_BUSY, max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
+    except OSError:
+        return 1.0
+
+
+class Patience:
+    """The patience of one recording.
+
+    Args:
+        full_s: How long a wait may take at first, on a quiet machine.
+    """
+
+    def __init__(self, full_s: float = SETTLE_S) -> None:
+        self._full_s = full_s * load_per_processor()
+        self._losses = 0
+
+    @property
+    def wait_s(self) -> float:
+        """How long the next wait may take."""
+        return self._full_s if self._losses < LOSSES else BRIEF_S
+
+    def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
+        """Wait until a condition holds; return whether it came to."""
+        came = wait_until(condition, self.wait_s, pause_s=pause_s)
+        if not came:
+            self.lose()
+        return came
+
+    def lose(self) -> None:
+        """Note that something was waited for in vain."""
+        self._losses += 1
+
+
+#: Space that staged submissions, recordings and reports may need at a time.
+MIN_SCRATCH_BYTES = 512 * MIB
+#: Memory below which a scenario with two nodes, its worker and the grader may not fit.
+MIN_MEMORY_BYTES = GIB
+
+_VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
+_CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
+#: Where the kernel shows its settings.
+SETTINGS_FOLDER = Path("/proc/sys")
+_PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
+
+
+def software(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the versions of everything that takes part, ROS only if there is one."""
+    yield Fact("grader", grader.__version__)
+    yield Fact("Python", f"{platform.python_version()} ({sys.executable})")
+    if ros is not None:
+        origin = "Python wheels" if ros.source == "wheels" else "the sourced installation"
+        yield Fact("ROS 2", f"{ros.distro}, from {origin} in {ros.prefix}")
+        yield Fact("rclpy", ros.rclpy_version)
+        yield Fact("RMW", f"rmw_fastrtps_cpp {_package_version(ros.prefix, 'rmw_fastrtps_cpp')}{_fast_dds(ros)}")
+    yield _bubblewrap()
+
+
+def system() -> Iterator[Fact]:
+    """Yield what the kernel and the hardware offer."""
+    yield Fact("kernel", f"{platform.system()} {platform.release()} {platform.machine()}, {_distribution()}")
+    yield Fact("user", f"{'root' if os.geteuid() == 0 else f'uid {os.geteuid()}'}{_surroundings()}")
+    yield _namespaces()
+    yield Fact("Landlock", _landlock())
+    yield Fact("processors", str(len(os.sched_getaffinity(0))))
+    yield _memory()
+    yield _scratch()
+
+
+def _package_version(prefix: Path, package: str) -> str:
+    """Return the version of a ROS package as its manifest says, or nothing."""
+    try:
+        manifest = (prefix / "share" / package / "package.xml").read_text(encoding="utf-8")
+    except (OSError, UnicodeError):
+        return ""
+    found = _VERSION.search(manifest)
+    return found[1] if found else ""
+
+
+def _fast_dds(ros: RosInstallation) -> str:
+    """Return the version of Fast DDS by the name of its library, as a phrase, or nothing."""
+    for folder in ros.runtime.library_paths:
+        for name in ("fastrtps", "fastdds"):
+            versions = sorted(re.findall(r"\.so\.(\d+\.\d+\.\d+)", " ".join(map(str, folder.glob(f"lib{name}*.so.*")))))
+            if versions:
+                return f", Fast DDS {versions[-1]}"
+    return ""
+
+
+def _bubblewrap() -> Fact:
+    path = shutil.which("bwrap")
+    if path is None:
+        return Fact("bubblewrap", "not installed", remedy=install_command("bubblewrap"))
+    return Fact("bubblewrap", f"{_said_by(path).removeprefix('bubblewrap ')} ({path})")
+
+
+def _said_by(program: str) -> str:
+    try:
+        done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.SubprocessError, UnicodeError):
+        return "cannot be started"
+    return done.stdout.strip()[:80]
+
+
+def _distribution() -> str:
+    try:
+        return platform.freedesktop_os_release().get("PRETTY_NAME", "an unnamed distribution")
+    except OSError:
+        return "an unnamed distribution"
+
+
+def _surroundings() -> str:
+    marks = {"/.dockerenv": "a Docker container", "/run/.containerenv": "a Podman container"}
+    inside = next((name for path, name in marks.items() if Path(path).exists()), "")
+    filtered = "system calls filtered" if confined() else ""
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        inside = inside or "a GitHub Actions runner"
+    known = ", ".join(part for part in (f"in {inside}" if inside else "", filtered) if part)
+    return f", {known}" if known else ""
+
+
+def _namespaces() -> Fact:
+    """Say whether ordinary users may make namespaces; root may in any case."""
+    command = setting_command()
+    if not command:
+        filtered = ", but a filter of system calls may" if confined() else ""
+        return Fact("user namespaces", f"no setting forbids them{filtered}")
+    name, _, value = command.rpartition(" ")[2].partition("=")
+    now = SETTINGS_FOLDER.joinpath(*name.split(".")).read_text(encoding="ascii").strip()
+    lasting = f"until the next start; for good: echo {name}={value} | sudo tee {_PERSISTENT}"
+    return Fact("user namespaces", f"kept from ordinary users by {name}={now}", remedy=f"{command} ({lasting})")
+
+
+def _landlock() -> str:
+    version = ctypes.CDLL(None, use_errno=True).syscall(_CREATE_RULESET, None, 0, _ASK_VERSION)
+    return f"version {version}" if version > 0 else "not offered by this kernel"
+
+
+def _memory() -> Fact:
+    available = _available_memory()
+    fits = available is None or available >= MIN_MEMORY_BYTES
+    value = "unknown" if available is None else f"{available / GIB:.1f} GiB available"
+    return Fact("memory", value, fits=fits, remedy="" if fits else "end other programs: a scenario may need 1 GiB")
+
+
+def _available_memory() -> int | None:
+    """Return the bytes that new programs can have, or None if the kernel does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")), None)
+
+
+def _scratch() -> Fact:
+    folder = tempfile.gettempdir()
+    free = shutil.disk_usage(folder).free
+    fits = free >= MIN_SCRATCH_BYTES
+    remedy = "" if fits else "free some space, or set TMPDIR to a folder that has it"
+    return Fact("temporary files", f"{free / GIB:.1f} GiB free in {folder}", fits=fits, remedy=remedy)

@@ -1,0 +1,153 @@
+"""What a student's process says in codes, checked and put into words; the files and lines that it may name."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Callable, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from grader.core.submission import main_not_called
+from grader.core.trace import Start, StartWay
+
+#: No file of a submission is larger.
+MOST_BYTES = 8 << 20
+NAME_CHARACTERS = 300
+
+
+class Places:
+    """The files of a staged submission, looked at when they are named.
+
+    Args:
+        root: Its folder; None for a submission without files.
+    """
+
+    def __init__(self, root: Path | None) -> None:
+        self._root = root
+        self._lines: dict[str, int] = {}
+
+    def has(self, file: object, line: object = 1) -> bool:
+        """Return whether a file of the submission has a line; its path is relative, and spelt as it is staged."""
+        return isinstance(file, str) and type(line) is int and 1 <= line <= self.lines(file)
+
+    def lines(self, file: str) -> int:
+        """Return how many lines a file has, an empty one has one; 0 for what is no file of the submission."""
+        if len(file) > NAME_CHARACTERS or file in ("", ".") or str(PurePosixPath(file)) != file:
+            return 0
+        if file not in self._lines:
+            if len(self._lines) >= 2_000:
+                return 0
+            self._lines[file] = self._count(file)
+        return self._lines[file]
+
+    def _count(self, file: str) -> int:
+        if self._root is None or file.startswith("/") or ".." in file.split("/") or "\0" in file:
+            return 0
+        path = self._root / file
+        try:
+            if path.resolve() != self._root.resolve() / file:
+                return 0
+            with open(path, "rb", opener=_without_waiting) as source:
+                if not stat.S_ISREG(os.fstat(source.fileno()).st_mode):
+                    return 0
+                return max(1, len(source.read(MOST_BYTES).splitlines()))
+        except (OSError, ValueError):
+            return 0
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; not a pipe that nobody writes to, and nothing that a link leads to."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+
+
+_WAYS = {way.value: way for way in StartWay}
+_NAME_CHARACTERS, _HIDDEN = 100, 20
+#: The dotted name of a module; folders may have any name, and may not have any sign.
+_TARGET = re.compile(r"[\w.() -]{1,300}")
+
+
+def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
+    """Return the sentence for a code; empty for a code that is unknown, or that names what cannot be.
+
+    Args:
+        file: The file that the process runs.
+        data: What it says.
+        places: The files of the submission.
+    """
+    say = NOTES.get(str(data.get("code")))
+    return say(file, data, places) if say is not None else ""
+
+
+def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -> Start | None:
+    """Return how a process says that its file is started; None if it says no such thing.
+
+    Args:
+        process: Name of the process.
+        file: The file that it runs.
+        data: What it says.
+        places: The files of the submission.
+    """
+    way, module, function = _WAYS.get(str(data.get("way"))), data.get("module"), data.get("function")
+    if way is None or not isinstance(module, str) or not isinstance(function, str):
+        return None
+    stem = file.rpartition("/")[2].rpartition(".")[0]
+    named = all(map(_is_name, function.split("."))) if function else True
+    if way is not StartWay.SCRIPT and (not named or module.rpartition(".")[2] != stem or not _TARGET.fullmatch(module)):
+        return None
+    target = "" if way is StartWay.SCRIPT else f"{module}:{function}" if function else module
+    hidden = data.get("hidden")
+    kept = [n for n in hidden[:_HIDDEN] if _is_there(n, file, places)] if isinstance(hidden, list) else []
+    return Start(process, file, way, target, tuple(kept))
+
+
+def hidden_notes(start: Start) -> list[str]:
+    """Return a sentence for each file that hides a module."""
+    need = "has the name of a module that Python or ROS needs: `python3` imports it instead; rename it"
+    return [f"{name} {need}" for name in start.hidden]
+
+
+def _is_there(name: object, file: str, places: Places) -> bool:
+    """Return whether a module lies beside a file, or in a folder above it."""
+    if not isinstance(name, str) or "/" in name:
+        return False
+    folders = [file]
+    while folders[-1]:
+        folders.append(folders[-1].rpartition("/")[0])
+    paths = [f"{folder}/{name}".lstrip("/") for folder in folders[1:]]
+    return any(places.has(path) or places.has(f"{path}/__init__.py") for path in paths)
+
+
+def _main_not_called(file: str, data: Mapping[str, Any], places: Places) -> str:
+    del data, places
+    return main_not_called(file)
+
+
+def _class_not_started(file: str, data: Mapping[str, Any], places: Places) -> str:
+    del places
+    name = data.get("class")
+    if not _is_name(name):
+        return ""
+    said = f"{file}: nothing starts {name}, so `python3 {file}` would do nothing"
+    return f"{said}; add a main() that calls rclpy.init(), makes the node and spins it"
+
+
+def _neighbour_imported(file: str, data: Mapping[str, Any], places: Places) -> str:
+    name = data.get("module")
+    if not _is_name(name) or not places.has(f"{file.rpartition('/')[0]}/{name}.py".lstrip("/")):
+        return ""
+    said = f"{file}: import {name} finds {name}.py beside it with `python3` only, not with `ros2 run`"
+    return f"{said}; in a package, write: from . import {name}"
+
+
+def _is_name(name: object) -> bool:
+    return isinstance(name, str) and name.isidentifier() and len(name) <= _NAME_CHARACTERS
+
+
+#: Every code that a process may send, and its sentence.
+NOTES: Mapping[str, Callable[[str, Mapping[str, Any], Places], str]] = {
+    "main_not_called": _main_not_called,
+    "class_not_started": _class_not_started,
+    "neighbour_imported": _neighbour_imported,
+}

@@ -1,0 +1,275 @@
+"""Plans: one scenario made concrete, every drawn value in place, as the supervisor hands it to a worker."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.core.limits import Limits
+from grader.core.scenario import (
+    ActionGoal,
+    Between,
+    JustAbove,
+    JustBelow,
+    MessageStream,
+    NumberSpec,
+    NumberStream,
+    OdometryStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    TimeBetween,
+    shortest,
+)
+from grader.core.submission import Submission
+from grader.execution.bag import Odometry, window
+from grader.execution.exchanges import (
+    PlannedCalls,
+    PlannedGoal,
+    PlannedMessages,
+    PlannedServer,
+    drawn_time,
+    from_json,
+    in_drawn_order,
+    plan_calls,
+    plan_goal,
+    plan_messages,
+    plan_server,
+    to_json,
+)
+
+#: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
+PlannedNumber = tuple[float, int]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedNumbers:
+    """Numbers to be published in the type the student's node takes; times in nanoseconds since scenario start."""
+
+    topic: str
+    type: str
+    start_ns: int
+    period_ns: int
+    repeats: int
+    numbers: tuple[PlannedNumber, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRecording:
+    """Recorded messages to be published as they are: `(t_ns, cdr, value)` since scenario start."""
+
+    topic: str
+    type: str
+    start_ns: int
+    stop_ns: int
+    messages: tuple[tuple[int, bytes, Mapping[str, Any]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a worker needs to know to run one scenario.
+
+    Attributes:
+        scenario: Scenario id.
+        processes: Name (the wanted file) and found file of each student process, in start order.
+        root: The staged submission.
+        host_seed: Hex; seeds the randomness of the student's processes, and tells nothing about the stimuli.
+        duration_ns: Observed time.
+        first_message_on: Topic whose first message starts the observation, or empty.
+        wait_at_most_ns: How long that message is waited for.
+        numbers: Stimuli.
+        recordings: Stimuli.
+        clock: `virtual` or `wall`.
+        limits: How much the processes may use, and how much is taken down.
+        stop_when_unfit: Whether a run on the virtual clock may end as soon as it is clear that it does no justice.
+        messages: Stimuli.
+        servers: Stimuli.
+        calls: Stimuli.
+        goals: Stimuli.
+        starts_ns: Name and time of the processes that start late.
+        may_exit: Names of the processes that are free to end.
+        shutdown_ns: How long processes may take to end after the stop signal; 0 if that is not looked at.
+        bare: Whether the files run as `python3 FILE` does, on the wall clock, with nothing of the grader in their
+            processes.
+        first_node_ns: When the first node of the bare processes is expected: their time is counted from it.
+    """
+
+    scenario: str
+    processes: tuple[tuple[str, str], ...]
+    root: str
+    host_seed: str
+    duration_ns: int
+    first_message_on: str
+    wait_at_most_ns: int
+    numbers: tuple[PlannedNumbers, ...]
+    recordings: tuple[PlannedRecording, ...]
+    clock: str
+    limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    stop_when_unfit: bool = False
+    messages: tuple[PlannedMessages, ...] = ()
+    servers: tuple[PlannedServer, ...] = ()
+    calls: tuple[PlannedCalls, ...] = ()
+    goals: tuple[PlannedGoal, ...] = ()
+    starts_ns: tuple[tuple[str, int], ...] = ()
+    may_exit: tuple[str, ...] = ()
+    shutdown_ns: int = 0
+    bare: bool = False
+    first_node_ns: int = 0
+
+
+#: The stimuli that are written the same way over the line, by their names in a plan.
+_EXCHANGES: Mapping[str, type[PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal]] = {
+    "messages": PlannedMessages,
+    "servers": PlannedServer,
+    "calls": PlannedCalls,
+    "goals": PlannedGoal,
+}
+
+
+def plan_scenario(  # noqa: PLR0913 - each comes from another stage
+    exercise: str, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
+) -> Plan:
+    """Return a scenario with every value drawn.
+
+    Args:
+        exercise: Id of the exercise it belongs to.
+        scenario: What to run.
+        submission: Whose files run; every process of the scenario has one.
+        seed: Every drawn value follows from it, the exercise and the scenario.
+        odometry: The recording, if the scenario plays one.
+        clock: `virtual` or `wall`.
+    """
+    purposes = ("stimuli", exercise, scenario.id)
+    # each draws from a source of its own: one more stimulus changes no other
+    drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
+    course = random.Random(derive(seed, "course", exercise, scenario.id))  # noqa: S311 - it has to repeat
+    duration_ns = drawn_time(scenario.span.duration_ns, course)
+    until_ns = 0 if scenario.span.after_first_message_on else duration_ns
+    draw = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
+    numbers = tuple(_numbers(s, draw, own, until_ns) for s, own in drawn if isinstance(s, NumberStream))
+    recordings = tuple(
+        _recording(s, odometry, draw.getrandbits(32), own)
+        for s, own in drawn
+        if isinstance(s, OdometryStream) and odometry is not None
+    )
+    return Plan(
+        scenario=scenario.id,
+        processes=tuple((name, submission.files[name].found or name) for name in scenario.processes),
+        root=str(submission.root),
+        host_seed=derive(seed, "host", exercise, scenario.id),
+        duration_ns=duration_ns,
+        first_message_on=scenario.span.after_first_message_on or "",
+        wait_at_most_ns=scenario.span.wait_at_most_ns,
+        numbers=numbers,
+        recordings=recordings,
+        clock=clock,
+        limits=scenario.limits,
+        messages=tuple(plan_messages(s, source) for s, source in drawn if isinstance(s, MessageStream)),
+        servers=tuple(plan_server(s, source) for s, source in drawn if isinstance(s, ServiceServer)),
+        calls=tuple(plan_calls(s, source) for s, source in drawn if isinstance(s, ServiceCalls)),
+        goals=tuple(plan_goal(s, source) for s, source in drawn if isinstance(s, ActionGoal)),
+        starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
+        may_exit=scenario.may_exit,
+        shutdown_ns=scenario.shutdown_ns,
+    )
+
+
+def derive(seed: int, *purpose: str) -> str:
+    """Return 64 hex digits that follow from a seed and a purpose, and from which neither can be found."""
+    text = "/".join((str(seed), *purpose))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:
+    """Return the numbers of a stream.
+
+    Args:
+        stream: What is to be published.
+        draw: Draws the numbers, for all streams of the scenario.
+        own: Draws what else is open in this one.
+        until_ns: When the observation ends; 0 if that is not known.
+    """
+    start_ns = drawn_time(stream.start_ns, own)
+    numbers = tuple(_number(spec, draw) for spec in in_drawn_order(stream.values, own))
+    repeats = max(1, shortest(stream.hold_ns) // stream.period_ns)
+    if isinstance(stream.hold_ns, TimeBetween) and numbers:
+        each = [max(1, drawn_time(stream.hold_ns, own) // stream.period_ns) for _ in numbers]
+        # who hears nothing for long may well switch off: the last number goes on, however little time the others took
+        each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
+        numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
+    return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers)
+
+
+def _number(spec: NumberSpec, draw: random.Random) -> PlannedNumber:
+    if isinstance(spec, Between):
+        if float(spec.low).is_integer() and float(spec.high).is_integer():
+            return float(draw.randint(int(spec.low), int(spec.high))), 0
+        # Two decimals: exactly what a student's "%.2f" shows.
+        return round(draw.uniform(spec.low, spec.high), 2), 0
+    if isinstance(spec, JustAbove):
+        return spec.limit, 1
+    if isinstance(spec, JustBelow):
+        return spec.limit, -1
+    return spec, 0
+
+
+def _recording(stream: OdometryStream, odometry: Odometry, seed: int, own: random.Random) -> PlannedRecording:
+    start_ns, duration_ns = drawn_time(stream.start_ns, own), drawn_time(stream.duration_ns, own)
+    messages = window(odometry, duration_ns=duration_ns, seed=seed)
+    kept = tuple((start_ns + m.t_ns, m.cdr, m.value) for m in messages if m.t_ns <= duration_ns)
+    return PlannedRecording(
+        topic=stream.topic,
+        type="nav_msgs/msg/Odometry",
+        start_ns=start_ns,
+        stop_ns=kept[-1][0] + 1 if kept else start_ns,
+        messages=kept,
+    )
+
+
+def plan_to_json(plan: Plan) -> dict[str, Any]:
+    """Return a plan as plain JSON values."""
+    data: dict[str, Any] = {
+        name: getattr(plan, name)
+        for name in Plan.__slots__
+        if name not in ("numbers", "recordings", "limits", *_EXCHANGES)
+    }
+    data |= {name: [to_json(planned) for planned in getattr(plan, name)] for name in _EXCHANGES}
+    data["limits"] = {name: getattr(plan.limits, name) for name in Limits.__slots__}
+    data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
+    data["recordings"] = [
+        {
+            "topic": r.topic,
+            "type": r.type,
+            "start_ns": r.start_ns,
+            "stop_ns": r.stop_ns,
+            "messages": [[t, base64.b64encode(cdr).decode(), value] for t, cdr, value in r.messages],
+        }
+        for r in plan.recordings
+    ]
+    return data
+
+
+def plan_from_json(data: Mapping[str, Any]) -> Plan:
+    """Return the plan that `plan_to_json` was given; the supervisor's word is trusted."""
+    fields = dict(data)
+    fields["processes"] = tuple((str(name), str(file)) for name, file in data["processes"])
+    fields["limits"] = Limits(**data["limits"])
+    fields["numbers"] = tuple(
+        PlannedNumbers(**{**n, "numbers": tuple((float(value), int(side)) for value, side in n["numbers"])})
+        for n in data["numbers"]
+    )
+    fields["recordings"] = tuple(
+        PlannedRecording(**{**r, "messages": _messages(r["messages"])}) for r in data["recordings"]
+    )
+    fields |= {name: tuple(from_json(kind, one) for one in data[name]) for name, kind in _EXCHANGES.items()}
+    fields["starts_ns"] = tuple((str(name), int(t_ns)) for name, t_ns in data["starts_ns"])
+    fields["may_exit"] = tuple(data["may_exit"])
+    return Plan(**fields)
+
+
+def _messages(rows: Sequence[Sequence[Any]]) -> tuple[tuple[int, bytes, Mapping[str, Any]], ...]:
+    return tuple((int(t), base64.b64decode(cdr), value) for t, cdr, value in rows)

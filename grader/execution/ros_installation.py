@@ -1,0 +1,281 @@
+"""Finds the Python interpreter and the ROS 2 installation that child processes run with, without importing them."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import re
+import sys
+import sysconfig
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from grader.core.errors import EnvironmentFault
+
+
+@dataclass(frozen=True, slots=True)
+class PythonRuntime:
+    """The interpreter and the ROS installation that children run with.
+
+    Attributes:
+        executable: Absolute path of the Python interpreter.
+        read_paths: Absolute files and folders that the interpreter, its packages and ROS need, read-only.
+        library_paths: Value of LD_LIBRARY_PATH, in order.
+        python_paths: Folders for sys.path beyond the interpreter's own, in order.
+        environment: Further variables that ROS needs (AMENT_PREFIX_PATH, ROS_DISTRO, RMW_IMPLEMENTATION ...).
+    """
+
+    executable: Path
+    read_paths: tuple[Path, ...]
+    library_paths: tuple[Path, ...]
+    python_paths: tuple[Path, ...]
+    environment: Mapping[str, str]
+
+
+def runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
+    """Return a runtime as JSON values."""
+    return {
+        "executable": str(runtime.executable),
+        "read_paths": [str(path) for path in runtime.read_paths],
+        "library_paths": [str(path) for path in runtime.library_paths],
+        "python_paths": [str(path) for path in runtime.python_paths],
+        "environment": dict(runtime.environment),
+    }
+
+
+def runtime_from_json(values: Mapping[str, Any]) -> PythonRuntime:
+    """Return a runtime from JSON values."""
+    return PythonRuntime(
+        executable=Path(values["executable"]),
+        read_paths=tuple(map(Path, values["read_paths"])),
+        library_paths=tuple(map(Path, values["library_paths"])),
+        python_paths=tuple(map(Path, values["python_paths"])),
+        environment=values["environment"],
+    )
+
+
+MESSAGE_PACKAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
+MIDDLEWARE = "librmw_fastrtps_cpp.so"
+DEFAULT_DISTRO = "jazzy"
+INSTALLED_HERE = Path("/opt/ros")
+
+# What any program needs from the system: the C library, its loader and cache, libraries chosen through alternatives.
+SYSTEM_PATHS = tuple(
+    map(Path, ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/alternatives", "/etc/ld.so.cache", "/etc/ld.so.conf"))
+)
+
+# The wheels re-execute Python once to set LD_LIBRARY_PATH; whoever sets both saves that start.
+NO_BOOTSTRAP = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+
+
+@dataclass(frozen=True, slots=True)
+class RosInstallation:
+    """The ROS 2 installation that children use.
+
+    Attributes:
+        runtime: Interpreter, paths and variables for children.
+        source: Where it comes from: Python wheels beside the interpreter, or an installation that the shell sourced.
+        distro: Name of the ROS release, e.g. `jazzy`.
+        rclpy_version: Version of rclpy, e.g. `7.1.6`.
+        prefix: Root folder of the installation.
+    """
+
+    runtime: PythonRuntime
+    source: Literal["wheels", "sourced"]
+    distro: str
+    rclpy_version: str
+    prefix: Path
+
+
+def find_ros(environment: Mapping[str, str] | None = None) -> RosInstallation:
+    """Return the ROS installation to use: the sourced one if there is one, else the wheels of this interpreter.
+
+    The two are never mixed: children of a sourced installation get nothing of the wheels' libraries.
+
+    Args:
+        environment: Variables of the shell; those of this process if None.
+
+    Raises:
+        EnvironmentFault: There is no usable ROS, with the command that mends it.
+    """
+    environment = os.environ if environment is None else environment
+    found = _find_sourced(environment) or _find_wheels()
+    if found is None:
+        raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", _install_hint())
+    _require_parts(found)
+    return found
+
+
+def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
+    prefixes = _paths(environment.get("AMENT_PREFIX_PATH", ""))
+    distro = environment.get("ROS_DISTRO", "")
+    searched = _paths(environment.get("PYTHONPATH", ""))
+    home_of_rclpy = next(
+        (
+            (prefix, folder)
+            for prefix in prefixes
+            for folder in _python_folders(prefix, searched)
+            if _holds_rclpy(folder)
+        ),
+        None,
+    )
+    if not distro or home_of_rclpy is None:
+        return None
+    prefix, folder = home_of_rclpy
+    _require_this_python(prefix, folder)
+    # A source build has one prefix for each package, side by side. Other prefixes are somebody's workspaces: they may
+    # hold solutions, and no exercise needs them.
+    siblings = tuple(other for other in prefixes if other.parent == prefix.parent)
+    libraries = _below(siblings, _paths(environment.get("LD_LIBRARY_PATH", ""))) or tuple(
+        other / "lib" for other in siblings
+    )
+    python_paths = tuple(path for other in siblings for path in _python_folders(other, searched))
+    runtime = PythonRuntime(
+        executable=Path(sys.executable),
+        read_paths=_existing((*_interpreter_paths(), *SYSTEM_PATHS, *siblings)),
+        library_paths=libraries,
+        python_paths=_once(python_paths),
+        environment={
+            "AMENT_PREFIX_PATH": ":".join(map(str, siblings)),
+            "ROS_DISTRO": distro,
+            "ROS_VERSION": "2",
+            "ROS_PYTHON_VERSION": "3",
+            **NO_BOOTSTRAP,
+        },
+    )
+    return RosInstallation(runtime, "sourced", distro, _version_of_rclpy(prefix, folder), prefix)
+
+
+def _find_wheels() -> RosInstallation | None:
+    found = next(
+        (
+            (folder, wheel)
+            for folder in _site_packages()
+            for wheel in sorted(folder.glob("ros_*_rclpy-*.dist-info"))
+            if _holds_rclpy(folder)
+        ),
+        None,
+    )
+    if found is None:
+        return None
+    folder, wheel = found
+    distro = re.sub(r"^ros_(.+)_rclpy-.*", r"\1", wheel.name)
+    # Not sys.prefix: a user's own or a distribution's site-packages lie elsewhere, and the libraries beside them.
+    prefix = folder.parents[2]
+    index = prefix / "share" / "ament_index"
+    parts = (prefix / "lib", folder, *((index.parent,) if index.is_dir() else ()))
+    runtime = PythonRuntime(
+        executable=Path(sys.executable),
+        read_paths=_existing((*_interpreter_paths(), *SYSTEM_PATHS, *parts)),
+        library_paths=(prefix / "lib", *sorted(path for path in folder.glob("ros_*.libs") if path.is_dir())),
+        python_paths=() if str(folder) in _isolated_path() else (folder,),
+        environment={"ROS_DISTRO": distro, **NO_BOOTSTRAP},
+    )
+    version = importlib.metadata.Distribution.at(wheel).version
+    return RosInstallation(runtime, "wheels", distro, version, prefix)
+
+
+def _require_this_python(prefix: Path, folder: Path) -> None:
+    extensions = sorted((folder / "rclpy").glob("_rclpy_pybind11.*.so"))
+    loadable = importlib.machinery.EXTENSION_SUFFIXES
+    if not extensions or any(path.name == "_rclpy_pybind11" + suffix for path in extensions for suffix in loadable):
+        return
+    built_for = re.search(r"cpython-(\d)(\d+)", extensions[0].name)
+    other = f"python{built_for[1]}.{built_for[2]}" if built_for else "another Python"
+    here = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    raise EnvironmentFault(
+        f"{prefix}: expected rclpy for {here}, which runs the grader, found rclpy for {other}",
+        f"install the grader with {other}, or use its own ROS: "
+        "unset AMENT_PREFIX_PATH ROS_DISTRO PYTHONPATH LD_LIBRARY_PATH",
+    )
+
+
+def _require_parts(ros: RosInstallation) -> None:
+    runtime = ros.runtime
+    pip = f'{sys.executable} -m pip install "ros-{ros.distro}-rclpy[fastrtps]" ros-{ros.distro}-common-interfaces'
+    apt = f"sudo apt install ros-{ros.distro}-rmw-fastrtps-cpp ros-{ros.distro}-common-interfaces"
+    hint = pip if ros.source == "wheels" else apt
+    if not any((folder / MIDDLEWARE).exists() for folder in runtime.library_paths):
+        raise EnvironmentFault(f"{ros.prefix}: expected the Fast DDS middleware ({MIDDLEWARE}), found none", hint)
+    folders = runtime.python_paths or tuple(_site_packages())
+    missing = [name for name in MESSAGE_PACKAGES if not any((folder / name).is_dir() for folder in folders)]
+    if missing:
+        raise EnvironmentFault(f"{ros.prefix}: expected the message package {missing[0]}, found none", hint)
+
+
+def _install_hint() -> str:
+    setups = sorted(INSTALLED_HERE.glob("*/setup.bash"))
+    if setups:
+        preferred = INSTALLED_HERE / DEFAULT_DISTRO / "setup.bash"
+        return f"source {preferred if preferred in setups else setups[-1]}"
+    if sys.platform == "linux" and platform.machine() == "x86_64":
+        wheels = f'"ros-{DEFAULT_DISTRO}-rclpy[fastrtps]" ros-{DEFAULT_DISTRO}-common-interfaces'
+        return f"{sys.executable} -m pip install {wheels}"
+    return f"install ROS 2 {DEFAULT_DISTRO} and run: source {INSTALLED_HERE / DEFAULT_DISTRO / 'setup.bash'}"
+
+
+def _interpreter_paths() -> tuple[Path, ...]:
+    """Return what the interpreter itself reads; never a whole prefix, which may be somebody's home folder."""
+    prefix, base = Path(sys.prefix), Path(sys.base_prefix)
+    folders = [Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")]
+    return (
+        Path(sys.executable),
+        prefix / "pyvenv.cfg",
+        *(root / name for root in (prefix, base) for name in ("lib", "lib64")),
+        *folders,
+    )
+
+
+def _site_packages() -> tuple[Path, ...]:
+    spec = importlib.util.find_spec("rclpy")
+    of_rclpy = (Path(spec.origin).parent.parent,) if spec is not None and spec.origin else ()
+    return _once((*of_rclpy, *(Path(sysconfig.get_path(name)) for name in ("purelib", "platlib"))))
+
+
+def _isolated_path() -> tuple[str, ...]:
+    """Return where `python -I` looks for packages: not in the user's own site-packages, for one."""
+    return tuple(sysconfig.get_path(name) for name in ("purelib", "platlib"))
+
+
+def _python_folders(prefix: Path, searched: Iterable[Path]) -> tuple[Path, ...]:
+    of_shell = _below((prefix,), searched)
+    here = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    usual = (prefix / "lib" / here / "site-packages", prefix / "local" / "lib" / here / "dist-packages")
+    return _existing((*of_shell, *usual))
+
+
+def _holds_rclpy(folder: Path) -> bool:
+    return (folder / "rclpy" / "__init__.py").is_file()
+
+
+def _version_of_rclpy(prefix: Path, folder: Path) -> str:
+    for distribution in importlib.metadata.distributions(name="rclpy", path=[str(folder)]):
+        return distribution.version
+    manifest = prefix / "share" / "rclpy" / "package.xml"
+    text = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
+    version = re.search(r"<version>\s*([\w.+-]+)\s*</version>", text)
+    return version[1] if version else "unknown"
+
+
+def _paths(value: str) -> tuple[Path, ...]:
+    """Return the absolute entries of a search path; an empty entry would mean the working directory."""
+    return _once(Path(entry) for entry in value.split(os.pathsep) if entry.startswith("/"))
+
+
+def _below(prefixes: Iterable[Path], paths: Iterable[Path]) -> tuple[Path, ...]:
+    prefixes = tuple(prefixes)
+    return tuple(path for path in paths if any(prefix == path or prefix in path.parents for prefix in prefixes))
+
+
+def _existing(paths: Iterable[Path]) -> tuple[Path, ...]:
+    home = Path.home()
+    return _once(path for path in paths if path.exists() and path != home and path not in home.parents)
+
+
+def _once(paths: Iterable[Path]) -> tuple[Path, ...]:
+    return tuple(dict.fromkeys(paths))

@@ -1,0 +1,227 @@
+"""Isolation by nested bubblewrap: a network of its own for the worker, a file view of its own for each student."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.core.errors import EnvironmentFault
+from grader.execution.sandbox import seccomp
+from grader.execution.sandbox.environment import student_environment
+from grader.execution.sandbox.exposure import (
+    STUDENT_GROUP,
+    make_readable,
+    parents_of,
+    secrets_within,
+    some_user,
+    taken_users,
+    view_of,
+)
+from grader.execution.sandbox.properties import install_command
+from grader.execution.sandbox.protocol import Command, Limits, StudentProcess, WorkerView
+
+ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
+SUBMISSION = Path("/submission")
+HOST = Path("/grader_host/host")
+HOME, WORK = Path("/tmp/home"), Path("/tmp/work")  # noqa: S108 -- a private tmpfs
+SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
+
+
+@dataclass(frozen=True, slots=True)
+class Bubblewrap:
+    """The walls that bubblewrap, seccomp and resource limits give.
+
+    Attributes:
+        bwrap: The bubblewrap program.
+        prlimit: The program of util-linux that sets resource limits.
+        setpriv: The program of util-linux that changes the user; used as root only.
+        as_root: Whether this process is root: students then run as another user instead of in a user namespace.
+        can_forbid_userns: Whether bubblewrap knows `--disable-userns` (0.8 and newer); seccomp forbids them anyway.
+    """
+
+    bwrap: Path
+    prlimit: Path
+    setpriv: Path
+    as_root: bool
+    can_forbid_userns: bool
+
+    @classmethod
+    def here(cls) -> Bubblewrap:
+        """Return the isolation for this machine and user; whether it works is for the probe to say.
+
+        Raises:
+            EnvironmentFault: A program is missing or this processor is unknown, with the command that mends it.
+        """
+        if not seccomp.supports(platform.machine()):
+            raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
+        bwrap = _program("bwrap", install_command("bubblewrap"))
+        told = subprocess.run([bwrap, "--help"], capture_output=True, check=False, env={}, timeout=10)
+        return cls(
+            bwrap=bwrap,
+            prlimit=_program("prlimit", install_command("util-linux")),
+            setpriv=_program("setpriv", install_command("util-linux")),
+            as_root=os.geteuid() == 0,
+            can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
+        )
+
+    @property
+    def name(self) -> str:
+        """Short name that reports show."""
+        return ROOT_NAME if self.as_root else USER_NAME
+
+    @property
+    def shares_network(self) -> bool:
+        """Each worker has a network of its own."""
+        return False
+
+    @property
+    def submission_seen_at(self) -> str:
+        """Where a student's process sees its submission."""
+        return str(SUBMISSION)
+
+    @property
+    def host_seen_at(self) -> str:
+        """Where a student's process sees the `host` package."""
+        return str(HOST)
+
+    def worker_command(
+        self,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: tuple[int, ...],
+        view: WorkerView | None = None,
+    ) -> Command:
+        """Return the command that starts the trusted worker.
+
+        It has its own network with only `lo`, its own processes and its own /dev/shm: what it leaves behind goes with
+        it. It is killed when the caller dies.
+        """
+        walls = [
+            *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
+            *(() if self.as_root else ("--unshare-user",)),
+            *(("--dev-bind", "/", "/", "--proc", "/proc") if view is None else self._workers_files(view)),
+            *("--perms", "1777", "--tmpfs", "/dev/shm", "--chdir", "/"),  # noqa: S108
+            *(() if view is None else ("--remount-ro", "/")),
+        ]
+        return Command((str(self.bwrap), *walls, "--", *argv), dict(environment), tuple(pass_fds))
+
+    def _workers_files(self, view: WorkerView) -> list[str]:
+        """Return the options that show a worker what it needs, the programs that start a student among them."""
+        shared = taken_users() if self.as_root else ()
+        read = view_of((*view.read, self.bwrap, self.prlimit, self.setpriv))
+        own = view_of(view.own)
+        options = ["--proc", "/proc", "--dev", "/dev", "--perms", "1777", "--tmpfs", "/tmp"]  # noqa: S108
+        for folder in parents_of((*read.bound, *(where for where, _ in read.links), *view.write, *shared)):
+            options += ["--perms", "0755", "--dir", str(folder)]
+        for path in read.bound:
+            options += ["--ro-bind", str(path), str(path)]
+        for where, target in read.links:
+            options += ["--symlink", target, str(where)]
+        for folder in view.hidden:
+            options += ["--perms", "0755", "--tmpfs", str(folder)]
+        for folder in parents_of(own.bound):
+            # Where bubblewrap makes a parent by itself, another user's student cannot pass through it.
+            if not any(folder.is_relative_to(path) for path in read.bound):
+                options += ["--perms", "0755", "--dir", str(folder)]
+        for path in own.bound:
+            options += ["--ro-bind", str(path), str(path)]
+        for folder in view.hidden:
+            options += ["--remount-ro", str(folder)]
+        for path in (*view.write, *shared):
+            options += ["--bind", str(path), str(path)]
+        return options
+
+    def student_command(self, process: StudentProcess, limits: Limits) -> Command:
+        """Return the command that starts a student's process, from inside the worker.
+
+        Options travel through a descriptor and bubblewrap itself starts without environment: a student reads both in
+        /proc/1. As root the staged copy is made readable by everyone, since the student is another user.
+        """
+        if self.as_root:
+            make_readable(process.submission)
+        filter_fd = _memory_file("filter", seccomp.student_filter())
+        options = [
+            *self._namespaces(),
+            *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
+            *_settings(student_environment(process, HOME)),
+            *self._files(process, limits),
+        ]
+        options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
+        argv = (str(self.bwrap), "--args", str(options_fd), "--", *self._entry(limits))
+        argv += (str(process.runtime.executable), *process.arguments)
+        opened = (filter_fd, options_fd)
+        return Command(argv, {}, (*process.pass_fds, *opened), opened)
+
+    def _namespaces(self) -> list[str]:
+        shared = ["--die-with-parent", "--new-session", "--unshare-pid", "--unshare-ipc", "--unshare-uts"]
+        shared += ["--unshare-cgroup-try", "--hostname", "student", "--cap-drop", "ALL"]
+        if self.as_root:
+            # What setpriv needs to become another user; it gives them up on the way.
+            return [*shared, "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_SETPCAP"]
+        return [*shared, "--unshare-user", *(("--disable-userns",) if self.can_forbid_userns else ())]
+
+    def _entry(self, limits: Limits) -> list[str]:
+        """Return the programs that set limits and, as root, change the user before Python starts.
+
+        Limits come first: the number of processes must be set inside the user namespace, where the kernel counts it.
+        """
+        seconds = limits.processor_s
+        entry = [
+            *(str(self.prlimit), f"--as={limits.address_space_bytes}", f"--nproc={limits.processes}"),
+            *(f"--nofile={limits.open_files}", f"--fsize={limits.file_bytes}", "--core=0", "--rtprio=0"),
+            f"--cpu={seconds}:{seconds + 1}",
+        ]
+        if not self.as_root:
+            return entry
+        privileges = ["--clear-groups", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"]
+        return [*entry, str(self.setpriv), f"--reuid={some_user()}", f"--regid={STUDENT_GROUP}", *privileges]
+
+    def _files(self, process: StudentProcess, limits: Limits) -> list[str]:
+        view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
+        size = str(limits.scratch_bytes)
+        # The first process is bubblewrap, without the filter of system calls: its memory must be out of reach.
+        first = "/proc/1"
+        options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
+        options += ["--dev", "/dev"]
+        # Scratch first: a mount on /tmp would hide what had been bound below it.
+        for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
+            options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
+        for folder in (HOME, HOME / "log", WORK):
+            options += ["--perms", "0777", "--dir", str(folder)]
+        for folder in (*view.parents(), *parents_of((HOST,) if process.host_folder else ())):
+            # Where Python lies below /tmp, these are in the scratch folder, and a user's student owns them.
+            options += ["--perms", "0555", "--dir", str(folder)]
+        for path in view.bound:
+            options += ["--ro-bind", str(path), str(path)]
+        for where, target in view.links:
+            options += ["--symlink", target, str(where)]
+        for folder in secrets_within(view.bound, process.runtime):
+            options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
+        options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
+        options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
+        # bubblewrap's /dev is a tmpfs without limit, which its owner could fill.
+        return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
+
+
+def _program(name: str, hint: str) -> Path:
+    found = shutil.which(name, path=SYSTEM_PROGRAMS) or shutil.which(name)
+    if found is None:
+        raise EnvironmentFault(f"sandbox: expected the program {name}, found none", hint)
+    return Path(found).absolute()
+
+
+def _settings(environment: Mapping[str, str]) -> Iterable[str]:
+    return (word for name, value in environment.items() for word in ("--setenv", name, value))
+
+
+def _memory_file(name: str, content: bytes) -> int:
+    descriptor = os.memfd_create(name)
+    with open(descriptor, "wb", closefd=False) as file:
+        file.write(content)
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    return descriptor

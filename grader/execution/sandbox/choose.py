@@ -1,0 +1,142 @@
+"""Chooses the tier of isolation by trying it, not by looking at versions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Fact, Property, TierReport, missing
+from grader.core.errors import EnvironmentFault
+from grader.execution.ros_installation import RosInstallation
+from grader.execution.sandbox import landlock, selftest, tiers
+from grader.execution.sandbox.memory import Memory
+from grader.execution.sandbox.properties import NOTHING, remedy_for
+from grader.execution.sandbox.protocol import Isolation
+from grader.execution.sandbox.tiers import WALLED, isolation_from_name
+from grader.execution.sandbox.trial import NO_EXCHANGE
+
+AUTO = "auto"
+#: So much of the reason against one tier is told where all of them are refused.
+MOST_CHARACTERS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The tier to record in.
+
+    Attributes:
+        isolation: The tier.
+        containment: What it was seen to hold back; empty without walls.
+    """
+
+    isolation: Isolation
+    containment: tuple[Property, ...] = ()
+
+
+def _silent(step: str) -> None:
+    """Take no note of a step."""
+
+
+def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> Choice:
+    """Return the isolation to record in.
+
+    Args:
+        wanted: `auto` for the strongest tier that contains what is required; `none` for no walls; or the name of a
+            tier, which must keep what it promises.
+        ros: What students' processes will run with.
+        progress: Hears which sandbox is tried, and why what is remembered of it does not do.
+
+    Raises:
+        EnvironmentFault: The tier asked for does not exist or does not hold here, or none does, with what mends it.
+    """
+    if wanted == NO_WALLS:
+        return Choice(isolation_from_name(wanted))
+    if wanted != AUTO:
+        return _named(wanted, ros, progress)
+    tried: list[TierReport] = []
+    for name in WALLED:
+        tried.append(inspect_tier(name, ros, progress))
+        if tried[-1].usable:
+            return Choice(isolation_from_name(name), tried[-1].properties)
+    raise _refusal(tried)
+
+
+def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
+    """Try every tier anew and return what each is worth here, strongest first; the one without walls comes last."""
+    open_ones = tuple(Property(name, holds=False, mechanism=NOTHING) for name in PROPERTIES)
+    nothing = TierReport(NO_WALLS, TIERS[NO_WALLS], usable=False, why="it contains nothing", properties=open_ones)
+    return (*(inspect_tier(name, ros, afresh=True) for name in WALLED), nothing)
+
+
+def sandbox_memory(ros: RosInstallation) -> Fact:
+    """Say whether a run would use a remembered self-test of the sandbox, or why it would repeat it."""
+    lapses = []
+    for name in WALLED:
+        memory = Memory.of(name, ros)
+        found = memory.recall()
+        if found is not None and found.usable:
+            return Fact("sandbox check", f"remembered for {name}: runs do not repeat it")
+        if not tiers.is_for_others(name):
+            lapses.append(f"{name}: {memory.lapse() or 'it does not hold'}")
+    return Fact("sandbox check", f"a run would repeat it; {lapses[0]}")
+
+
+def inspect_tier(
+    name: str, ros: RosInstallation, progress: Callable[[str], None] = _silent, *, afresh: bool = False
+) -> TierReport:
+    """Return what one tier is worth here, from the last self-test if nothing that matters has changed since.
+
+    Args:
+        name: Tier name.
+        ros: What students' processes will run with.
+        progress: Hears that it is tried, and why.
+        afresh: Whether to test it in any case.
+    """
+    try:
+        isolation = isolation_from_name(name)
+    except EnvironmentFault as fault:
+        return TierReport(name, TIERS[name], usable=False, why=fault.message, remedy=fault.hint)
+    memory = Memory.of(name, ros)
+    remembered = None if afresh else memory.recall()
+    if remembered is not None:
+        return remembered
+    progress(f"trying the sandbox {name}{'' if afresh else f' ({memory.lapse()})'}")
+    report = selftest.inspect(isolation, ros)
+    if report.properties and not _kept(report):
+        # A busy machine gets a second chance.
+        report = selftest.inspect(isolation, ros)
+    report = replace(report, remedy=remedy_for(report))
+    if _kept(report):
+        # What fails may fail because the machine is busy, or be mended in the next minute.
+        memory.keep(report)
+    return report
+
+
+def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -> Choice:
+    isolation = isolation_from_name(wanted)
+    report = inspect_tier(wanted, ros, progress)
+    if not _kept(report):
+        raise EnvironmentFault(f"isolation {wanted}: expected a sandbox that holds, found: {report.why}", report.remedy)
+    return Choice(isolation, report.properties)
+
+
+def _kept(report: TierReport) -> bool:
+    """Return whether a tier keeps what it promises: Landlock promises nothing about a network that it was given."""
+    promised = [name for name in REQUIRED if report.name != landlock.NAME or name != "net_egress"]
+    broken = [found for found in report.properties if found.name in promised and not found.holds]
+    return bool(report.properties) and not broken and NO_EXCHANGE not in report.why
+
+
+def _refusal(tried: Sequence[TierReport]) -> EnvironmentFault:
+    mine = [report for report in tried if not tiers.is_for_others(report.name)]
+    found = "; ".join(f"{report.name}: {_shortly(report)}" for report in mine)
+    # The remedy of a tier for another user comes last: it asks for the most.
+    remedies = [report.remedy for report in (*mine, *tried) if report.remedy]
+    hint = remedies[0] if remedies else "grade doctor says what each tier lacks"
+    wanted = ", ".join(REQUIRED)
+    return EnvironmentFault(f"isolation: expected a sandbox that contains {wanted}, found none ({found})", hint)
+
+
+def _shortly(report: TierReport) -> str:
+    open_ones = [found.name for found in missing(report.properties)]
+    return f"not contained: {', '.join(open_ones)}" if open_ones else report.why[:MOST_CHARACTERS]

@@ -1,0 +1,111 @@
+"""The variables that worker and student processes start with; nothing of the caller's environment is among them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import grader
+from grader.execution.ros_installation import PythonRuntime
+from grader.execution.sandbox.protocol import StudentProcess
+
+PACKAGE = Path(grader.__file__).resolve().parent
+
+# Worker and student must agree on these. With the default transports Fast DDS would look for a /dev/shm that the two do
+# not share, and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST would bring that transport back by itself: it must stay unset.
+DDS_SETTINGS: Mapping[str, str] = {
+    "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    # A DEFAULT_FASTRTPS_PROFILES.xml in the working directory would be loaded otherwise.
+    "SKIP_DEFAULT_XML_FILE": "1",
+}
+
+# One arena and one thread per library: a node's memory and thread count then depend little on the machine's cores.
+FEW_RESOURCES: Mapping[str, str] = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "MALLOC_ARENA_MAX": "2",
+}
+
+
+#: ROS releases with Fast DDS 2, whose profiles differ from those of Fast DDS 3 in variable and element names.
+WITH_FAST_DDS_2 = ("humble", "iron", "jazzy")
+
+
+def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
+    """Return the variable that names a Fast DDS profile.
+
+    Args:
+        folder: Where the process sees the profiles.
+        name: `NAME.xml` there is for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
+        distro: ROS release, e.g. `jazzy`.
+    """
+    if distro in WITH_FAST_DDS_2:
+        return {"FASTRTPS_DEFAULT_PROFILES_FILE": f"{folder}/{name}.xml"}
+    return {"FASTDDS_DEFAULT_PROFILES_FILE": f"{folder}/{name}3.xml"}
+
+
+def quick_discovery(host_folder: str | Path, runtime: PythonRuntime) -> dict[str, str]:
+    """Return the variable that makes Fast DDS repeat itself quickly; the profile lies in the `host` package."""
+    return dds_profile(host_folder, "fastdds", distro_of(runtime.environment))
+
+
+def distro_of(environment: Mapping[str, str]) -> str:
+    """Return the ROS release that an environment is for."""
+    return environment.get("ROS_DISTRO", "jazzy")
+
+
+def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
+    """Return what any child that uses ROS needs: the trusted worker as well as students' processes."""
+    environment = {
+        "PATH": "/usr/bin:/bin",
+        "LANG": "C.UTF-8",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONUTF8": "1",
+        **runtime.environment,
+        **DDS_SETTINGS,
+        **FEW_RESOURCES,
+    }
+    if runtime.library_paths:
+        environment["LD_LIBRARY_PATH"] = ":".join(map(str, runtime.library_paths))
+    if runtime.python_paths:
+        environment["PYTHONPATH"] = ":".join(map(str, runtime.python_paths))
+    return environment
+
+
+def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
+    """Return what a trusted worker needs: ROS, this package, and a folder for what ROS writes beside its work.
+
+    Args:
+        runtime: Interpreter and ROS.
+        home: That folder.
+    """
+    environment = runtime_environment(runtime)
+    python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
+    return {
+        **environment,
+        **quick_discovery(PACKAGE / "student_host", runtime),
+        "PYTHONPATH": os.pathsep.join([*python_paths, str(PACKAGE.parent)]),
+        "HOME": str(home),
+        "ROS_LOG_DIR": str(home),
+    }
+
+
+def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
+    """Return the whole environment of a student's process.
+
+    Args:
+        process: What is started; its own variables win.
+        home: A folder that the process may write to, as the process sees it.
+    """
+    return {
+        **runtime_environment(process.runtime),
+        "PATH": "/usr/bin",
+        "HOME": str(home),
+        "ROS_LOG_DIR": str(home / "log"),
+        # An int in a float field is then an exception with a line instead of an abort.
+        "ROS_PYTHON_CHECK_FIELDS": "1",
+        **process.environment,
+    }

@@ -1,0 +1,192 @@
+"""Which files of this machine a student's process sees, and what of the grader it must not see."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import secrets
+import stat
+import sysconfig
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+import grader
+from grader.execution.ros_installation import PythonRuntime
+from grader.execution.sandbox.protocol import WorkerView
+
+MOST_LINKS = 40  # what the kernel allows in one path
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A minimal view of the machine's files.
+
+    Attributes:
+        bound: Real files and folders, sorted, none inside another.
+        links: Symbolic links on the way to them, (where, target), sorted, none inside a bound folder.
+    """
+
+    bound: tuple[Path, ...]
+    links: tuple[tuple[Path, str], ...]
+
+    def parents(self) -> tuple[Path, ...]:
+        """Return the folders above the bound paths and links, outermost first."""
+        return parents_of((*self.bound, *(where for where, _ in self.links)))
+
+
+def view_of(paths: Iterable[Path]) -> View:
+    """Return a view in which every path that exists can be opened under its own name.
+
+    Args:
+        paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link
+            to a link still finds its way; a path that does not exist is left out.
+    """
+    real: set[Path] = set()
+    links: dict[Path, str] = {}
+    for path in paths:
+        target, on_the_way = _follow(path)
+        if target is not None:
+            real.add(target)
+            links.update(on_the_way)
+    bound = tuple(path for path in sorted(real) if not any(parent in real for parent in path.parents))
+    return View(bound, tuple((where, links[where]) for where in sorted(links) if not _is_inside(where, bound)))
+
+
+def parents_of(paths: Iterable[Path]) -> tuple[Path, ...]:
+    """Return every folder above the paths except the root, outermost first."""
+    return tuple(sorted({parent for path in paths for parent in path.parents if parent != Path("/")}))
+
+
+def _is_inside(path: Path, folders: Iterable[Path]) -> bool:
+    return any(folder in path.parents for folder in folders)
+
+
+def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
+    """Walk a path part by part and note each link passed; None if it leads nowhere."""
+    links: dict[Path, str] = {}
+    done, to_do = Path("/"), list(PurePath(os.path.normpath(path)).parts[1:])
+    passed = 0
+    while to_do:
+        step = done / to_do.pop(0)
+        if step.name == "..":
+            done = done.parent
+        elif step.is_symlink():
+            passed += 1
+            if passed > MOST_LINKS:
+                return None, {}
+            target = os.readlink(step)  # noqa: PTH115 -- Path.readlink drops a leading "./"
+            links[step] = target
+            to_do[:0] = [part for part in PurePath(target).parts if part != "/"]
+            done = Path("/") if target.startswith("/") else done
+        elif step.exists():
+            done = step
+        else:
+            return None, {}
+    return done, links
+
+
+# Where there is no user namespace, the kernel counts processes by user: students who run at the same time on one
+# machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since
+# containers map no others.
+STUDENT_GROUP = 61234
+STUDENT_USERS = range(61234, 65234)
+TRIES = 1000
+
+
+#: Graders of one machine lock in this file the byte of each user that they have taken; only root writes there.
+TAKEN = Path("/run/rclpy-grader.users")
+
+
+class StudentUsers:
+    """Hands out users that student processes may become, each to one process on this machine.
+
+    A user stays taken until the process that asked for it ends. Where no note can be made of that, a user is only
+    unlikely to be another's.
+
+    Args:
+        taken: The file of locks, made if it is not there.
+    """
+
+    def __init__(self, taken: Path) -> None:
+        self._path = taken
+        self._file: int | None = None
+        self._mine: set[int] = set()
+        self._lock = threading.Lock()
+
+    def next(self) -> int:
+        """Return a user that nobody else has."""
+        with self._lock:
+            for _ in range(TRIES):
+                user = STUDENT_USERS.start + secrets.randbelow(len(STUDENT_USERS))
+                if user not in self._mine and self._take(user):
+                    break
+            self._mine.add(user)
+            return user
+
+    def _take(self, user: int) -> bool:
+        try:
+            if self._file is None:
+                self._file = os.open(self._path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, user)
+        except OSError as error:
+            return error.errno not in (errno.EAGAIN, errno.EACCES) or self._file is None
+        return True
+
+
+_USERS = StudentUsers(TAKEN)
+
+
+def some_user() -> int:
+    """Return a user that a student's process may become, and that no other grader on this machine uses."""
+    return _USERS.next()
+
+
+def taken_users() -> tuple[Path, ...]:
+    """Return the file in which workers note the users they have taken, made if it is not there; nothing if neither."""
+    with contextlib.suppress(OSError):
+        os.close(os.open(TAKEN, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600))
+        return (TAKEN,)
+    return ()
+
+
+def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
+    """Return the folders with rubrics and checks that would be seen through a folder that is shown."""
+    package = Path(grader.__file__).resolve().parent
+    bound = tuple(bound)
+    # An editable installation keeps a copy of the rubrics among the packages, away from the code.
+    installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
+    places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
+    return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
+
+
+def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
+    """Return what a worker sees: Python, ROS, the part of this package that it runs, and a folder for its work.
+
+    Args:
+        runtime: Interpreter and ROS.
+        folder: That folder; what is recorded is staged there.
+    """
+    package = Path(grader.__file__).resolve().parent
+    read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
+    hidden = tuple(secrets_within(view_of(read).bound, runtime))
+    own = tuple(package / name for name in ("__init__.py", "core", "student_host", "execution"))
+    return WorkerView(read, hidden, own, (folder,))
+
+
+def make_readable(folder: Path) -> None:
+    """Let every user read a folder and what is in it; links are left alone."""
+    for path in (folder, *folder.rglob("*")):
+        mode = path.lstat().st_mode
+        wanted = 0o555 if stat.S_ISDIR(mode) else 0o444
+        if (stat.S_ISDIR(mode) or stat.S_ISREG(mode)) and mode & wanted != wanted:
+            path.chmod(stat.S_IMODE(mode) | wanted)
+
+
+def closed_folders(paths: Iterable[Path]) -> list[Path]:
+    """Return the folders above some paths that only their owner or group can enter."""
+    folders = {folder for path in paths for folder in path.parents}
+    return [folder for folder in sorted(folders) if folder.is_dir() and not folder.stat().st_mode & stat.S_IXOTH]

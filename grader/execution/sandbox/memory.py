@@ -1,0 +1,165 @@
+"""Remembers the self-tests of a login session in a file of the user's own; whatever is wrong with it, it is ignored."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import socket
+import stat
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import grader
+from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport
+from grader.execution.ros_installation import RosInstallation
+from grader.execution.sandbox.bubblewrap import SYSTEM_PROGRAMS
+from grader.execution.sandbox.properties import SETTINGS
+
+LARGEST = 64 << 10
+FOLDER = "rclpy-grader"
+#: What reading a file that anything may have happened to raises.
+UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The place of one tier's self-test.
+
+    Attributes:
+        file: A file in the user's own folder; None if there is no such folder.
+        key: Everything that a result depends on, by what it is, each as a digest: what was remembered under another
+            key is ignored.
+    """
+
+    file: Path | None
+    key: Mapping[str, str]
+
+    @classmethod
+    def of(cls, tier: str, ros: RosInstallation) -> Memory:
+        """Return the place for a tier, this machine as it is booted, this user and this ROS."""
+        texts = {"sandbox": tier}
+        for what, text in circumstances(ros):
+            texts[what] = "\n".join((texts.get(what, ""), text))
+        key = {what: _digest(text) for what, text in texts.items()}
+        folder = own_folder()
+        # Several installations of one user are used in turn: each has a file of its own.
+        installation = _digest(f"{Path(__file__)} {ros.runtime.executable} {ros.prefix}")[:12]
+        return cls(folder / f"sandbox-{tier}-{installation}.json" if folder else None, key)
+
+    def recall(self) -> TierReport | None:
+        """Return the self-test remembered, if there is one and the file is this user's alone."""
+        try:
+            remembered = self._read()
+            return report_from_json(remembered["report"]) if remembered["key"] == self.key else None
+        except UNUSABLE:
+            return None
+
+    def lapse(self) -> str:
+        """Return why no self-test is recalled, as a phrase; empty if one is."""
+        if self.recall() is not None:
+            return ""
+        if self.file is None:
+            return "there is no folder to remember it in"
+        try:
+            before = dict(self._read()["key"])
+        except UNUSABLE:
+            return "none is remembered"
+        changed = [what for what, digest in self.key.items() if before.get(what) != digest]
+        return f"changed since: {', '.join(changed)}" if changed else "what is remembered cannot be used"
+
+    def _read(self) -> Any:
+        """Return what the file holds; raises one of `UNUSABLE` if that is nothing or not this user's alone."""
+        if self.file is None:
+            raise FileNotFoundError
+        descriptor = os.open(self.file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+        with os.fdopen(descriptor, "rb") as file:
+            found = os.fstat(descriptor)
+            if found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) != 0o600 or found.st_size > LARGEST:
+                raise PermissionError
+            return json.loads(file.read(LARGEST))
+
+    def keep(self, report: TierReport) -> None:
+        """Remember a self-test, if that can be done."""
+        if self.file is None:
+            return
+        draft = self.file.with_name(f".{secrets.token_hex(8)}")
+        with contextlib.suppress(OSError):
+            descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+                json.dump({"key": dict(self.key), "report": asdict(report)}, file)
+            draft.replace(self.file)
+
+
+def report_from_json(values: object) -> TierReport:
+    """Return a report from what was remembered; raises ValueError, TypeError or KeyError if it is none."""
+    if not isinstance(values, dict) or values["name"] not in TIERS:
+        raise ValueError("a report of a tier")
+    properties = tuple(Property(**found) for found in values.pop("properties"))
+    report = TierReport(**values, properties=properties)
+    texts = (report.why, report.remedy, *(text for found in properties for text in (found.mechanism, found.found)))
+    flags = (report.usable, *(found.holds for found in properties))
+    if [found.name for found in properties] != list(PROPERTIES):
+        raise ValueError("a report of every property")
+    if not all(type(text) is str for text in texts) or not all(type(flag) is bool for flag in flags):
+        raise TypeError("texts and flags")
+    return report
+
+
+def own_folder() -> Path | None:
+    """Return a folder that only this user can write to, made if need be; None if there is none."""
+    given = os.environ.get("XDG_RUNTIME_DIR") or os.environ.get("XDG_CACHE_HOME")
+    base = Path(given) if given else Path.home() / ".cache"
+    folder = base / FOLDER
+    with contextlib.suppress(OSError, RuntimeError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022:
+            return folder
+    return None
+
+
+def circumstances(ros: RosInstallation) -> Iterator[tuple[str, str]]:
+    """Yield what a self-test depends on, each with what it is; nothing that changes by itself while nothing does."""
+    yield "boot", _content("/proc/sys/kernel/random/boot_id")
+    yield "user", f"{os.geteuid()} {os.getegid()}"
+    for name in ("net", "user", "mnt", "pid"):
+        with contextlib.suppress(OSError):
+            yield "namespaces", os.readlink(f"/proc/self/ns/{name}")  # noqa: PTH115 -- it points to no path
+    status = _content("/proc/self/status").splitlines()
+    yield from (("privileges", line) for line in status if line.startswith(("Cap", "Seccomp", "NoNewPrivs")))
+    # Which ones there are changes with every container that is started here, and changes nothing.
+    yield "network", str(any(name != "lo" for _, name in socket.if_nameindex()))
+    yield from (("settings", f"{name} {_content('/proc/sys/' + name.replace('.', '/'))}") for name, _, _ in SETTINGS)
+    for program in ("bwrap", "prlimit", "setpriv"):
+        yield program, _stamp(Path(shutil.which(program, path=SYSTEM_PROGRAMS) or shutil.which(program) or "/nowhere"))
+    yield "ROS", f"{ros.prefix} {ros.distro} {ros.rclpy_version}"
+    yield "Python", f"{ros.runtime.executable} {ros.runtime.read_paths}"
+    yield "grader", grader.__version__
+    # Not the folder itself or its byte code, which the first run of a version writes.
+    sources = (path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".xml"))
+    yield from (("grader", _stamp(path)) for path in sorted(sources))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _content(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def _stamp(path: Path) -> str:
+    try:
+        found = path.stat()
+    except OSError:
+        return f"{path} missing"
+    return f"{path} {found.st_size} {found.st_mtime_ns}"

@@ -1,0 +1,211 @@
+"""The self-test of a tier: a probe that tries to break out of it, and what it achieved, property by property."""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import fcntl
+import json
+import os
+import secrets
+import socket
+import struct
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport, missing
+from grader.execution.domains import private_domains, shared_domains
+from grader.execution.ros_installation import RosInstallation, runtime_to_json
+from grader.execution.sandbox.environment import PACKAGE, worker_environment
+from grader.execution.sandbox.exposure import worker_view
+from grader.execution.sandbox.properties import mechanism
+from grader.execution.sandbox.protocol import Isolation
+from grader.execution.sandbox.trial import EXCHANGE, NO_EXCHANGE
+
+TRIAL_S = 45.0
+STAGED = "probe.txt"
+ANSWERED = {"achieved", "outgrown", "said"}
+#: Folders that a student never writes to.
+CLOSED = ("/", "/dev", "/etc", "/usr/lib", "/proc")
+SIOCGIFADDR = 0x8915  # linux/sockios.h
+
+
+@dataclass(frozen=True, slots=True)
+class Bait:
+    """What the probe of one trial is tempted with.
+
+    Attributes:
+        folder: Everything of the trial; deleted afterwards.
+        canary: A file beside the submission that everybody may read and write.
+        segment: A file in this machine's shared memory that everybody may read and write.
+        secret: What the worker's command line and environment hold.
+        sinks: Listeners on this machine's addresses other than the loopback.
+        loopback: A listener on the loopback address.
+    """
+
+    folder: Path
+    canary: Path
+    segment: Path
+    secret: str
+    sinks: tuple[socket.socket, ...]
+    loopback: socket.socket
+
+
+def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
+    """Start a probe inside a tier and return what the tier is worth; about half a second.
+
+    Args:
+        isolation: The tier.
+        ros: What students' processes will run with.
+    """
+    letter = TIERS[isolation.name]
+    with laid_bait() as bait:
+        answer, why = trial(isolation, ros, bait)
+        if set(answer.get("achieved", ())) != set(PROPERTIES):
+            why = why or str(answer.get("said") or "the probe did not answer")
+            return TierReport(isolation.name, letter, usable=False, why=f"no process runs in it: {why}")
+        achieved: dict[str, list[str]] = answer["achieved"]
+        for name, more in noticed(bait, outgrown=bool(answer["outgrown"])):
+            achieved[name].append(more)
+    contained = tuple(property_of(isolation.name, name, achieved[name]) for name in PROPERTIES)
+    why = why_not(contained)
+    return TierReport(isolation.name, letter, usable=not why, why=why, properties=contained)
+
+
+def property_of(tier: str, name: str, achieved: list[str]) -> Property:
+    """Return a property from what was achieved against it."""
+    if not achieved:
+        return Property(name, holds=True, mechanism=mechanism(tier, name))
+    return Property(name, holds=False, mechanism=mechanism(tier, name), found=", ".join(dict.fromkeys(achieved))[:300])
+
+
+def why_not(contained: tuple[Property, ...]) -> str:
+    """Return why a tier with these properties is not to be used; empty if it may."""
+    if any(NO_EXCHANGE in found.found for found in contained if found.name == EXCHANGE):
+        return NO_EXCHANGE
+    return "; ".join(map(str, missing(contained)))
+
+
+# --- the trial ---
+
+
+def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
+    """Run the trial and return its answer, empty if there is none, and why there is none."""
+    submission = bait.folder / "submission"
+    request = {
+        "isolation": isolation.name,
+        "runtime": runtime_to_json(ros.runtime),
+        "submission": str(submission),
+        "staged": STAGED,
+        "domain": next(shared_domains() if isolation.shares_network else private_domains()),
+        "probe": asked_of_probe(bait),
+    }
+    module = "grader.execution.sandbox.trial"
+    argv = (str(ros.runtime.executable), "-s", "-B", "-m", module, json.dumps(request), bait.secret)
+    command = isolation.worker_command(argv, environment(ros, bait), (), worker_view(ros.runtime, bait.folder))
+    try:
+        done = subprocess.run(
+            command.argv,
+            env=dict(command.environment),
+            pass_fds=command.pass_fds,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=TRIAL_S,
+            start_new_session=True,
+            check=False,
+            cwd="/",
+        )
+    except subprocess.TimeoutExpired:
+        return {}, f"the self-test did not end within {TRIAL_S:.0f} s"
+    except OSError as error:
+        return {}, f"{Path(command.argv[0]).name} cannot be started: {error.strerror}"
+    finally:
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
+    with contextlib.suppress(ValueError):
+        answer = json.loads(done.stdout)
+        if isinstance(answer, dict) and answer.keys() >= ANSWERED:
+            return answer, ""
+    said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+    return {}, said[-1][:300] if said else f"the self-test ended with code {done.returncode}"
+
+
+def environment(ros: RosInstallation, bait: Bait) -> Mapping[str, str]:
+    """Return the environment of the worker of a trial, which holds a secret as a worker's may."""
+    variables = worker_environment(ros.runtime, bait.folder)
+    return {**variables, "PATH": os.environ.get("PATH", variables["PATH"]), "PROBE_SECRET": bait.secret}
+
+
+def asked_of_probe(bait: Bait) -> dict[str, Any]:
+    """Return what the supervisor tells the probe; the worker adds the rest."""
+    hidden = (bait.canary, PACKAGE / "core" / "report.py", PACKAGE / "judging" / "__init__.py", Path("/etc/passwd"))
+    return {
+        "hidden": [str(path) for path in hidden],
+        "closed": [*CLOSED, str(bait.folder)],
+        "files": [str(bait.canary)],
+        "segments": [str(bait.segment)],
+        # In two halves: the probe's own command line is to be found by nobody.
+        "secret": [bait.secret[:16], bait.secret[16:]],
+        "sinks": [sink.getsockname()[:2] for sink in bait.sinks if sink.type == socket.SOCK_STREAM],
+        "loopback": bait.loopback.getsockname()[1],
+    }
+
+
+# --- the bait ---
+
+
+@contextlib.contextmanager
+def laid_bait() -> Iterator[Bait]:
+    """Lay out bait, and clear it away."""
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="grade-probe-")))
+        folder.chmod(0o755)
+        (folder / "submission").mkdir(mode=0o755)
+        segment = Path("/dev/shm") / f"grade-probe-{secrets.token_hex(8)}"  # noqa: S108
+        files = (folder / "canary", folder / "submission" / STAGED, segment)
+        stack.callback(segment.unlink, missing_ok=True)
+        for path in files:
+            path.write_text("canary", encoding="utf-8")
+            path.chmod(0o666)
+        sinks = tuple(stack.enter_context(sink) for sink in listeners())
+        loopback = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        loopback.bind(("127.0.0.1", 0))
+        loopback.setblocking(False)  # noqa: FBT003 -- the name of the method says what
+        yield Bait(folder, files[0], segment, secrets.token_hex(16), sinks, loopback)
+
+
+def listeners() -> Iterator[socket.socket]:
+    """Yield a TCP and a UDP socket, on the same port, for each of this machine's addresses beyond the loopback."""
+    for _, name in socket.if_nameindex():
+        with contextlib.suppress(OSError):
+            address = address_of(name)
+            if address.startswith("127."):
+                continue
+            stream = socket.create_server((address, 0))
+            yield stream
+            datagram = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            yield datagram
+            datagram.bind(stream.getsockname())
+
+
+def address_of(interface: str) -> str:
+    """Return the IPv4 address of an interface; raises OSError if it has none."""
+    request = array.array("B", struct.pack("16s24x", interface.encode()))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        fcntl.ioctl(asked, SIOCGIFADDR, request)
+    return socket.inet_ntoa(request.tobytes()[20:24])
+
+
+def noticed(bait: Bait, *, outgrown: bool) -> Iterator[tuple[str, str]]:
+    """Yield what the bait itself shows, by property: whatever the probe says."""
+    with contextlib.suppress(BlockingIOError):
+        if bait.loopback.recv(16):
+            yield "dds_private", "programs outside share its loopback address"
+    if bait.canary.read_text(encoding="utf-8") != "canary" or bait.canary.stat().st_mode & 0o777 != 0o666:
+        yield "fs_write", f"changed {bait.canary.name}"
+    if outgrown:
+        yield "fs_write", "outgrew its scratch folder"

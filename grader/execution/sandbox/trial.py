@@ -1,0 +1,140 @@
+"""The worker of a self-test: starts a probe as it would start a student, talks to it over DDS, and notes what it felt.
+
+Usage: python -m grader.execution.sandbox.trial JSON, with an object of `isolation`, `runtime`, `submission` and a
+file `staged` in it, `domain`, and `probe`, what the probe is to try. Prints one JSON line: `achieved`, by property;
+`outgrown`; and `said`, the last line of the probe's errors.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from grader.core.limits import Limits
+from grader.execution.ros_installation import runtime_from_json
+from grader.execution.sandbox import probe
+from grader.execution.sandbox.environment import quick_discovery
+from grader.execution.sandbox.protocol import Command, StudentProcess
+from grader.execution.sandbox.start import SPARE
+from grader.execution.sandbox.starting import HOST
+from grader.execution.sandbox.tiers import isolation_from_name
+
+#: Seconds in which a message must have come back, and between two attempts to send it.
+EXCHANGE_S, AGAIN_S = 15.0, 0.03
+LIMITS = Limits(processes=48)
+#: What is noted, and under which property, if no message made the round.
+EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
+
+
+def main() -> None:
+    """Conduct the trial that the command line describes."""
+    request: dict[str, Any] = json.loads(sys.argv[1])
+    segment = Path("/dev/shm") / f"grade-probe-{os.getpid()}"  # noqa: S108
+    segment.write_bytes(b"segment")
+    segment.chmod(0o666)
+    try:
+        answer = trial(request, str(segment))
+    finally:
+        segment.unlink()
+    print(json.dumps(answer), flush=True)  # noqa: T201 -- the answer
+    # Taking ROS down takes longer than everything else here.
+    os._exit(0)
+
+
+def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
+    """Start the probe, exchange a message with it, and return what it achieved."""
+    signals: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, _: signals.append(number))
+    before = condition()
+    command = probe_command(request, segment)
+    with subprocess.Popen(
+        command.argv,
+        env=dict(command.environment),
+        pass_fds=command.pass_fds,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    ) as process:
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
+        heard, kept = exchange(process, request["domain"])
+        out, err = process.communicate(timeout=EXCHANGE_S)
+    lines = out.decode("utf-8", "replace").splitlines()
+    said = err.decode("utf-8", "replace").strip().splitlines()
+    achieved: dict[str, list[str]] = json.loads(lines[0]) if lines else {}
+    if achieved and not (heard and kept):
+        achieved[EXCHANGE].append(NO_EXCHANGE)
+    if achieved and (signals or condition() != before):
+        achieved["signals"].append("the worker felt it")
+    return {"achieved": achieved, "outgrown": lines[1:] == ["outgrown"], "said": said[-1][:300] if said else ""}
+
+
+def condition() -> Mapping[str, object]:
+    """Return what of this process another one could change."""
+    return {
+        "limit": resource.getrlimit(resource.RLIMIT_MSGQUEUE),
+        "priority": os.getpriority(os.PRIO_PROCESS, 0),
+        "processors": sorted(os.sched_getaffinity(0)),
+    }
+
+
+def probe_command(request: dict[str, Any], segment: str) -> Command:
+    """Return the command of the probe, as a student's process."""
+    isolation = isolation_from_name(request["isolation"])
+    runtime = runtime_from_json(request["runtime"])
+    told = {
+        **request["probe"],
+        "worker": os.getpid(),
+        "shared": isolation.shares_network,
+        "segments": [*request["probe"]["segments"], segment],
+        "memory": LIMITS.address_space_bytes,
+        "threads": 2 * (LIMITS.processes + SPARE),
+        "scratch": LIMITS.scratch_bytes,
+    }
+    seen_at = isolation.submission_seen_at or request["submission"]
+    told["files"] = [*told["files"], f"{seen_at}/{request['staged']}"]
+    told["closed"] = [*told["closed"], seen_at, str(Path(seen_at).parent)]
+    source = Path(probe.__file__).read_text(encoding="utf-8")
+    process = StudentProcess(
+        runtime=runtime,
+        host_folder=HOST,
+        submission=Path(request["submission"]),
+        arguments=("-s", "-u", "-B", "-c", source, json.dumps(told)),
+        environment={"ROS_DOMAIN_ID": str(request["domain"]), **quick_discovery(isolation.host_seen_at, runtime)},
+        pass_fds=(),
+    )
+    return isolation.student_command(process, LIMITS)
+
+
+def exchange(process: subprocess.Popen[bytes], domain: int) -> tuple[bool, Any]:
+    """Send a message until it comes back from the probe; return whether it did while that ran, and the node."""
+    import rclpy  # noqa: PLC0415 -- the probe starts meanwhile
+    from std_msgs.msg import String  # noqa: PLC0415
+
+    rclpy.init(domain_id=domain)
+    node = rclpy.create_node("trial", start_parameter_services=False, enable_rosout=False)
+    nonce = os.urandom(8).hex()
+    heard: list[str] = []
+    node.create_subscription(String, "probe_back", lambda message: heard.append(message.data), 10)
+    forth = node.create_publisher(String, "probe_forth", 10)
+    deadline, again = time.monotonic() + EXCHANGE_S, 0.0
+    while nonce not in heard and process.poll() is None and (now := time.monotonic()) < deadline:
+        # Whoever is not matched yet loses what is sent.
+        if now >= again and forth.get_subscription_count():
+            forth.publish(String(data=nonce))
+            again = now + AGAIN_S
+        rclpy.spin_once(node, timeout_sec=0.01)
+    return nonce in heard, node
+
+
+if __name__ == "__main__":
+    main()

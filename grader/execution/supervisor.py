@@ -1,0 +1,346 @@
+"""The supervisor's side of recording: keeps workers, hands them plans, takes traces back.
+
+A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and
+the plan it had is tried once more, unless it took all the time it had. A second failure becomes a trace with a problem
+of ours, which is never judged; but where workers have ended at their limits twice, the nodes have brought them there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.core.errors import HarnessError
+from grader.core.limits import Limits
+from grader.core.quantities import MIB, NS_PER_S, size
+from grader.core.trace import ClockKind, Fault, FaultKind, Trace
+from grader.execution.codec import trace_from_json
+from grader.execution.plan import Plan, plan_to_json
+from grader.execution.ros_installation import PythonRuntime, runtime_to_json
+from grader.execution.sandbox.environment import worker_environment
+from grader.execution.sandbox.exposure import worker_view
+from grader.execution.sandbox.protocol import Isolation
+from grader.execution.usage import families, usage
+from grader.execution.worker import RealTimeBudget
+
+#: A worker that has not answered after the real time of a scenario and this many seconds is taken for lost: its guard
+#: would have ended it long before. On the wall clock it may have begun a second try shortly before the end.
+MARGIN_S = 60.0
+#: What an ended worker gets to be gone.
+END_S = 5.0
+#: A worker that fills more is ended, which its guard should have prevented: it does not run while the middleware takes
+#: apart what a node has sent. How often that is looked at.
+FULL_BYTES, LOOK_S = 768 * MIB, 0.1
+#: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
+ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
+TRIES = 2
+MODULE = b"grader.execution.worker"
+
+
+class WorkerLostError(HarnessError):
+    """A worker ended, or did not answer.
+
+    Args:
+        message: What happened.
+        limit: The limit of its own that it ended at, in words; empty if none explains it.
+        late: Whether it has taken all the time it had.
+    """
+
+    def __init__(self, message: str, *, limit: str = "", late: bool = False) -> None:
+        super().__init__(message)
+        self.limit = limit
+        self.late = late
+
+
+class WorkerProcess:
+    """One running worker and the line to it.
+
+    Args:
+        isolation: The tier it runs in, and starts student processes in.
+        runtime: Interpreter and ROS.
+        domains: Gives the number of a ROS domain that nobody else uses.
+        scratch: A folder for what ROS writes beside its work.
+
+    Attributes:
+        worn: Whether it should do no more, as it says.
+    """
+
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
+        self._domains = domains
+        self.worn = False
+        self._executable = os.fsencode(runtime.executable)
+        self._pid = 0
+        self._line, theirs = socket.socketpair()
+        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": runtime_to_json(runtime)}
+        argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
+        command = isolation.worker_command(
+            argv, _environment(runtime, scratch), (theirs.fileno(),), worker_view(runtime, scratch)
+        )
+        self._process = subprocess.Popen(
+            command.argv,
+            env=dict(command.environment),
+            pass_fds=command.pass_fds,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
+            cwd="/",
+            start_new_session=True,
+        )
+        for descriptor in command.opened_fds:
+            os.close(descriptor)
+        theirs.close()
+
+    def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
+        """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it is no more."""
+        own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
+        request = json.dumps({"plan": plan_to_json(plan), **own}) + "\n"
+        expected = f"worker: expected a trace of {plan.scenario}, found none"
+        try:
+            self._line.settimeout(MARGIN_S)  # a plan with a recording in it is more than the line holds at once
+            self._line.sendall(request.encode())
+            tries = 1 + (plan.clock == ClockKind.WALL.value)
+            seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
+            answer = json.loads(self._answer(plan.limits, time.monotonic() + seconds))
+        except TimeoutError as error:
+            raise WorkerLostError(f"{expected} (it did not answer in time)", late=True) from error
+        except MemoryError as error:
+            what = f"{size(FULL_BYTES)} of memory"
+            raise WorkerLostError(f"{expected} (it had filled {what})", limit=what) from error
+        except EOFError as error:
+            end = self._end()
+            limit = plan.limits.processor_words() if end == "SIGXCPU" else ""
+            raise WorkerLostError(f"{expected} (ended by {end})", limit=limit) from error
+        except (OSError, ValueError, RecursionError) as error:
+            raise HarnessError(f"{expected} ({error})") from error
+        if not isinstance(answer, dict) or "trace" not in answer:
+            problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
+            said = problem.strip().splitlines()
+            raise HarnessError(f"worker: {said[-1] if said else 'expected a trace, found none'}"[:600])
+        self.worn = answer.get("worn") is True
+        real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
+        if isinstance(real_ns, int) and isinstance(starved_ns, int):
+            budget.charge(real_ns, starved_ns)
+        return trace_from_json(answer["trace"])
+
+    def _end(self) -> str:
+        """Return how the worker ended: the name of a signal, or its code."""
+        try:
+            code = self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            return "nothing that can be seen"
+        number = -code if code < 0 else code - 128  # bubblewrap passes a signal on as a shell does
+        return signal.Signals(number).name if number in {*signal.Signals} else f"code {code}"
+
+    def _answer(self, limits: Limits, deadline: float) -> bytes:
+        """Return what the worker says.
+
+        Raises:
+            TimeoutError: It says nothing until the deadline.
+            MemoryError: It has filled too much memory.
+            EOFError: It has ended.
+            OSError: It says too much, or the line is broken.
+        """
+        most = max(ANSWER_BYTES, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
+        received = bytearray()
+        while not received.endswith(b"\n"):
+            self._line.settimeout(LOOK_S)
+            try:
+                found = self._line.recv(1 << 20)
+            except TimeoutError:
+                if time.monotonic() > deadline:
+                    raise
+                self._look()
+                continue
+            if not found:
+                raise EOFError
+            received += found
+            if len(received) > most:
+                raise OSError("it answered without end")
+        return bytes(received)
+
+    def _look(self) -> None:
+        """Raise MemoryError if the worker itself, not what it has started, has filled too much memory."""
+        self._pid = self._pid or self._find()
+        if self._pid and usage([self._pid]).memory_bytes > FULL_BYTES:
+            raise MemoryError
+
+    def _find(self) -> int:
+        """Return the worker's number here, below whatever the isolation put around it; 0 before it has begun."""
+        for pid in sorted(families([self._process.pid])[self._process.pid]):
+            with contextlib.suppress(OSError):
+                words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+                if words[0] == self._executable and MODULE in words:
+                    return pid
+        return 0
+
+    def close(self) -> None:
+        """Hang up; the worker and whatever it started end at once."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, 9)
+        self._process.wait()
+        self._line.close()  # last: a thread that waits for an answer has been woken by the end of the worker
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A plan with the name its progress is told by, and the real time it shares with others; without end by default."""
+
+    title: str
+    plan: Plan
+    budget: RealTimeBudget = field(default_factory=RealTimeBudget, compare=False)
+
+
+class Recorder:
+    """A few workers that record scenarios side by side; virtual time makes that safe.
+
+    Args:
+        isolation: The tier.
+        runtime: Interpreter and ROS.
+        domains: Gives ROS domains, a new one for every scenario.
+        scratch: A folder for what ROS writes beside its work, and for all that is recorded: a worker may see no
+            other. The caller removes it.
+        workers: How many scenarios are recorded at the same time.
+    """
+
+    def __init__(
+        self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], *, scratch: Path, workers: int
+    ) -> None:
+        self._isolation = isolation
+        self._runtime = runtime
+        self._domains = _Shared(domains)
+        self._idle: queue.LifoQueue[WorkerProcess | None] = queue.LifoQueue()  # a warm worker first
+        self._alive: list[WorkerProcess] = []
+        self._lock = threading.Lock()
+        self._closed = False
+        self._count = workers
+        self._scratch = scratch
+        # The system ends a worker with the thread that started it: these threads live as long as the recorder.
+        self._pool = ThreadPoolExecutor(workers, thread_name_prefix="recorder")
+        for _ in range(workers):
+            self._idle.put(None)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def warm_up(self, count: int) -> None:
+        """Start so many workers now, so that they are ready when the first plan comes."""
+        # In the caller's thread, which outlives the recorder. All places are taken before any is given back: the
+        # queue would hand the first worker out again.
+        places = [self._idle.get() for _ in range(min(count, self._count))]
+        for place in places:
+            self._idle.put(place or self._start())
+
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+        """Record every job and return the traces in the same order."""
+        return list(self.each(jobs, progress))
+
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        """Record every job and yield the traces in the same order, each as soon as those before it are there."""
+        futures = [self._pool.submit(self._record, job, progress) for job in jobs]
+        for future in futures:
+            yield future.result()
+
+    def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
+        """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
+        progress(job.title)
+        trace = self._recorded(job)
+        return self._recorded(job) if job.budget.left_ns and any(f.signal for f in trace.faults()) else trace
+
+    def _recorded(self, job: Job) -> Trace:
+        problem = ""
+        limits: list[str] = []
+        for _ in range(TRIES):
+            if not job.budget.left_ns:
+                return job.budget.unrecorded(job.plan)
+            worker = self._idle.get()
+            usable = None
+            try:
+                worker = worker or self._start()
+                trace = worker.run(job.plan, job.budget)
+                if worker.worn:
+                    self._discard(worker)
+                else:
+                    usable = worker
+                return trace
+            except HarnessError as error:
+                problem = error.message
+                self._discard(worker)
+                if isinstance(error, WorkerLostError):
+                    limits += [error.limit] if error.limit else []
+                    if error.late:
+                        break
+                if self._closed:
+                    break
+            finally:
+                self._idle.put(usable)
+        clock = ClockKind(job.plan.clock)
+        if len(limits) == TRIES:
+            faults = tuple(
+                Fault(
+                    0,
+                    name,
+                    FaultKind.KILLED,
+                    f"stopped: what the nodes sent took the grader's own process to {limits[-1]}",
+                )
+                for name, _ in job.plan.processes
+            )
+            return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
+        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+
+    def _start(self) -> WorkerProcess:
+        with self._lock:
+            if self._closed:
+                raise HarnessError("worker: the recorder is closed")
+            worker = WorkerProcess(self._isolation, self._runtime, self._domains, self._scratch)
+            self._alive.append(worker)
+            return worker
+
+    def _discard(self, worker: WorkerProcess | None) -> None:
+        with self._lock:
+            if worker in self._alive and worker is not None:
+                self._alive.remove(worker)
+                worker.close()
+
+    def close(self) -> None:
+        """End every worker; what is under way is given up."""
+        with self._lock:
+            self._closed = True
+            alive, self._alive = self._alive, []
+        for worker in alive:
+            worker.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class _Shared:
+    """An iterator that several threads may use."""
+
+    def __init__(self, numbers: Iterator[int]) -> None:
+        self._numbers = numbers
+        self._lock = threading.Lock()
+
+    def __iter__(self) -> _Shared:
+        return self
+
+    def __next__(self) -> int:
+        with self._lock:
+            return next(self._numbers)
+
+
+def _environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
+    """Return the whole environment of a worker: nothing of the caller's but where to find programs."""
+    from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
+    return {**worker_environment(runtime, scratch), **from_caller}

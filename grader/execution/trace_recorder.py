@@ -1,0 +1,144 @@
+"""Takes down what happens in a scenario, up to its limits; the same for both clocks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from grader.core.limits import Limits
+from grader.core.quantities import NS_PER_S, size
+from grader.core.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer, Request, Response
+from grader.execution.observer import Taken
+
+#: Of a trace nobody reads more notes than this, and of a note no longer names.
+NOTES, NOTE_CHARACTERS, NAME_CHARACTERS = 50, 500, 200
+#: Bounds beyond which nobody's nodes go, and which keep a trace small enough to be handed on: publishers and
+#: subscriptions at one moment, the same over all snapshots of the graph, faults and offers.
+ENDPOINTS, GRAPH_PARTS, FAULTS, OFFERS = 500, 100_000, 200, 2_000
+
+
+#: Messages a second on one topic, and so many more, beyond which nobody's nodes go either: a node that publishes as
+#: fast as it can.
+FLOOD_HZ, BURST = 1_000, 100
+
+
+class Tape:
+    """The observations of one run, in order.
+
+    Args:
+        limits: How much is taken down.
+
+    Attributes:
+        observations: What was taken down.
+        full: Why the recording has to end, as a sentence; empty while it goes on.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._notes: list[str] = []
+        self._graph = GraphSnapshot(0, (), ())
+        self._graph_parts = 0
+        self._messages: Counter[str] = Counter()
+        self._traffic_bytes = 0
+        self._counts: Counter[type] = Counter()
+        self.observations: list[Observation] = []
+        self.full = ""
+
+    @property
+    def graph(self) -> GraphSnapshot:
+        """The last snapshot."""
+        return self._graph
+
+    def seen(self, topic: str) -> int:
+        """Return how many messages on a topic were taken down."""
+        return self._messages[topic]
+
+    def floods(self, now_ns: int) -> bool:
+        """Return whether more messages have come on a topic, for the time it is, than any right node sends."""
+        return max(self._messages.values(), default=0) > BURST + FLOOD_HZ * now_ns / NS_PER_S
+
+    def add(self, *observations: Observation) -> None:
+        """Take down what needs no counting, or little: of faults and offers only the first ones."""
+        for observation in observations:
+            kind = type(observation)
+            self._counts[kind] += 1
+            if self._counts[kind] <= {Fault: FAULTS, Offer: OFFERS}.get(kind, len(self.observations) + 1):
+                self.observations.append(observation)
+
+    def message(self, t_ns: int, taken: Taken) -> None:
+        """Take down a message, or end the recording where it is one too many."""
+        limits = self._limits
+        self._messages[taken.topic] += 1
+        self._traffic_bytes += len(taken.cdr)
+        if self._messages[taken.topic] > limits.messages:
+            self.stop(t_ns, f"more than {limits.messages:,} messages on {taken.topic[:NAME_CHARACTERS]}")
+        elif self._traffic_bytes > limits.traffic_bytes:
+            self.stop(t_ns, f"more than {size(limits.traffic_bytes)} of messages")
+        elif not self.full:
+            self.observations.append(Message(t_ns, taken.topic, taken.type, taken.value, taken.cdr))
+
+    def exchange(self, observation: Request | Response, size_bytes: int) -> None:
+        """Take down a request or response, or end the recording where it is one too many.
+
+        Args:
+            observation: It.
+            size_bytes: How much of it a student's node sent.
+        """
+        limits, service = self._limits, observation.service
+        self._messages[f"service {service}"] += 1
+        self._traffic_bytes += size_bytes
+        if self._messages[f"service {service}"] > limits.messages:
+            name = service[:NAME_CHARACTERS]
+            self.stop(observation.t_ns, f"more than {limits.messages:,} requests and responses of {name}")
+        elif self._traffic_bytes > limits.traffic_bytes:
+            self.stop(observation.t_ns, f"more than {size(limits.traffic_bytes)} of messages")
+        elif not self.full:
+            self.observations.append(observation)
+
+    def look(self, graph: GraphSnapshot, participants: int) -> bool:
+        """Take down the graph where it has changed.
+
+        Args:
+            graph: As it is now.
+            participants: How many participants have appeared so far.
+
+        Returns:
+            Whether it had changed and may be worked with.
+        """
+        last = self._graph
+        if (graph.nodes, graph.endpoints, graph.services) == (last.nodes, last.endpoints, last.services):
+            return False
+        self._graph_parts += len(graph.nodes) + len(graph.endpoints) + len(graph.services)
+        if participants > self._limits.participants:
+            self.stop(graph.t_ns, f"more than {self._limits.participants:,} DDS participants")
+        elif max(len(graph.endpoints), len(graph.nodes)) > ENDPOINTS:
+            self.stop(graph.t_ns, f"more than {ENDPOINTS:,} nodes, publishers or subscriptions at once")
+        elif len(graph.services) > ENDPOINTS:
+            self.stop(graph.t_ns, f"more than {ENDPOINTS:,} servers and clients at once")
+        elif self._graph_parts > GRAPH_PARTS:
+            self.stop(graph.t_ns, "the nodes changed the ROS graph too often")
+        else:
+            self._graph = graph
+            self.observations.append(graph)
+        return not self.full
+
+    def look_back(self, t_ns: int) -> None:
+        """Take down that nothing was ever in the graph, if so: a trace without any snapshot says nothing about it."""
+        if not any(isinstance(o, GraphSnapshot) for o in self.observations):
+            self.observations.append(GraphSnapshot(t_ns, (), ()))
+
+    def stop(self, t_ns: int, why: str) -> None:
+        """End the recording at a limit, with a mark; the first limit counts."""
+        if not self.full:
+            self.full = f"{why}: the rest was not looked at"
+            self.observations.append(Mark(t_ns, "limit", self.full))
+
+    def note(self, *texts: str) -> None:
+        """Take down sentences that a reader must know."""
+        self._notes += texts[: 2 * NOTES - len(self._notes)] if len(self._notes) < 2 * NOTES else ()
+
+    def notes(self, others: Iterable[str]) -> tuple[str, ...]:
+        """Return the notes, those of others last; the limit that ended the recording comes first."""
+        first = [self.full] if self.full else []
+        whole = dict.fromkeys(text[:NOTE_CHARACTERS] for text in (*first, *self._notes, *others))
+        return tuple(whole)[:NOTES]

@@ -1,0 +1,138 @@
+"""What processes use, as the kernel says: memory, processor time, threads, and files in scratch folders."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from grader.core.quantities import NS_PER_S
+
+#: Where a sandbox with its own file systems has the folders that may be written to.
+FOLDERS = ("tmp", "dev/shm")
+
+
+def scratch_names(pids: Iterable[int]) -> int:
+    """Return how many files and folders there are in the fullest scratch folder of some processes.
+
+    Args:
+        pids: The processes, of one sandbox.
+
+    Returns:
+        The count; 0 where they share the machine's folders, of which nothing tells who filled them.
+    """
+    return max(
+        (_names_below(f"/proc/{pid}/root/{folder}", f"/{folder}") for pid in pids for folder in FOLDERS), default=0
+    )
+
+
+def _names_below(folder: str, ours: str) -> int:
+    try:
+        if os.stat(folder).st_dev == os.stat(ours).st_dev:  # noqa: PTH116 -- strings, of folders in /proc
+            return 0
+        system = os.statvfs(folder)
+    except OSError:  # the process has ended, or is being made
+        return 0
+    return system.f_files - system.f_ffree
+
+
+NS_PER_TICK = NS_PER_S // os.sysconf("SC_CLK_TCK")
+#: State in /proc/PID/stat of a process that a signal has halted.
+HALTED = b"T"
+#: Kinds of memory that belong to a process and cannot be read again from a file; in /proc/PID/status, in KiB.
+OWN_MEMORY = (b"RssAnon:", b"RssShmem:", b"VmSwap:")
+#: Places in /proc/PID/stat after the name in parentheses, which may hold anything; proc(5) counts from 1, and the
+#: first one here is its third.
+PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What some processes use together; processor time includes that of children that have ended.
+
+    `halted` is whether a signal has halted one of them, so that it will never run by itself again.
+    """
+
+    memory_bytes: int = 0
+    processor_ns: int = 0
+    threads: int = 0
+    halted: bool = False
+
+
+def usage(pids: Iterable[int]) -> Usage:
+    """Return what processes use; one that has ended uses nothing."""
+    memory_kib = ticks = threads = 0
+    halted = False
+    for pid in pids:
+        own_kib, own_threads = _status(pid)
+        memory_kib += own_kib
+        threads += own_threads
+        fields = _stat(pid)
+        halted = halted or fields[:1] == [HALTED]
+        ticks += sum(int(field) for field in fields[USER_TIME : CHILDREN_SYSTEM_TIME + 1])
+    return Usage(memory_kib << 10, ticks * NS_PER_TICK, threads, halted)
+
+
+def families(roots: Collection[int]) -> dict[int, set[int]]:
+    """Return each process with its children, their children and so on."""
+    parents = {pid: int(fields[PARENT]) for pid in _pids() if (fields := _stat(pid))}
+    found: dict[int, set[int]] = {root: {root} for root in roots}
+    for pid in parents:
+        line = [pid]
+        while line[-1] in parents and line[-1] not in found and len(line) <= len(parents):
+            line.append(parents[line[-1]])
+        if line[-1] in found:
+            found[line[-1]].update(line)
+    return found
+
+
+def innermost(root: int) -> int:
+    """Return the process at the end of a chain of wrappers, each of which has one child."""
+    pids = {pid: int(fields[PARENT]) for pid in families([root])[root] if (fields := _stat(pid))}
+    return next((pid for pid in pids if pid not in pids.values()), root)
+
+
+def starved_ns(pids: Iterable[int]) -> int:
+    """Return how long the threads of processes were ready to run and had to wait for a processor."""
+    return sum(thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task"))
+
+
+def thread_starved_ns(pid: int, thread: int | str) -> int:
+    """Return how long a thread was ready to run and waited for a processor; 0 where the kernel does not count it."""
+    fields = _read(f"/proc/{pid}/task/{thread}/schedstat").split()
+    return int(fields[1]) if len(fields) > 1 else 0
+
+
+def _status(pid: int) -> tuple[int, int]:
+    """Return a process's own memory in KiB and its threads."""
+    memory_kib = threads = 0
+    for line in _read(f"/proc/{pid}/status").splitlines():
+        if line.startswith(OWN_MEMORY):
+            memory_kib += int(line.split()[1])
+        elif line.startswith(b"Threads:"):
+            threads = int(line.split()[1])
+    return memory_kib, threads
+
+
+def _stat(pid: int) -> list[bytes]:
+    return _read(f"/proc/{pid}/stat").rpartition(b")")[2].split()
+
+
+def _pids() -> list[int]:
+    return [int(name) for name in _names("/proc") if name.isdecimal()]
+
+
+def _names(folder: str) -> list[str]:
+    try:
+        return os.listdir(folder)  # noqa: PTH208 - many times a second
+    except OSError:
+        return []
+
+
+def _read(path: str) -> bytes:
+    """Return a file of /proc; nothing if the process has ended meanwhile."""
+    try:
+        with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - many times a second
+            return file.read(1 << 16)
+    except OSError:
+        return b""

@@ -1,0 +1,293 @@
+"""The trusted worker: runs plans one after another in a network of its own, and answers each with a trace."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import resource
+import socket
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from grader.core.errors import HarnessError
+from grader.core.limits import Limits
+from grader.core.quantities import GIB, MIB, NS_PER_S, duration
+from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
+from grader.execution.bare_runner import BareStudent
+from grader.execution.bare_start import bare_arguments
+from grader.execution.codec import trace_to_json
+from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
+from grader.execution.notes import Places
+from grader.execution.plan import Plan, plan_from_json
+from grader.execution.resource_monitor import Budget, Guard
+from grader.execution.ros_installation import PythonRuntime, runtime_from_json
+from grader.execution.sandbox.environment import quick_discovery
+from grader.execution.sandbox.protocol import Isolation, StudentProcess
+from grader.execution.sandbox.tiers import isolation_from_name
+from grader.execution.student_process import LOG_FORMAT, Student
+from grader.execution.usage import usage
+
+#: More than anything takes, for recordings that are not of one submission.
+FOREVER_S = 1e9
+#: Where nodes lost more than this share of it to others on the machine, a budget that is used up says nothing of them.
+STARVED_SHARE = 0.25
+
+
+class RealTimeBudget:
+    """Real time from its making on; several recordings may go on at once.
+
+    Args:
+        seconds: How much there is.
+    """
+
+    def __init__(self, seconds: float = FOREVER_S) -> None:
+        self._total_ns = round(seconds * NS_PER_S)
+        self._started_ns = time.monotonic_ns()
+        self._real_ns = self._starved_ns = 0
+        self._lock = threading.Lock()
+
+    @property
+    def left_ns(self) -> int:
+        """Real time that is left; 0 if it is used up."""
+        return max(0, self._total_ns - (time.monotonic_ns() - self._started_ns))
+
+    @property
+    def _exceeded(self) -> str:
+        return f"the recordings of this submission took more than {duration(self._total_ns)} of real time"
+
+    @property
+    def words(self) -> str:
+        """Why a recording is ended, or not begun, when the time is used up; the same in every run."""
+        return f"stopped: {self._exceeded}"
+
+    def charge(self, real_ns: int, starved_ns: int) -> None:
+        """Take note of a recording.
+
+        Args:
+            real_ns: What it took.
+            starved_ns: How much of that the nodes waited for processors that others had.
+        """
+        with self._lock:
+            self._real_ns += real_ns
+            self._starved_ns += starved_ns
+
+    def unrecorded(self, plan: Plan) -> Trace:
+        """Return the trace of a scenario for which no time is left: the nodes' fault, or the machine's."""
+        clock = ClockKind(plan.clock)
+        if self._starved_ns > STARVED_SHARE * self._real_ns:
+            problem = f"the machine was too busy: {self._exceeded}"
+            return Trace(plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+        faults = tuple(Fault(0, name, FaultKind.KILLED, self.words) for name, _ in plan.processes)
+        return Trace(plan.scenario, clock, stop_ns=plan.duration_ns, observations=faults)
+
+
+#: A run on the wall clock whose reference slipped is repeated so often before the scenario is undecided.
+WALL_TRIES = 3
+#: Where the guard comes too late, the system ends the worker: at this much mapped, and so much processor time beyond
+#: the guard's limit. A worker maps 0.6 GiB.
+ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
+#: A worker that has filled more than this after a scenario does no more; ordinary scenarios leave 30 to 50 MiB.
+WORN_BYTES = 128 * MIB
+
+
+class Worker:
+    """Starts students' processes and conducts them.
+
+    Args:
+        isolation: The tier that student processes are started in.
+        runtime: Interpreter and ROS.
+    """
+
+    def __init__(self, isolation: Isolation, runtime: PythonRuntime) -> None:
+        self._isolation = isolation
+        self._runtime = runtime
+        self._real_ns = self._starved_ns = 0
+
+    def run(self, plan: Plan, domain: int, left_ns: int, budget_words: str) -> dict[str, Any]:
+        """Run one plan and return the answer.
+
+        Args:
+            plan: The scenario.
+            domain: The ROS domain to use.
+            left_ns: Real time that is left for the submission.
+            budget_words: What to say where that is used up.
+        """
+        self._real_ns = self._starved_ns = 0
+        limit_processor_time(plan.limits)
+        started_ns = time.monotonic_ns()
+        for _ in range(WALL_TRIES if plan.clock == "wall" else 1):
+            spent_ns = time.monotonic_ns() - started_ns
+            trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
+            if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
+                break
+        # evidence is written in the form of a trace, and what was reached for is none
+        cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
+        return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
+
+    def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
+        students: list[Student] = []
+        with ExitStack() as stack:
+            stack.callback(stop, students)
+            for name, file in plan.processes:
+                start = self._start_bare if plan.bare else self._start
+                students.append(start(plan, name, file, domain))
+            # rclpy takes long to import: the students' processes start meanwhile.
+            from grader.execution.observer import Observer  # noqa: PLC0415
+            from grader.execution.virtual_runner import Conductor  # noqa: PLC0415
+            from grader.execution.wall_runner import WallConductor  # noqa: PLC0415
+
+            observer = Observer(domain, plan.limits)
+            stack.callback(observer.close)
+            guard = stack.enter_context(Guard(students, plan.limits, budget))
+            stack.callback(self._account, guard)
+            conductor: Callable[..., Conductor | WallConductor] = WallConductor if plan.clock == "wall" else Conductor
+            if plan.bare:
+                from grader.execution.bare_runner import BareConductor  # noqa: PLC0415 - as above
+
+                conductor = BareConductor
+            else:
+                for student in students:
+                    _await_ready(student)
+            trace = guard.reviewed(conductor(plan, students, observer).run())
+            return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
+
+    def _account(self, guard: Guard) -> None:
+        self._real_ns += guard.real_ns
+        self._starved_ns += guard.starved_ns
+
+    def _start(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+        ours, theirs = socket.socketpair()
+        root = self._isolation.submission_seen_at or plan.root
+        request = {
+            "fd": theirs.fileno(),
+            "root": root,
+            "file": file,
+            "seed": plan.host_seed,
+            "clock": plan.clock,
+            "log_format": LOG_FORMAT,
+            "python_paths": [str(p) for p in self._runtime.python_paths],
+            "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
+        }
+        launcher = f"{self._isolation.host_seen_at}/launcher.py"
+        command = self._isolation.student_command(
+            StudentProcess(
+                runtime=self._runtime,
+                host_folder=Path(__file__).resolve().parents[1] / "student_host",
+                submission=Path(plan.root),
+                arguments=("-s", "-u", "-B", "-X", "utf8", launcher, json.dumps(request)),
+                environment={
+                    "ROS_DOMAIN_ID": str(domain),
+                    "RCUTILS_COLORIZED_OUTPUT": "0",
+                    **quick_discovery(self._isolation.host_seen_at, self._runtime),
+                    "PYTHONHASHSEED": str(int(plan.host_seed[:8], 16)),
+                },
+                pass_fds=(theirs.fileno(),),
+            ),
+            plan.limits,
+        )
+        try:
+            student = Student.start(name, root, command, ours, plan.limits)
+        except OSError:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+        student.file, student.places = file, Places(Path(plan.root))
+        return student
+
+    def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+        """Start a file with nothing of the grader in its process; see `bare`."""
+        root = self._isolation.submission_seen_at or plan.root
+        command = self._isolation.student_command(
+            StudentProcess(
+                runtime=self._runtime,
+                host_folder=None,
+                submission=Path(plan.root),
+                arguments=bare_arguments(Path(plan.root), root, file),
+                environment={"ROS_DOMAIN_ID": str(domain)},
+                pass_fds=(),
+            ),
+            plan.limits,
+        )
+        student = BareStudent.begin(name, root, command, plan.limits)
+        student.file, student.places = file, Places(Path(plan.root))
+        return student
+
+
+def limit_memory() -> None:
+    """Have the system limit what this process may map; students' processes have a limit of their own."""
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (_lower(ADDRESS_SPACE_BYTES, most), most))
+
+
+def limit_processor_time(limits: Limits) -> None:
+    """Have the system limit the processor time of this process from now on."""
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    seconds = math.ceil(time.process_time_ns() / NS_PER_S) + limits.processor_s + SPARE_CPU_S
+    resource.setrlimit(resource.RLIMIT_CPU, (_lower(seconds, most), most))
+
+
+def _lower(value: int, most: int) -> int:
+    return value if most == resource.RLIM_INFINITY else min(value, most)
+
+
+def is_worn(trace: Trace) -> bool:
+    """Return whether a worker should do no more after a scenario: something odd has happened, or it has grown."""
+    odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes
+    full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)
+    return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
+
+
+def _await_ready(student: Student) -> None:
+    """Wait until a process is about to run its file; until then nothing of the student's has run."""
+    if not student.is_ready():
+        raise RuntimeError(f"a student's process did not start: {student.stopped or _last_words(student)}")
+
+
+def _last_words(student: Student) -> str:
+    student.drain()
+    words = [getattr(line, "text", "") for line in student.output(0, final=True)]
+    return " | ".join(words[-3:])[:500] or "no output"
+
+
+def stop(students: list[Student]) -> None:
+    """Send the stop signal to every process that still runs, give it a moment, end it."""
+    for student in students:
+        if not student.ended:
+            student.tell({"stop": True})
+    for student in students:
+        student.kill()
+        student.close()
+
+
+def main() -> None:
+    """Serve plans until the supervisor hangs up."""
+    request = json.loads(sys.argv[1])
+    line = socket.socket(fileno=request["line"])
+    commands, answers = line.makefile("r"), line.makefile("w")
+    limit_memory()
+    worker = Worker(isolation_from_name(request["isolation"]), runtime_from_json(request["runtime"]))
+    for command in commands:
+        data = json.loads(command)
+        try:
+            plan = plan_from_json(data["plan"])
+            answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])
+        except HarnessError as error:
+            answer = {"problem": error.message}
+        except Exception:
+            answer = {"problem": traceback.format_exc()[-4000:]}
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    os.chdir("/")
+    main()

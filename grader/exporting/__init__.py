@@ -1,1 +1,0 @@
-"""Packs the grader for platforms that run it themselves."""

@@ -1,0 +1,200 @@
+"""What an author says about a rubric's self-test in a file beside it: folders, baseline, why something survives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+
+from grader.core.errors import RubricError
+from grader.core.exercise import Exercise
+from grader.rubrics.mistakes import mistakes_of, nearest
+from grader.rubrics.yaml_tree import Mistake, Position, TreePath, YamlSyntaxError, YamlTree, read_yaml
+from grader.submissions.collected import listed, shown
+
+SCHEMA = "grader/selftest-notes/v1"
+MAX_BYTES = 256 * 1024
+_Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One sentence of the author's about some mutants or variants.
+
+    Attributes:
+        pattern: What it is about: ids, with `*` for anything.
+        because: The sentence; empty where only criteria are named.
+        criteria: Which of these should notice such a mutant; empty where a sentence is given.
+        where: Place in the file, for messages.
+    """
+
+    pattern: str
+    because: str = ""
+    criteria: tuple[str, ...] = ()
+    where: str = ""
+
+    def fits(self, id_: str) -> bool:
+        """Whether it is about this mutant or variant."""
+        return fnmatchcase(id_, self.pattern)
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """All that the author says.
+
+    Attributes:
+        reference: Folder of the reference solution; None if none is named.
+        template: Folder of the template; None if none is named.
+        template_score: What the template is worth; None if nothing is said.
+        survivors: Why some mutants survive.
+        expected: Which criteria should notice others.
+        variants: Why some correct variants lose points.
+        criteria: Criterion id -> why no mutant turns it.
+    """
+
+    reference: Path | None = None
+    template: Path | None = None
+    template_score: Fraction | None = None
+    survivors: Sequence[Explanation] = field(default_factory=tuple)
+    expected: Sequence[Explanation] = field(default_factory=tuple)
+    variants: Sequence[Explanation] = field(default_factory=tuple)
+    criteria: Mapping[str, str] = field(default_factory=dict)
+
+
+class _Shape(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Survivor(_Shape):
+    mutants: _Text
+    because: _Text
+
+
+class _Expected(_Shape):
+    mutants: _Text
+    killed_by: Annotated[tuple[_Text, ...], Field(min_length=1, strict=False)]
+
+
+class _Variant(_Shape):
+    variants: _Text
+    because: _Text
+
+
+class _Criterion(_Shape):
+    criterion: _Text
+    because: _Text
+
+
+class _File(_Shape):
+    schema_: Literal["grader/selftest-notes/v1"] = Field(alias="schema")
+    reference: _Text | None = None
+    template: _Text | None = None
+    template_score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
+    survivors: Annotated[tuple[_Survivor, ...], Field(strict=False)] = ()
+    expected: Annotated[tuple[_Expected, ...], Field(strict=False)] = ()
+    variants: Annotated[tuple[_Variant, ...], Field(strict=False)] = ()
+    criteria: Annotated[tuple[_Criterion, ...], Field(strict=False)] = ()
+
+
+def beside(rubric: Path) -> Path:
+    """Return where the notes on a rubric's self-test lie: `NAME.selftest.yaml` beside `NAME.yaml`."""
+    return rubric.with_name(f"{rubric.stem}.selftest.yaml")
+
+
+def read_explained(path: Path, exercise: Exercise) -> Explained:
+    """Return what a file says about the self-test of an exercise; a file that is not there says nothing.
+
+    Raises:
+        RubricError: It cannot be read, or has mistakes; one line each, in the order of the file.
+    """
+    if not path.exists():
+        return Explained()
+    tree = _tree(path)
+    try:
+        read = _File.model_validate(tree.data or {})
+    except ValidationError as error:
+        _refuse(path, [*tree.mistakes, *mistakes_of(error, tree, _File)])
+    mistakes = [*tree.mistakes, *_unknown_criteria(read, tree, exercise)]
+    if mistakes:
+        _refuse(path, mistakes)
+    return _explained(path, read, tree)
+
+
+def idle(explanations: Iterable[Explanation], needed: Callable[[Explanation], bool]) -> tuple[str, ...]:
+    """Return what explains nothing, each with its place."""
+    return tuple(f"{e.where}: `{shown(e.pattern)}` explains nothing" for e in explanations if not needed(e))
+
+
+def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
+    return Explained(
+        reference=None if read.reference is None else path.parent / read.reference,
+        template=None if read.template is None else path.parent / read.template,
+        template_score=None if read.template_score is None else Fraction(str(read.template_score)),
+        survivors=tuple(
+            Explanation(one.mutants, because=_line(one.because), where=_where(path, tree, ("survivors", n)))
+            for n, one in enumerate(read.survivors)
+        ),
+        expected=tuple(
+            Explanation(one.mutants, criteria=one.killed_by, where=_where(path, tree, ("expected", n)))
+            for n, one in enumerate(read.expected)
+        ),
+        variants=tuple(
+            Explanation(one.variants, because=_line(one.because), where=_where(path, tree, ("variants", n)))
+            for n, one in enumerate(read.variants)
+        ),
+        criteria={one.criterion: _line(one.because) for one in read.criteria},
+    )
+
+
+def _tree(path: Path) -> YamlTree:
+    where = shown(str(path), 500)
+    try:
+        data = path.read_bytes()
+        if len(data) > MAX_BYTES:
+            raise RubricError(f"{where}: expected at most {MAX_BYTES // 1024} KiB, found more")
+        return read_yaml(data.decode("utf-8-sig"))
+    except OSError as error:
+        raise RubricError(f"{where}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise RubricError(f"{where}: expected UTF-8 text, found another encoding", "save the file as UTF-8") from None
+    except YamlSyntaxError as error:
+        _refuse(path, [error.mistake])
+
+
+def _refuse(path: Path, mistakes: Sequence[Mistake]) -> NoReturn:
+    where, ordered = shown(str(path), 500), sorted(set(mistakes))
+    lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in ordered]
+    raise RubricError("\n".join(lines), next((m.hint for m in ordered if m.hint), ""))
+
+
+def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> list[Mistake]:
+    known = [criterion.id for criterion in exercise.criteria]
+    named: list[tuple[str, TreePath]] = [
+        *(
+            (id_, ("expected", n, "killed_by", k))
+            for n, e in enumerate(read.expected)
+            for k, id_ in enumerate(e.killed_by)
+        ),
+        *((one.criterion, ("criteria", n, "criterion")) for n, one in enumerate(read.criteria)),
+    ]
+    return [
+        tree.values[at].mistake(
+            f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`", nearest(id_, known)
+        )
+        for id_, at in named
+        if id_ not in known
+    ]
+
+
+def _where(path: Path, tree: YamlTree, at: TreePath) -> str:
+    place: Position = tree.values[at]
+    return f"{shown(str(path), 500)}:{place.line}:{place.column}"
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,365 @@
+"""Correct variants of a program: the same behaviour with other names, order and style; none may cost a point."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+import libcst as cst
+
+from grader.mutation.operators.mutants import meaning
+from grader.mutation.operators.program import (
+    CREATORS,
+    Edit,
+    Program,
+    argument,
+    called,
+    expression,
+    statement,
+    string,
+    text_of,
+)
+from grader.mutation.operators.words import names
+
+
+def renamed_classes(program: Program) -> str:
+    """Every class has another name."""
+    names = {node.name.value for node in program.all(cst.ClassDef)}
+    return _renamed(program, names, lambda name: f"My{name}")
+
+
+def renamed_functions(program: Program) -> str:
+    """Every function outside classes has another name, `main` too."""
+    names = {node.name.value for node in program.all(cst.FunctionDef) if program.enclosing(node, cst.ClassDef) is None}
+    return _renamed(program, names, lambda name: f"run_{name}")
+
+
+def renamed_methods(program: Program) -> str:
+    """Every method has another name."""
+    methods = [node for node in program.all(cst.FunctionDef) if program.enclosing(node, cst.ClassDef)]
+    names = {method.name.value for method in methods if not method.name.value.startswith("__")}
+    edits: list[Edit] = [(m.name, cst.Name(f"do_{m.name.value}")) for m in methods if m.name.value in names]
+    return program.changed([*edits, *_of_own_objects(program, names, "do_")])
+
+
+def renamed_attributes(program: Program) -> str:
+    """Every attribute of an object of the program's own has another name."""
+    targets = [target.target for target in program.all(cst.AssignTarget)]
+    names = {t.attr.value for t in targets if isinstance(t, cst.Attribute) and program.code(t.value) == "self"}
+    return program.changed(_of_own_objects(program, names, "the_"))
+
+
+def renamed_variables(program: Program) -> str:
+    """Every variable and every constant has another name."""
+    targets = [target.target for target in program.all(cst.AssignTarget)]
+    names = {target.value for target in targets if isinstance(target, cst.Name)}
+    names |= {loop.target.value for loop in program.all(cst.For) if isinstance(loop.target, cst.Name)}
+    names -= {node.name.value for node in program.all(cst.FunctionDef)}
+    names -= {node.name.value for node in program.all(cst.ClassDef)}
+    return _renamed(program, names, lambda name: f"{name}_{'X' if name.isupper() else 'x'}")
+
+
+def renamed_nodes(program: Program) -> str:
+    """The node has another name."""
+    edits: list[Edit] = []
+    for call in program.calls("__init__", "Node", "create_node"):
+        name = text_of(call.args[0].value) if call.args else None
+        if name is not None and (called(call) != "__init__" or "super" in program.code(call.func)):
+            edits.append((call.args[0].value, string(f"{name}_of_mine")))
+    return program.changed(edits)
+
+
+def reordered_methods(program: Program) -> str:
+    """The methods of each class stand the other way round."""
+    edits: list[Edit] = []
+    for node in program.all(cst.ClassDef):
+        methods = [part for part in node.body.body if isinstance(part, cst.FunctionDef)]
+        edits += zip(methods, reversed(methods), strict=True)
+    return program.changed([(old, new) for old, new in edits if old is not new])
+
+
+def reordered_constants(program: Program) -> str:
+    """The constants of the file stand the other way round, as far as none needs another."""
+    lines = [s for s in program.module.body if isinstance(s, cst.SimpleStatementLine)]
+    plain = [s for s in lines if isinstance(s.body[0], cst.Assign) and not program.all(cst.Name, s.body[0].value)]
+    return program.changed([(old, new) for old, new in zip(plain, reversed(plain), strict=True) if old is not new])
+
+
+def _renamed(program: Program, names: Iterable[str], rename: Callable[[str], str]) -> str:
+    """Return the source with plain names changed: not as keyword, and not as attribute of anything."""
+    wanted = set(names) - _not_ours(program)
+    edits: list[Edit] = []
+    for node in program.all(cst.Name):
+        above = next(program.above(node), None)
+        is_attribute = isinstance(above, cst.Attribute) and above.attr is node
+        is_keyword = isinstance(above, cst.Arg) and above.keyword is node
+        if node.value in wanted and not is_attribute and not is_keyword:
+            edits.append((node, cst.Name(rename(node.value))))
+    return program.changed(edits)
+
+
+def _of_own_objects(program: Program, names: Collection[str], prefix: str) -> list[Edit]:
+    """Return the edits that rename attributes of `self`, and of variables that hold an object of an own class."""
+    classes = {node.name.value for node in program.all(cst.ClassDef)}
+    made = [a for a in program.all(cst.Assign) if isinstance(a.value, cst.Call) and called(a.value) in classes]
+    objects = {"self", *(program.code(target.target) for assign in made for target in assign.targets)}
+    return [
+        (node.attr, cst.Name(f"{prefix}{node.attr.value}"))
+        for node in program.all(cst.Attribute)
+        if node.attr.value in names and program.code(node.value) in objects
+    ]
+
+
+def _not_ours(program: Program) -> set[str]:
+    """Return the names that come with an import, or are those of parameters."""
+    names = {alias.evaluated_alias or alias.evaluated_name.split(".")[0] for alias in program.all(cst.ImportAlias)}
+    return names | {parameter.name.value for parameter in program.all(cst.Param)}
+
+
+#: Specifications that mean the same in every style.
+_PLAIN = re.compile(r"(?:0?\d*(?:\.\d+)?[dfegs])?")
+
+
+def single_quotes(program: Program) -> str:
+    """Texts stand in single quotes."""
+    doubled = [
+        node
+        for node in program.all(cst.SimpleString)
+        if node.value.startswith('"') and not node.value.startswith('"""') and "'" not in node.value
+    ]
+    return program.changed([(node, cst.SimpleString(f"'{node.value[1:-1]}'")) for node in doubled])
+
+
+def windows_lines(program: Program) -> str:
+    """Lines end as on Windows."""
+    return program.module.code.replace("\r\n", "\n").replace("\n", "\r\n")
+
+
+def other_topic_form(program: Program) -> str:
+    """Topics and services are relative where they were absolute, and the other way round."""
+    edits = [(node, string(name[1:] if name.startswith("/") else f"/{name}")) for node, name in names(program)]
+    return program.changed([(old, new) for old, new in edits if "~" not in new.value])
+
+
+def keyword_arguments(program: Program) -> str:
+    """Publishers, timers and the like are made with named arguments."""
+    edits: list[Edit] = []
+    for call in program.calls(*CREATORS):
+        args = []
+        for arg, name in zip(call.args, CREATORS[called(call)], strict=False):
+            named = arg.keyword is not None or arg.star
+            args.append(arg if named else arg.with_changes(keyword=cst.Name(name), equal=_equal()))
+        edits.append((call, call.with_changes(args=[*args, *call.args[len(args) :]])))
+    return program.changed(edits)
+
+
+def percent_format(program: Program) -> str:
+    """Texts are made with `%`, not as f-strings."""
+    return _formatted(program, _Style(_percent_field, _percent_text, _percent))
+
+
+def format_method(program: Program) -> str:
+    """Texts are made with `.format`, not as f-strings."""
+    return _formatted(program, _Style(_format_field, str, _format))
+
+
+def qos_object(program: Program) -> str:
+    """The queue depth stands in a QoSProfile."""
+    edits: list[Edit] = []
+    for call in program.calls("create_publisher", "create_subscription"):
+        arg = argument(call, "qos_profile")
+        if arg is not None and isinstance(arg.value, cst.Integer):
+            edits.append((arg.value, expression(f"QoSProfile(depth={arg.value.value})")))
+    return (
+        program.changed([*edits, *program.importing("from rclpy.qos import QoSProfile")]) if edits else _same(program)
+    )
+
+
+def lambda_callbacks(program: Program) -> str:
+    """Callbacks of timers and subscriptions are lambdas."""
+    edits: list[Edit] = []
+    for call in program.calls("create_timer", "create_subscription"):
+        arg = argument(call, "callback")
+        if arg is not None and isinstance(arg.value, (cst.Name, cst.Attribute)):
+            given = "msg" if called(call) == "create_subscription" else ""
+            edits.append((arg.value, expression(f"lambda{given and ' '}{given}: {program.code(arg.value)}({given})")))
+    return program.changed(edits)
+
+
+def executor(program: Program) -> str:
+    """An executor object spins the node."""
+    edits: list[Edit] = []
+    for line in program.all(cst.SimpleStatementLine):
+        node = _spun(program, line)
+        if node:
+            text = f"executor = SingleThreadedExecutor()\nexecutor.add_node({node})\nexecutor.spin()\n"
+            edits.append((line, cst.FlattenSentinel(cst.parse_module(text).body)))
+    imported = program.importing("from rclpy.executors import SingleThreadedExecutor")
+    return program.changed([*edits, *imported]) if edits else _same(program)
+
+
+def loop_in_thread(program: Program) -> str:
+    """A loop that sleeps in place of the timer; a thread spins."""
+    timers = program.calls("create_timer")
+    timer = timers[0] if len(timers) == 1 else None
+    lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
+    callback = argument(timer, "callback") if timer is not None else None
+    pause = argument(timer, "timer_period_sec") if timer is not None else None
+    if timer is None or callback is None or pause is None or len(lines) != 1 or "self" in program.code(pause.value):
+        return _same(program)
+    made = program.enclosing(timer, cst.SimpleStatementLine)
+    name = program.code(callback.value)
+    if made is None or not name.startswith("self.") or program.code(made).strip() != program.code(timer):
+        return _same(program)
+    node = _spun(program, lines[0])
+    thread = f"threading.Thread(target=rclpy.spin, args=({node},), daemon=True).start()"
+    body = f"    {node}{name.removeprefix('self')}()\n    time.sleep({program.code(pause.value)})\n"
+    loop = cst.FlattenSentinel([statement(thread), statement(f"while rclpy.ok():\n{body}")])
+    imports = (*program.importing("import threading"), *program.importing("import time"))
+    return program.changed([(made, statement("pass")), (lines[0], loop), *imports])
+
+
+def without_guard(program: Program) -> str:
+    """The file ends with its function `main`, as a console script needs it."""
+    guards = [node for node in program.all(cst.If) if "__name__" in program.code(node.test)]
+    has_main = any(node.name.value == "main" for node in program.all(cst.FunctionDef))
+    return program.changed([(guard, cst.RemoveFromParent()) for guard in guards]) if has_main else _same(program)
+
+
+def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
+    """Return the name of the node that a line spins; empty if it does nothing of that kind."""
+    small = line.body[0]
+    if not isinstance(small, cst.Expr) or not isinstance(small.value, cst.Call):
+        return ""
+    call = small.value
+    plain = program.code(call.func) == "rclpy.spin" and len(call.args) == 1 and isinstance(call.args[0].value, cst.Name)
+    return program.code(call.args[0].value) if plain else ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Style:
+    """How a style writes a field with its specification, the text between fields, and the whole with its values."""
+
+    field: Callable[[str], str]
+    text: Callable[[str], str]
+    whole: Callable[[str, str], str]
+
+
+def _formatted(program: Program, style: _Style) -> str:
+    """Return the source with f-strings written another way, where that is possible."""
+    edits: list[Edit] = []
+    for node in program.all(cst.FormattedString):
+        values = [part for part in node.parts if isinstance(part, cst.FormattedStringExpression)]
+        if values and len(node.start) == 2 and all(_is_plain(program, part) for part in values):
+            text = "".join(
+                style.text(part.value)
+                if isinstance(part, cst.FormattedStringText)
+                else style.field(_specification(program, part))
+                for part in node.parts
+            )
+            given = ", ".join(program.code(part.expression) for part in values)
+            edits.append((node, expression(style.whole(f"{node.end}{text}{node.end}", given))))
+    return program.changed(edits)
+
+
+def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
+    """Whether every style can write a field."""
+    return (
+        part.conversion is None and part.equal is None and _PLAIN.fullmatch(_specification(program, part)) is not None
+    )
+
+
+def _specification(program: Program, part: cst.BaseFormattedStringContent) -> str:
+    pieces = part.format_spec if isinstance(part, cst.FormattedStringExpression) else None
+    return "".join(program.code(piece) for piece in pieces or ())
+
+
+def _percent_field(specification: str) -> str:
+    return f"%{specification or 's'}"
+
+
+def _percent_text(text: str) -> str:
+    return text.replace("%", "%%").replace("{{", "{").replace("}}", "}")
+
+
+def _format_field(specification: str) -> str:
+    return f"{{:{specification}}}" if specification else "{}"
+
+
+def _percent(text: str, values: str) -> str:
+    return f"{text} % ({values},)"
+
+
+def _format(text: str, values: str) -> str:
+    return f"{text}.format({values})"
+
+
+def _equal() -> cst.AssignEqual:
+    return cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
+
+
+def _same(program: Program) -> str:
+    return program.module.code
+
+
+#: Returns the source of a variant, or the same source where there is nothing to vary.
+Rewriter = Callable[[Program], str]
+#: Variant name -> what writes it; its docstring says how it differs.
+VARIANTS: Mapping[str, Rewriter] = {
+    rewriter.__name__: rewriter
+    for rewriter in (
+        renamed_classes,
+        renamed_functions,
+        renamed_methods,
+        renamed_attributes,
+        renamed_variables,
+        renamed_nodes,
+        reordered_methods,
+        reordered_constants,
+        single_quotes,
+        windows_lines,
+        other_topic_form,
+        keyword_arguments,
+        percent_format,
+        format_method,
+        qos_object,
+        lambda_callbacks,
+        executor,
+        loop_in_thread,
+        without_guard,
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A correct program beside the reference solution.
+
+    Attributes:
+        file: Name of the file.
+        name: Key of `VARIANTS`.
+        source: The whole program.
+    """
+
+    file: str
+    name: str
+    source: str
+
+    @property
+    def id(self) -> str:
+        """A name that stays the same as long as the reference solution does."""
+        return f"{self.file}:{self.name}"
+
+
+def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[Variant, ...]:
+    """Return the variants that differ from a program, in the order of the table.
+
+    Args:
+        source: The program.
+        file: Its name, for the ids.
+        rewriters: What makes them.
+    """
+    program = Program(source)
+    written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
+    return tuple(Variant(file, name, text) for name, text in written if text != source and meaning(text) is not None)

@@ -1,0 +1,279 @@
+"""Operators on names, logs and periods."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from itertools import combinations
+
+import libcst as cst
+
+from grader.mutation.operators.flow import at_top, lines_of, parameters
+from grader.mutation.operators.program import (
+    CREATORS,
+    LEVELS,
+    SLEEPS,
+    Change,
+    Edit,
+    Program,
+    argument,
+    called,
+    expression,
+    into,
+    is_docstring,
+    short,
+    statement,
+    string,
+    text_of,
+)
+
+_WORD = re.compile(r"(?<![%{\\\w/~.])[A-Za-z]{3,}")
+_QUIET, _LOUD = "debug", "error"
+
+
+def print_instead(program: Program) -> Iterator[Change]:
+    """`print` instead of the logger."""
+    for call in _logs(program):
+        after = cst.Call(cst.Name("print"), [_plain(arg) for arg in call.args[:1]])
+        yield Change(call, into(program.code(call), program.code(after)), ((call, after),))
+
+
+def log_level(program: Program) -> Iterator[Change]:
+    """A log that nobody sees because it is for debugging, or one that cries for help."""
+    for call in _logs(program):
+        for level in (_QUIET, _LOUD):
+            if isinstance(call.func, cst.Attribute) and call.func.attr.value != level:
+                yield Change(call, into(call.func.attr.value, level), ((call.func.attr, cst.Name(level)),))
+
+
+def log_every_message(program: Program) -> Iterator[Change]:
+    """The report comes with each message, not by the timer."""
+    for heard in program.handed_to("create_subscription"):
+        for timer in program.handed_to("create_timer"):
+            lines = lines_of(heard)
+            if lines and parameters(timer) == ["self"] and parameters(heard)[:1] == ["self"]:
+                last = lines[-1]
+                added = cst.FlattenSentinel([last, statement(f"self.{timer.name.value}()")])
+                yield Change(heard, f"{heard.name.value} calls {timer.name.value}", ((last, added),))
+
+
+def text(program: Program) -> Iterator[Change]:
+    """Another text: a word that is misspelt, in a log, an answer or a format."""
+    for node in program.all(cst.SimpleString):
+        said = text_of(node)
+        if said is not None and not is_docstring(program, node) and _is_prose(said) and (word := _WORD.search(said)):
+            after = said[: word.start()] + word[0][:-1] + said[word.end() :]
+            yield Change(node, into(said, after), ((node, string(after)),))
+    for part in program.all(cst.FormattedStringText):
+        if word := _WORD.search(part.value):
+            after = part.value[: word.start()] + word[0][:-1] + part.value[word.end() :]
+            yield Change(part, into(part.value, after), ((part, part.with_changes(value=after)),))
+
+
+def rounding(program: Program) -> Iterator[Change]:
+    """Digits that are lost in a text: `.0f` for `.3f`."""
+    for part in program.all(cst.FormattedStringExpression):
+        spec = "".join(program.code(piece) for piece in part.format_spec or ())
+        if spec.endswith("f") and spec != ".0f":
+            after = part.with_changes(format_spec=[cst.FormattedStringText(".0f")])
+            yield Change(part, into(program.code(part), program.code(after)), ((part, after),))
+    for node in program.all(cst.SimpleString):
+        said = text_of(node)
+        if said is not None and (match := re.search(r"%\.[1-9]f", said)):
+            after_text = said[: match.start()] + "%.0f" + said[match.end() :]
+            yield Change(node, into(said, after_text), ((node, string(after_text)),))
+
+
+def missing_value(program: Program) -> Iterator[Change]:
+    """A text that does not say the value."""
+    for part in program.all(cst.FormattedStringExpression):
+        yield Change(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
+
+
+def _logs(program: Program) -> list[cst.Call]:
+    """Return the calls of a logger; other things have methods of these names, but not with a text first."""
+    found = [call for call in program.calls(*LEVELS) if isinstance(call.func, cst.Attribute) and call.args]
+    return [call for call in found if "log" in program.code(call.func).lower()]
+
+
+def _plain(arg: cst.Arg) -> cst.Arg:
+    return arg.with_changes(comma=cst.MaybeSentinel.DEFAULT, keyword=None, equal=cst.MaybeSentinel.DEFAULT)
+
+
+def _is_prose(said: str) -> bool:
+    """Whether a text is for people: names of topics, nodes and files have no blanks."""
+    return " " in said.strip()
+
+
+_NAMED = {
+    "create_publisher": "topic",
+    "create_subscription": "topic",
+    "create_service": "srv_name",
+    "create_client": "srv_name",
+}
+#: Message and service types that share the fields people use with others: type -> package, type.
+_TWINS: Mapping[str, tuple[str, str]] = {
+    "Twist": ("geometry_msgs.msg", "Accel"),
+    "Vector3": ("geometry_msgs.msg", "Point"),
+    "Point": ("geometry_msgs.msg", "Vector3"),
+    "PoseStamped": ("geometry_msgs.msg", "PoseWithCovarianceStamped"),
+    "Odometry": ("geometry_msgs.msg", "PoseWithCovarianceStamped"),
+    "Float32": ("std_msgs.msg", "Float64"),
+    "Float64": ("std_msgs.msg", "Float32"),
+    "Int8": ("std_msgs.msg", "Int16"),
+    "Int16": ("std_msgs.msg", "Int32"),
+    "Int32": ("std_msgs.msg", "Int64"),
+    "Int64": ("std_msgs.msg", "Int32"),
+    "UInt8": ("std_msgs.msg", "UInt16"),
+    "Temperature": ("sensor_msgs.msg", "RelativeHumidity"),
+    "Trigger": ("std_srvs.srv", "SetBool"),
+    "SetBool": ("std_srvs.srv", "Trigger"),
+}
+#: Types with a stamped relative -> the member that holds what they hold, and their own fields.
+_STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "Twist": ("twist", ("linear", "angular")),
+    "Pose": ("pose", ("position", "orientation")),
+}
+
+
+def topic_typo(program: Program) -> Iterator[Change]:
+    """A misspelt topic or service: its last letter is missing."""
+    for node, name in names(program):
+        yield _renamed(node, name, name[:-1] if len(name) > 2 else f"{name}s")
+
+
+def topic_namespace(program: Program) -> Iterator[Change]:
+    """A topic or service of another tutorial: the right name inside a namespace, as `/turtle1/cmd_vel`."""
+    for node, name in names(program):
+        yield _renamed(node, name, f"/turtle1/{name.lstrip('/')}")
+
+
+def topic_private(program: Program) -> Iterator[Change]:
+    """A name that is private to the node, `~/cmd_vel`."""
+    for node, name in names(program):
+        yield _renamed(node, name, f"~/{name.lstrip('/')}")
+
+
+def topic_swapped(program: Program) -> Iterator[Change]:
+    """Two topics mistaken for each other: what is published is listened to, and the other way round."""
+    for (one, name), (other, other_name) in combinations(names(program), 2):
+        if name != other_name:
+            yield Change(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
+
+
+def message_type(program: Program) -> Iterator[Change]:
+    """Another message or service type with the same fields, imported and used in the whole file."""
+    for imported, alias in _imported_types(program, _TWINS):
+        package, twin = _TWINS[alias]
+        edits: list[Edit] = [(name, cst.Name(twin)) for name in _uses(program, alias) if not _is_import(program, name)]
+        line = f"from {package} import {twin}"
+        edits += program.importing(line)
+        yield Change(imported, into(alias, f"{package}.{twin}"), tuple(edits))
+
+
+def stamped_type(program: Program) -> Iterator[Change]:
+    """The stamped relative of a type, with the fields where that has them: TwistStamped for Twist."""
+    for imported, alias in _imported_types(program, _STAMPED):
+        member, parts = _STAMPED[alias]
+        stamped = f"{alias}Stamped"
+        edits: list[Edit] = [
+            (name, cst.Name(stamped)) for name in _uses(program, alias) if not _is_import(program, name)
+        ]
+        fields = [node for node in program.all(cst.Attribute) if node.attr.value in parts]
+        edits += [(node.value, cst.Attribute(node.value, cst.Name(member))) for node in fields]
+        package = program.code(imported.module) if imported.module is not None else ""
+        edits += program.importing(f"from {package} import {stamped}")
+        yield Change(imported, into(alias, stamped), tuple(edits))
+
+
+def message_type_once(program: Program) -> Iterator[Change]:
+    """A type that two ends of the same program disagree about: only one publisher or subscription has another one."""
+    for call in program.calls(*CREATORS):
+        arg = argument(call, CREATORS[called(call)][0])
+        if arg is None or not isinstance(arg.value, cst.Name) or arg.value.value not in _TWINS:
+            continue
+        package, twin = _TWINS[arg.value.value]
+        edits = ((arg.value, cst.Name(twin)), *program.importing(f"from {package} import {twin}"))
+        yield Change(call, f"{called(call)} {into(arg.value.value, twin)}", edits)
+
+
+def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
+    """Return where topics and services are named, each place once."""
+    found: dict[cst.SimpleString, str] = {}
+    for call in program.calls(*_NAMED):
+        arg = argument(call, _NAMED[called(call)])
+        node = program.constant(arg.value) if arg is not None else None
+        name = text_of(node)
+        if isinstance(node, cst.SimpleString) and name:
+            found[node] = name
+    return list(found.items())
+
+
+def _renamed(node: cst.SimpleString, name: str, other: str) -> Change:
+    return Change(node, into(name, other), ((node, string(other)),))
+
+
+def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
+    for imported in program.all(cst.ImportFrom):
+        if not isinstance(imported.names, cst.ImportStar):
+            for alias in imported.names:
+                if alias.asname is None and isinstance(alias.name, cst.Name) and alias.name.value in known:
+                    yield imported, alias.name.value
+
+
+def _uses(program: Program, name: str) -> list[cst.Name]:
+    return [node for node in program.all(cst.Name) if node.value == name and not _is_attribute(program, node)]
+
+
+def _is_attribute(program: Program, node: cst.Name) -> bool:
+    above = next(program.above(node), None)
+    return isinstance(above, cst.Attribute) and above.attr is node
+
+
+def _is_import(program: Program, node: cst.CSTNode) -> bool:
+    return any(isinstance(above, (cst.Import, cst.ImportFrom)) for above in program.above(node))
+
+
+#: What people make of a period: a slip of ten, milliseconds, the half, the double, a quarter off.
+_FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.25", "* 0.75")
+
+
+def period(program: Program) -> Iterator[Change]:
+    """A period that is wrong by a factor: ten, two, milliseconds for seconds, or a quarter."""
+    for given in _periods(program):
+        before = program.code(given)
+        inside = before if isinstance(given, (cst.Name, cst.Attribute, cst.BaseNumber)) else f"({before})"
+        for factor in _FACTORS:
+            yield Change(given, into(before, f"{inside} {factor}"), ((given, expression(f"{inside} {factor}")),))
+
+
+def rate_as_period(program: Program) -> Iterator[Change]:
+    """The rate where the period belongs, and the other way round."""
+    for given in _periods(program):
+        before = program.code(given)
+        is_inverse = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
+        after = (
+            program.code(given.right) if is_inverse and isinstance(given, cst.BinaryOperation) else f"1 / ({before})"
+        )
+        yield Change(given, into(before, after), ((given, expression(after)),))
+
+
+def sleeping_callback(program: Program) -> Iterator[Change]:
+    """A callback that sleeps, and keeps everything else waiting."""
+    for function in program.callbacks:
+        edits = (*program.importing("import time"), *at_top(function, "time.sleep(2.0)"))
+        yield Change(function, f"{function.name.value} sleeps 2 s", edits)
+
+
+def busy_callback(program: Program) -> Iterator[Change]:
+    """A callback that loops for ever."""
+    for function in program.callbacks[:1]:
+        yield Change(function, f"{function.name.value} loops", at_top(function, "while True:\n    pass\n"))
+
+
+def _periods(program: Program) -> list[cst.BaseExpression]:
+    """Return what timers, rates and sleeps are given, where it is written."""
+    given = [arg.value for call in program.calls("create_timer") if (arg := argument(call, "timer_period_sec"))]
+    given += [arg.value for call in program.calls("create_rate") if (arg := argument(call, "frequency"))]
+    given += [call.args[0].value for call in program.calls(*SLEEPS) if len(call.args) == 1]
+    return given

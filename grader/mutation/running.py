@@ -1,0 +1,309 @@
+"""Tests rubrics: tries reference, template, mutants and correct variants, side by side."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from itertools import islice, zip_longest
+from pathlib import Path
+
+from libcst import ParserSyntaxError
+
+from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
+from grader.app.request import Request
+from grader.app.seeds import PRACTICE
+from grader.core.errors import RubricError
+from grader.core.exercise import Exercise
+from grader.core.submission import Submission
+from grader.core.trace import Trace
+from grader.execution.bag import Odometry
+from grader.execution.recording_session import Studio, open_studio
+from grader.execution.supervisor import Job
+from grader.judging.judge import judge_exercise
+from grader.mutation.explained import Explained, Explanation, beside, idle, read_explained
+from grader.mutation.operators.mutants import mutants_of
+from grader.mutation.operators.program import Program
+from grader.mutation.operators.variants import variants_of
+from grader.mutation.results import Fate, Result, Standing, Trial, one_line_change, standing_of
+from grader.submissions.sources import read_sources
+from grader.submissions.submission import stage_submission
+
+#: So many programs for each worker are recorded before any is judged: traces are large.
+_AT_ONCE = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A changed file that is to be run, and what is known of it."""
+
+    id: str
+    file: str
+    operator: str
+    source: str
+
+
+@dataclass(slots=True)
+class Bench:
+    """What the programs of one rubric are tried with."""
+
+    studio: Studio
+    workers: int
+    request: Request
+    exercise: Exercise
+    odometry: Odometry | None
+    seed: int
+    reference: Submission
+    sources: Mapping[str, str]
+    progress: Progress
+    traces: dict[str, Trace] = field(default_factory=dict)
+    recordings: int = 0
+
+    def measure_reference(self) -> Standing:
+        """Return what the reference solution is worth, and keep what was recorded of it."""
+        standing, self.traces = self._recorded(self.reference)
+        return standing
+
+    def standing(self, submission: Submission) -> Standing:
+        """Return what a whole submission is worth."""
+        return self._recorded(submission)[0]
+
+    def _recorded(self, submission: Submission) -> tuple[Standing, dict[str, Trace]]:
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
+        recorded = self.studio.record(jobs, self.request.clock, self.progress)
+        self.recordings += len(recorded)
+        traces = {scenario: trace for (_, scenario), trace in recorded.items()}
+        sources = read_sources(submission)
+        return standing_of(judge_exercise(self.exercise, traces, submission, sources)), traces
+
+    def standings(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, Standing]]:
+        """Yield what each changed program is worth; scenarios without the changed file are those of the reference."""
+        done, waiting = 0, iter(candidates)
+        at_once = _AT_ONCE * self.workers
+        while chunk := list(islice(waiting, at_once)):
+            folder = self.studio.folder / "mutants"
+            submissions = {c.id: self._staged(c, folder / str(n)) for n, c in enumerate(chunk)}
+            jobs = {
+                (c.id, key[1]): replace(job, title=f"{label}, {done + n + 1} of {len(candidates)}: {c.id}")
+                for n, c in enumerate(chunk)
+                for key, job in self._jobs(c, submissions[c.id]).items()
+            }
+            recorded = self.studio.record(jobs, self.request.clock, self.progress)
+            self.recordings += len(recorded)
+            for candidate in chunk:
+                own = {scenario: trace for (id_, scenario), trace in recorded.items() if id_ == candidate.id}
+                yield candidate, self._judged(candidate, submissions[candidate.id], own)
+            shutil.rmtree(folder)
+            done += len(chunk)
+
+    def _jobs(self, candidate: Candidate, submission: Submission) -> Mapping[tuple[str, str], Job]:
+        jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
+        concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
+        return {key: job for key, job in jobs.items() if key[1] in concerned}
+
+    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> Standing:
+        sources = {**self.sources, candidate.file: candidate.source}
+        return standing_of(judge_exercise(self.exercise, {**self.traces, **own}, submission, sources))
+
+    def _staged(self, candidate: Candidate, root: Path) -> Submission:
+        found = self.reference.files[candidate.file].found or candidate.file
+        shutil.copytree(self.reference.root, root)
+        (root / found).write_text(candidate.source, encoding="utf-8", newline="")
+        return replace(self.reference, root=root)
+
+
+#: A sample holds a variant for so many mutants.
+_MUTANTS_A_VARIANT = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How rubrics are tested.
+
+    Attributes:
+        reference: Folder of reference solutions; None for what the notes beside a rubric name.
+        template: Folder of templates; None likewise.
+        jobs: Scenarios recorded side by side; None leaves it to the machine.
+        only: Ids to run, with `*` for anything; empty for all.
+        sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
+        seed: Of the sample, and of every drawn value; None derives the values from the reference solution.
+        clock: `virtual`, `wall` or `auto`.
+        isolation: `auto`, `none` or the name of a tier.
+    """
+
+    reference: Path | None = None
+    template: Path | None = None
+    jobs: int | None = None
+    only: str = ""
+    sample: int | None = None
+    seed: int | None = None
+    clock: str = "auto"
+    isolation: str = "auto"
+
+
+def selftest(rubrics: Sequence[Path], options: Options, progress: Progress) -> Iterator[Result]:
+    """Test rubrics, and yield what came of each as soon as it is there.
+
+    Args:
+        rubrics: Their files.
+        options: How they are tested.
+        progress: Hears which step begins.
+
+    Raises:
+        GraderError: Something that the test needs cannot be used; its class says who must act.
+    """
+    prepared = [_prepared(path, options) for path in rubrics]
+    workers = options.jobs or len(os.sched_getaffinity(0))
+    with open_studio(options.isolation, workers) as studio:
+        for path, exercise, explained in prepared:
+            bench = _bench(path, exercise, explained, studio, replace(options, jobs=workers), progress)
+            yield _tested(path, bench, explained, options)
+
+
+def _prepared(path: Path, options: Options) -> tuple[Path, Exercise, Explained]:
+    (exercise,) = read_exercises(Request("", rubrics=(path,)))
+    said = read_explained(beside(path), exercise)
+    explained = replace(said, reference=options.reference or said.reference, template=options.template or said.template)
+    if explained.reference is None:
+        hint = f"name it with --reference FOLDER, or as `reference:` in {beside(path).name}"
+        raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)
+    return path, exercise, explained
+
+
+def _bench(  # noqa: PLR0913  each comes from another stage
+    path: Path, exercise: Exercise, explained: Explained, studio: Studio, options: Options, progress: Progress
+) -> Bench:
+    request = Request(
+        "", rubrics=(path,), clock=options.clock, isolation=options.isolation, workers=options.jobs, seed=options.seed
+    )
+    reference = _staged(explained.reference, exercise, studio, "reference")
+    return Bench(
+        studio=studio,
+        request=request,
+        exercise=exercise,
+        odometry=read_recording(request, [exercise]),
+        seed=PRACTICE.seed(reference.digest) if options.seed is None else options.seed,
+        reference=reference,
+        sources=_sources(reference, exercise),
+        progress=progress,
+        workers=options.jobs or 1,
+    )
+
+
+def _staged(folder: Path | None, exercise: Exercise, studio: Studio, name: str) -> Submission:
+    root = studio.folder / exercise.id / name
+    root.mkdir(parents=True)
+    return stage_submission(str(folder), exercise.files, root)
+
+
+def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
+    """Return the text of every file of the reference solution; raises RubricError if one cannot be used."""
+    sources = read_sources(reference)
+    for name in exercise.files:
+        if name not in sources:
+            raise RubricError(f"{reference.path}: expected {name} of {exercise.id} in it, found none that can be read")
+        try:
+            Program(sources[name])
+        except ParserSyntaxError as error:
+            where = f"{reference.path}/{name}:{error.raw_line}"
+            raise RubricError(f"{where}: expected a program that libcst can read, found another") from None
+    return sources
+
+
+def _tested(path: Path, bench: Bench, explained: Explained, options: Options) -> Result:
+    started = time.perf_counter()
+    exercise = bench.exercise
+    bench.progress(f"{exercise.id}: reference and template")
+    reference = bench.measure_reference()
+    template = None
+    if explained.template is not None:
+        template = bench.standing(_staged(explained.template, exercise, bench.studio, "template"))
+    # Without a right program nothing can be said about wrong ones.
+    tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
+    correct = tuple(_variants(bench, explained, options)) if reference.full else ()
+    whole = reference.full and not options.only and options.sample is None
+    return Result(
+        rubric=str(path),
+        exercise=exercise.id,
+        criteria=tuple(criterion.id for criterion in exercise.criteria),
+        reference=reference,
+        template=template,
+        baseline=explained.template_score,
+        mutants=tried,
+        variants=correct,
+        whole=whole,
+        idle=_idle(explained, tried, correct) if whole else (),
+        unturned=explained.criteria,
+        recordings=bench.recordings,
+        duration_s=time.perf_counter() - started,
+    )
+
+
+def _mutants(bench: Bench, explained: Explained, options: Options) -> Iterator[Trial]:
+    """Yield the mutants that were asked for, tried."""
+    found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
+    wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
+    for candidate, standing in bench.standings(
+        _sampled(wanted, options.sample, options.seed or 0), f"{bench.exercise.id}: mutant"
+    ):
+        trial = _trial(candidate, standing, bench)
+        because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
+        expected = _first(explained.expected, trial.id)
+        yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
+
+
+def _variants(bench: Bench, explained: Explained, options: Options) -> Iterator[Trial]:
+    """Yield the correct variants that were asked for, tried."""
+    found = [variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name)]
+    wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
+    most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
+    chosen = _sampled(wanted, most, options.seed or 0)
+    for candidate, standing in bench.standings(chosen, f"{bench.exercise.id}: variant"):
+        trial = _trial(candidate, standing, bench)
+        because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
+        yield replace(trial, because=because.because if because else "")
+
+
+def _trial(candidate: Candidate, standing: Standing, bench: Bench) -> Trial:
+    change = one_line_change(bench.sources[candidate.file], candidate.source)
+    return Trial(candidate.id, candidate.file, candidate.operator, change, standing)
+
+
+def _wanted(id_: str, options: Options) -> bool:
+    return not options.only or fnmatchcase(id_, options.only)
+
+
+def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> list[Candidate]:
+    """Return at most so many, spread over the operators, in the same order; the draw repeats."""
+    if most is None:
+        return list(candidates)
+    draw = random.Random(f"{seed}")  # noqa: S311  it has to repeat
+    groups: dict[str, list[Candidate]] = {}
+    for candidate in draw.sample(candidates, len(candidates)):
+        groups.setdefault(candidate.operator, []).append(candidate)
+    rounds = zip_longest(*groups.values())
+    drawn = [candidate.id for one_each in rounds for candidate in one_each if candidate is not None]
+    kept = set(drawn[:most])
+    return [candidate for candidate in candidates if candidate.id in kept]
+
+
+def _first(explanations: Iterable[Explanation], id_: str) -> Explanation | None:
+    return next((explanation for explanation in explanations if explanation.fits(id_)), None)
+
+
+def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Trial]) -> tuple[str, ...]:
+    """Return what the author explains and nothing needs."""
+    survived = [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]
+    lost = [trial.id for trial in variants if trial.fate is Fate.KILLED]
+    every = [trial.id for trial in mutants]
+    turned = {id_ for trial in mutants for id_ in trial.standing.turned}
+    return (
+        *idle(explained.survivors, lambda e: any(map(e.fits, survived))),
+        *idle(explained.expected, lambda e: any(map(e.fits, every))),
+        *idle(explained.variants, lambda e: any(map(e.fits, lost))),
+        *(f"{id_}: the notes say why no mutant turns it, but some do" for id_ in explained.criteria if id_ in turned),
+    )

@@ -1,0 +1,223 @@
+"""Shows what came of a self-test: tables for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from io import StringIO
+from typing import Any
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from grader.core.exercise import Outcome
+from grader.mutation.results import Fate, Result, Standing, Trial
+from grader.reporting.escape import shown, valid_unicode
+
+SCHEMA = "grader/mutation/v1"
+_NARROWEST = 80
+_GOOD, _BAD, _QUIET = "green", "bold red", "dim"
+
+
+def render_results(results: Sequence[Result], *, width: int, colour: bool) -> str:
+    """Return what came of some rubrics as text.
+
+    Args:
+        results: What came of each.
+        width: Columns of the page; at least 80 are used.
+        colour: Whether to colour with ANSI sequences; without, the text is the same.
+    """
+    out = StringIO()
+    console = Console(
+        file=out,
+        width=max(width, _NARROWEST),
+        force_terminal=colour,
+        color_system="standard" if colour else None,
+        legacy_windows=False,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        _environ={},
+    )
+    for result in results:
+        _result(console, result)
+    return "\n".join(line.rstrip() for line in out.getvalue().splitlines()) + "\n"
+
+
+def _result(console: Console, result: Result) -> None:
+    verdict = Text("no hole found" if result.passed else "HAS HOLES", style=_GOOD if result.passed else _BAD)
+    console.print(Text(f"{shown(result.exercise)} ({shown(result.rubric)}): ").append(verdict))
+    console.print(f"  reference  {_standing(result.reference)}", style="" if result.reference.full else _BAD)
+    if result.template is not None:
+        said = "" if result.baseline is None else f", expected {_points(result.baseline)}"
+        console.print(f"  template   {_standing(result.template)}{said}", style="" if result.template_fits else _BAD)
+    if not result.reference.full:
+        console.print("  mutants    none tried: first the reference has to score full")
+        _reasons(console, result.reference)
+        return
+    console.print(f"  mutants    {_count(result)}")
+    lost = len(result.marked_down)
+    console.print(
+        f"  variants   {len(result.variants)} correct ones, {lost or 'none'} marked down", style=_BAD if lost else ""
+    )
+    console.print(f"  recorded   {result.recordings} scenarios in {result.duration_s:.0f} s")
+    console.print()
+    console.print(_operators(result))
+    console.print()
+    console.print(_criteria(result))
+    _listed(console, "Survivors: nobody noticed", result.survivors, _BAD)
+    _listed(console, "Correct variants that lose points", result.marked_down, _BAD)
+    _listed(console, "Undecided: the grader or the machine failed, it says nothing", result.undecided, "yellow")
+    others = [t for t in result.mutants if t.fate is Fate.KILLED and not t.as_expected]
+    _listed(console, "Noticed by another criterion than expected", others, "yellow")
+    _listed(console, "Explained survivors", [t for t in result.mutants if t.because], _QUIET)
+    _listed(console, "Explained variants", [t for t in result.variants if t.because], _QUIET)
+    for id_, because in result.unturned.items():
+        _put(console, 2, f"{id_} is turned by no mutant because {shown(because, limit=600)}", _QUIET)
+    for line in result.idle:
+        _put(console, 2, line, "yellow")
+
+
+def _count(result: Result) -> str:
+    fates = [trial.fate for trial in result.mutants]
+    explained = sum(bool(trial.because) for trial in result.mutants)
+    counts = f"{len(fates)} tried, {fates.count(Fate.KILLED)} killed, {len(result.survivors)} survived"
+    undecided = f", {fates.count(Fate.UNDECIDED)} undecided" if Fate.UNDECIDED in fates else ""
+    return f"{counts}, {explained} survived for a reason{undecided}" + (
+        "" if result.whole else " (not all that there are)"
+    )
+
+
+def _operators(result: Result) -> Table:
+    """Return a row an operator."""
+    table = _table("operator", "made", "killed", "as said", "by other", "excused", "undecided", "SURVIVED")
+    for name in dict.fromkeys(trial.operator for trial in result.mutants):
+        own = [trial for trial in result.mutants if trial.operator == name]
+        killed = [trial for trial in own if trial.fate is Fate.KILLED]
+        said = [trial for trial in killed if trial.expected]
+        right = sum(trial.as_expected for trial in said)
+        survived = sum(trial.fate is Fate.SURVIVED and not trial.because for trial in own)
+        row = [
+            len(own),
+            len(killed),
+            right,
+            len(said) - right,
+            sum(bool(t.because) for t in own),
+            _undecided(own),
+            survived,
+        ]
+        table.add_row(name, *(str(number or "") for number in row), style=_BAD if survived else "")
+    return table
+
+
+def _criteria(result: Result) -> Table:
+    """Return a row a criterion."""
+    table = _table("criterion", "turned by", "alone", "expected", "of these turned", "")
+    for id_ in result.criteria:
+        turned = [trial for trial in result.mutants if id_ in trial.standing.turned]
+        alone = sum(trial.standing.turned == (id_,) for trial in turned)
+        meant = [trial for trial in result.mutants if id_ in trial.expected]
+        never = "NEVER TURNED" if id_ in result.never_turned else ""
+        row = (len(turned), alone, len(meant), sum(id_ in trial.standing.turned for trial in meant))
+        table.add_row(id_, *(str(number or "") for number in row), never, style=_BAD if never else "")
+    return table
+
+
+def _table(first: str, *others: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold", show_edge=False)
+    table.add_column(f"  {first}", no_wrap=True)
+    for name in others:
+        table.add_column(name, justify="right")
+    return table
+
+
+def _listed(console: Console, title: str, trials: Iterable[Trial], style: str) -> None:
+    found = list(trials)
+    if not found:
+        return
+    console.print()
+    console.print(f"{title} ({len(found)})", style=style)
+    for trial in found:
+        _put(console, 2, shown(trial.id, limit=200), "bold" if style == _BAD else "")
+        _put(console, 4, shown(trial.change, limit=400), _QUIET)
+        if trial.because:
+            _put(console, 4, f"because {shown(trial.because, limit=600)}")
+        elif trial.fate is not Fate.SURVIVED:
+            _reasons(console, trial.standing)
+        if trial.expected and not trial.as_expected:
+            _put(console, 4, f"expected {' or '.join(trial.expected)}")
+
+
+def _reasons(console: Console, standing: Standing) -> None:
+    for id_, reason in standing.reasons.items():
+        if standing.outcomes[id_] is not Outcome.BLOCKED:
+            _put(console, 4, f"{id_}: {shown(reason, limit=300)}")
+
+
+def _put(console: Console, indent: int, text: str, style: str = "") -> None:
+    console.print(Padding(Text(text, style=style), (0, 0, 0, indent), expand=False))
+
+
+def _standing(standing: Standing) -> str:
+    return f"{_points(standing.score)}/{_points(standing.max_score)}"
+
+
+def _points(points: Any) -> str:
+    return f"{round(float(points), 3):g}"
+
+
+def _undecided(trials: Sequence[Trial]) -> int:
+    return sum(trial.fate is Fate.UNDECIDED for trial in trials)
+
+
+def results_to_json(results: Sequence[Result]) -> str:
+    """Return what came of some rubrics as JSON text; selftest.schema.json describes it."""
+    data = {"schema": SCHEMA, "passed": all(r.passed for r in results), "rubrics": [_as_data(r) for r in results]}
+    return json.dumps(data, indent=2, allow_nan=False) + "\n"
+
+
+def _as_data(result: Result) -> Mapping[str, Any]:
+    return {
+        "rubric": valid_unicode(result.rubric),
+        "exercise": result.exercise,
+        "passed": result.passed,
+        "whole": result.whole,
+        "reference": _standing_data(result.reference),
+        "template": None if result.template is None else _standing_data(result.template),
+        "template_expected": None if result.baseline is None else float(result.baseline),
+        "criteria": [
+            {"id": id_, "turned_by": sum(id_ in t.standing.turned for t in result.mutants)} for id_ in result.criteria
+        ],
+        "never_turned": list(result.never_turned),
+        "unturned_because": {id_: valid_unicode(because) for id_, because in result.unturned.items()},
+        "mutants": [_trial_data(trial) for trial in result.mutants],
+        "variants": [_trial_data(trial) for trial in result.variants],
+        "idle": [valid_unicode(line) for line in result.idle],
+        "recordings": result.recordings,
+        "duration_s": round(result.duration_s, 3),
+    }
+
+
+def _trial_data(trial: Trial) -> Mapping[str, Any]:
+    return {
+        "id": valid_unicode(trial.id),
+        "file": valid_unicode(trial.file),
+        "operator": trial.operator,
+        "change": valid_unicode(trial.change),
+        "fate": trial.fate.value,
+        "killed_by": list(trial.standing.turned),
+        "expected": list(trial.expected),
+        "because": valid_unicode(trial.because),
+        **_standing_data(trial.standing),
+    }
+
+
+def _standing_data(standing: Standing) -> Mapping[str, Any]:
+    return {
+        "score": float(standing.score),
+        "max_score": float(standing.max_score),
+        "outcomes": {id_: outcome.value for id_, outcome in standing.outcomes.items()},
+        "reasons": {id_: valid_unicode(reason) for id_, reason in standing.reasons.items()},
+    }

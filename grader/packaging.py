@@ -1,0 +1,255 @@
+"""Packs the grader for platforms that run it themselves: its wheel, pinned versions, and the platform's scripts."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import importlib
+import importlib.metadata
+import io
+import json
+import re
+import sys
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import grader
+from grader.app.seeds import read_key
+from grader.core.errors import EnvironmentFault, GraderError, RubricError
+from grader.rubrics.builtin import builtin_rubrics, require_exercises, shipped
+from grader.rubrics.loader import own_check_files, read_rubric
+from grader.rubrics.variants import First
+
+PACKAGE = "rclpy-grader"
+#: A zip knows no time before this; the same files give the same bytes.
+_LONG_AGO = (1980, 1, 1, 0, 0, 0)
+_PROGRAM, _FILE, _PRIVATE = 0o100755, 0o100644, 0o100600
+#: What every environment has of its own, for its own Python.
+_WITH_PYTHON = ("pip", "setuptools", "wheel")
+_NOT_PACKED = ("__pycache__", "shipped")
+
+
+def integration(name: str) -> bytes:
+    """Return one of the files that platforms run, such as `gradescope/setup.sh`."""
+    return (shipped("integrations") / name).read_bytes()
+
+
+def wheel() -> tuple[str, bytes]:
+    """Return the name and the bytes of a wheel of the package that is running.
+
+    Raises:
+        EnvironmentFault: The package is not installed, only importable, or needs more than when it was installed.
+    """
+    try:
+        installed = importlib.metadata.distribution(PACKAGE)
+    except importlib.metadata.PackageNotFoundError:
+        text = f"{PACKAGE}: expected an installed package, found only its code"
+        raise EnvironmentFault(text, "python3 -m pip install . in the checkout of the grader") from None
+    _refuse_stale(installed)
+    stem = f"{PACKAGE.replace('-', '_')}-{installed.version}"
+    files = _code()
+    for name in ("METADATA", "entry_points.txt"):
+        files[f"{stem}.dist-info/{name}"] = (installed.read_text(name) or "").encode()
+    files[f"{stem}.dist-info/WHEEL"] = (
+        b"Wheel-Version: 1.0\nGenerator: grade\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    )
+    record = f"{stem}.dist-info/RECORD"
+    files[record] = "".join([*map(_recorded, files, files.values()), f"{record},,\n"]).encode()
+    return f"{stem}-py3-none-any.whl", zipped(files)
+
+
+def pins() -> str:
+    """Return the versions of all that the package needs, as they are installed here, as constraints for pip.
+
+    They hold for this Python and later ones: of an older one it is not known whether it can have them.
+    """
+    found: dict[str, str] = {}
+    done: set[tuple[str, tuple[str, ...]]] = set()
+    waiting: list[tuple[str, tuple[str, ...]]] = [(PACKAGE, ())]
+    while waiting:
+        name, extras = waiting.pop()
+        try:
+            distribution = importlib.metadata.distribution(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue  # for another system
+        if (name, extras) not in done:
+            done.add((name, extras))
+            found[_normal(name)] = distribution.version
+            waiting += _needed(distribution.requires or [], extras)
+    for name in (PACKAGE, *_WITH_PYTHON):
+        found.pop(name, None)
+    since = f'python_version >= "{sys.version_info.major}.{sys.version_info.minor}"'
+    return "".join(f"{name}=={version} ; {since}\n" for name, version in sorted(found.items()))
+
+
+def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = (), private: tuple[str, ...] = ()) -> bytes:
+    """Return a zip of files by name, in that order; programs can be run, private files read by their owner."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            info = zipfile.ZipInfo(name, _LONG_AGO)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = (_PROGRAM if name in programs else _PRIVATE if name in private else _FILE) << 16
+            archive.writestr(info, content)
+    return stream.getvalue()
+
+
+def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
+    """Refuse a checkout that was installed before it came to need what it needs now."""
+    if sys.version_info < (3, 11):
+        return
+    tomllib = importlib.import_module("tomllib")  # Python 3.10 has none
+    project = Path(grader.__file__).resolve().parent.parent / "pyproject.toml"
+    if not project.is_file():
+        return
+
+    wanted = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["dependencies"]
+    have = {_normal(name) for name, _ in _needed(installed.requires or [], ())}
+    new = sorted({_normal(name) for name, _ in _needed(wanted, ())} - have)
+    if new:
+        text = f"{PACKAGE}: expected an installation that knows its requirements, found none of {', '.join(new)}"
+        raise EnvironmentFault(text, "python3 -m pip install -e . in the checkout of the grader")
+
+
+def _code() -> dict[str, bytes]:
+    package = Path(grader.__file__).resolve().parent
+    files = {f"grader/{name}": content for name, content in _below(package, but=_NOT_PACKED).items()}
+    for folder in ("rubrics", "integrations"):
+        for name, content in _below(shipped(folder)).items():
+            files[f"grader/shipped/{folder}/{name}"] = content
+    return files
+
+
+def _below(folder: Path, but: tuple[str, ...] = ("__pycache__",)) -> dict[str, bytes]:
+    paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    relative = ((path, path.relative_to(folder)) for path in paths)
+    return {
+        name.as_posix(): path.read_bytes()
+        for path, name in relative
+        if name.parts[0] not in but and "__pycache__" not in name.parts
+    }
+
+
+def _recorded(name: str, content: bytes) -> str:
+    digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+    return f"{name},sha256={digest},{len(content)}\n"
+
+
+def _needed(requirements: Iterable[str], extras: tuple[str, ...]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the name and the extras of each requirement that holds for some extras of the one that requires it."""
+    for requirement in requirements:
+        of_extra = re.search(r"extra *== *['\"]([^'\"]+)", requirement)
+        if of_extra is None or of_extra[1] in extras:
+            match = re.match(r"([A-Za-z0-9._-]+) *(?:\[([^]]*)\])?", requirement)
+            assert match is not None, requirement
+            yield match[1], tuple(extra.strip() for extra in (match[2] or "").split(",") if extra)
+
+
+def _normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+#: Files that are run; the others are read.
+_PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
+#: The key that drawn values follow from, where `run_autograder` looks for it.
+SEED_KEY = "seed.key"
+#: Classroom 50 fetches no more than this.
+CLASSROOM50_BYTES = 10 * 1024 * 1024
+_OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
+_HEX_DIGITS = 40
+_NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """What a platform is to grade, and how.
+
+    Attributes:
+        exercises: Exercise ids; empty for all of the rubrics.
+        rubrics: Rubric files; empty for the built-in ones.
+        isolation: As on the command line.
+    """
+
+    exercises: tuple[str, ...] = ()
+    rubrics: tuple[Path, ...] = ()
+    isolation: str = "auto"
+
+
+def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
+    """Return the autograder zip for Gradescope; raises GraderError if it would not work there.
+
+    Args:
+        chosen: What it grades.
+        seed_key: File with the key that drawn values follow from; None for the public practice key.
+    """
+    files = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
+    if seed_key is not None:
+        files[SEED_KEY] = read_key(seed_key, "seed key") + b"\n"
+    return zipped({**files, **_common(chosen)}, programs=_PROGRAMS, private=(SEED_KEY,))
+
+
+def classroom50(chosen: Chosen) -> dict[str, bytes]:
+    """Return the files of an assignment's autograder for Classroom 50, by name.
+
+    Raises:
+        GraderError: They would not work there.
+    """
+    files = {"autograder.py": integration("classroom50/autograder.py"), **_common(chosen)}
+    size = sum(map(len, files.values()))
+    if size > CLASSROOM50_BYTES:
+        text = f"classroom50: expected at most {CLASSROOM50_BYTES} bytes, found {size}"
+        raise GraderError(text, "leave out rubrics that this assignment does not need")
+    return files
+
+
+def workflow(action: str) -> str:
+    """Return the workflow of a student's repository, which grades with an action at one commit.
+
+    Args:
+        action: `OWNER/NAME@COMMIT`, the commit with all of its 40 digits: what it names never changes.
+
+    Raises:
+        GraderError: It is of another form.
+    """
+    repository, _, commit = action.partition("@")
+    parts = repository.split("/")
+    whole = len(commit) == _HEX_DIGITS and set(commit) <= set("0123456789abcdef")
+    if len(parts) != 2 or not all(part and set(part) <= _NAME_SIGNS for part in parts) or not whole:
+        text = f"{action}: expected OWNER/NAME@COMMIT with a commit of {_HEX_DIGITS} digits, found something else"
+        raise GraderError(text, "git rev-parse HEAD in the repository of the grader says the commit")
+    text = integration("github/workflow.yml").decode()
+    return text.replace(_OWNER, repository).replace(_COMMIT, commit)
+
+
+def _common(chosen: Chosen) -> dict[str, bytes]:
+    _check(chosen)
+    name, content = wheel()
+    # Numbered: two rubrics may have one name in two folders, and names of files may be anything.
+    rubrics = {f"rubrics/{n}/rubric.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
+    settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
+    checks = {
+        f"rubrics/{n}/{file.name}": file.content
+        for n, path in enumerate(chosen.rubrics, start=1)
+        for file in own_check_files(path)
+    }
+    return {
+        "prepare": integration("prepare"),
+        "settings.json": (json.dumps(settings, indent=2) + "\n").encode(),
+        "constraints.txt": pins().encode(),
+        name: content,
+        **rubrics,
+        **checks,
+    }
+
+
+def _check(chosen: Chosen) -> None:
+    """Find mistakes now that would otherwise be found by the first student."""
+    paths = chosen.rubrics or tuple(builtin_rubrics().values())
+    exercises = [read_rubric(path, draw=First()) for path in paths]
+    for path, found in zip(paths, exercises, strict=True):
+        if found.variant is not None:
+            text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
+            raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
+    require_exercises(chosen.exercises, [exercise.id for exercise in exercises])

@@ -1,1 +1,0 @@
-"""Turns files that people write, rubrics and submissions, into values of the model."""

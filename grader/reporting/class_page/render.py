@@ -1,0 +1,218 @@
+"""The page of a class as HTML, rendered from a template that escapes everything it is given."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+from typing import Any
+from urllib.parse import quote
+
+from jinja2 import Template
+from markupsafe import Markup
+
+from grader.core.exercise import Outcome, exercise_name
+from grader.reporting import wording
+from grader.reporting.class_page.causes import Cause, causes
+from grader.reporting.class_page.contents import ClassPage, PageLink, ReportData, Student
+from grader.reporting.class_page.counts import Distribution, ExerciseCount, distribution, exercise_counts
+from grader.reporting.escape import script_json, shown
+from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
+
+
+@cache
+def own_script() -> str:
+    """Return the page's own script, which needs that of the reports before it."""
+    return _read("assets/class.js")
+
+
+@cache
+def own_style() -> str:
+    """Return the page's own style sheet, which stands on that of the reports."""
+    return _read("assets/class.css")
+
+
+def class_assets() -> dict[str, bytes]:
+    """Return file name -> content of what a page rendered with `assets=...` loads from there."""
+    return {**shared_assets(), own_name("js"): own_script().encode(), own_name("css"): own_style().encode()}
+
+
+def own_name(ending: str) -> str:
+    """Return the file name of the page's own script or style sheet; another version has another name."""
+    text = own_script() if ending == "js" else own_style()
+    return f"class-{hashlib.sha256(text.encode()).hexdigest()[:12]}.{ending}"
+
+
+def scripts_policy(*, standalone: bool) -> str:
+    """Return which scripts the page may run, as a Content-Security-Policy writes it."""
+    if not standalone:
+        return "'self' file:"
+    return f"'{common().script_digest}' '{policy_digest(own_script())}'"
+
+
+def common() -> Bundle:
+    """Return what the page has in common with reports."""
+    return bundle()
+
+
+def _read(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+#: One sign for each outcome, and one for a criterion that a report does not have.
+LETTERS = {Outcome.MET: "m", Outcome.PARTLY: "p", Outcome.NOT_MET: "n", Outcome.BLOCKED: "b", Outcome.UNDECIDED: "u"}
+NOT_ASKED = "-"
+_NAME_LIMIT = 100
+
+
+def payload(
+    page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[Cause], spread: Distribution
+) -> dict[str, Any]:
+    """Return the data of the page.
+
+    Args:
+        page: The page.
+        exercises: Its exercises and criteria.
+        found: Its causes, in the order shown.
+        spread: How its scores are distributed.
+    """
+    criteria = [(e.id, c.id) for e in exercises for c in e.criteria]
+    return {
+        "criteria": [f"{exercise}/{criterion}" for exercise, criterion in criteria],
+        "students": [_student(student, exercises, criteria) for student in page.students],
+        "causes": [list(cause.students) for cause in found],
+        "bins": [[b.label, b.low, b.high, b.raw, b.final] for b in spread.bins],
+        "changed": spread.changed,
+        "max_score": float(spread.max_score),
+    }
+
+
+def _student(
+    student: Student, exercises: Sequence[ExerciseCount], criteria: Sequence[tuple[str, str]]
+) -> dict[str, Any]:
+    """Return what a row is sorted by, column by column, and the outcome of each criterion in one letter."""
+    by_id = {} if student.report is None else {e["id"]: e for e in student.report["exercises"]}
+    outcomes = {(e, c["id"]): LETTERS[Outcome(c["outcome"])] for e, x in by_id.items() for c in x["criteria"]}
+    change = None if student.final is None or student.raw is None else student.final - student.raw
+    return {
+        "name": shown(student.name, limit=_NAME_LIMIT),
+        "status": student.status,
+        "raw": student.raw,
+        "change": change if student.adjustments else None,
+        "final": student.final,
+        "exercises": [by_id[e.id]["score"] if e.id in by_id else None for e in exercises],
+        "outcomes": "".join(outcomes.get(pair, NOT_ASKED) for pair in criteria),
+    }
+
+
+#: More causes than this are counted, not shown.
+MOST_CAUSES = 40
+REPORT_PAGE, REPORT_DATA = "report.html", "report.json"
+#: The same as far as students may see it.
+HANDED_BACK_PAGE = "feedback.html"
+
+
+def render_class(page: ClassPage, *, assets: str | None = None) -> str:
+    """Return the page of a class, which loads nothing from anywhere else.
+
+    Args:
+        page: What is shown; all its text is taken for hostile.
+        assets: Where the page finds the files of `class_assets`, relative to itself, e.g. `assets`; None puts them into
+            the page.
+    """
+    counted = [(k, s.report) for k, s in enumerate(page.students) if s.report is not None and s.counts]
+    exercises = exercise_counts(report for _, report in counted)
+    found = causes(counted)
+    spread = distribution(page.students)
+    return _template().render(
+        page=page,
+        exercises=exercises,
+        causes=found,
+        most_causes=MOST_CAUSES,
+        spread=spread,
+        tiles=_tiles(page, spread),
+        outcomes=wording.OUTCOME_WORDS,
+        common=common(),
+        assets=assets,
+        data=Markup(script_json(payload(page, exercises, found, spread))),  # noqa: S704  safe in a script element
+    )
+
+
+def result_link(folder: str, file: str, anchor: str = "") -> str:
+    """Return the link to a file of a student's results, percent-encoded; empty if it would lead anywhere else.
+
+    Args:
+        folder: Name of the folder below `students/`.
+        file: Name of the file in it.
+        anchor: Id of an element in it.
+    """
+    path = page_link(PageLink("", f"students/{folder}/{file}")) if "/" not in folder and folder else ""
+    return f"{path}#{quote(anchor, safe='', errors='replace')}" if path and anchor else path
+
+
+def page_link(link: PageLink) -> str:
+    """Return the address of another page in the folder for results; empty if it would lead out of it."""
+    parts = link.path.split("/")
+    wrong = any(part in ("", ".", "..") or "\\" in part or "\0" in part for part in parts)
+    return "" if wrong else "/".join(quote(part, safe="", errors="replace") for part in parts)
+
+
+@cache
+def _template() -> Template:
+    templates = page_environment("grader.reporting.class_page")
+    templates.filters |= {"points": _points, "percent": _percent}
+    templates.globals |= {
+        "embedded": Markup,
+        "bundle": bundle,
+        "exercise_name": exercise_name,
+        "result_link": result_link,
+        "page_link": page_link,
+        "segments": _segments,
+        "exercise_points": exercise_points,
+        "report_page": REPORT_PAGE,
+        "report_data": REPORT_DATA,
+        "handed_back_page": HANDED_BACK_PAGE,
+        "cause_anchor": _cause_anchor,
+    }
+    return templates.get_template("class.html")
+
+
+def exercise_points(report: ReportData | None, id_: str) -> Fraction | None:
+    """Return the points that a report has for an exercise; None if it is not in it."""
+    exercises = () if report is None else report["exercises"]
+    return next((Fraction(str(e["score"])) for e in exercises if e["id"] == id_), None)
+
+
+def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
+    """Return the figures that are looked at first, with what they are."""
+    standing = Counter(student.status for student in page.students)
+    found = spread.final or spread.raw
+    scores = [("mean", _percent(found[0])), ("median", _percent(found[1]))] if found else []
+    full = [("full score", str(spread.bins[-1].final))] if found else []
+    return [*scores, *full, *((status, str(count)) for status, count in standing.most_common())]
+
+
+def _cause_anchor(cause: Cause) -> str:
+    return f"{cause.exercise}-{cause.criterion}"
+
+
+def _points(value: Fraction | None) -> str:
+    return "" if value is None else wording.points(value)
+
+
+def _percent(value: float) -> str:
+    return f"{value:.1f} %"
+
+
+def _segments(outcomes: dict[str, int]) -> list[tuple[str, int, int]]:
+    """Return outcome, where its part of a bar begins and how long it is, without the empty ones."""
+    parts, start = [], 0
+    for outcome in Outcome:
+        count = outcomes[outcome.value]
+        if count:
+            parts.append((outcome.value, start, count))
+        start += count
+    return parts

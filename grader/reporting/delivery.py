@@ -1,0 +1,218 @@
+"""Writes reports to files, whole or not at all, and to standard output."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import stat
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from grader.core.errors import GraderError
+from grader.core.report import Report
+from grader.reporting.audience import ANYBODY, Readers
+from grader.reporting.escape import encoded
+from grader.reporting.formats import FORMATS, Layout, check_surroundings, rendered
+
+
+def check_writable(path: Path) -> None:
+    """Make sure that a report can be written to a path, without changing what is there.
+
+    Raises:
+        OSError: It cannot, and why.
+    """
+    target = _target(path)
+    if _is_special(target):
+        return
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    descriptor, probe = _beside(target)
+    os.close(descriptor)
+    probe.unlink()
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that a reader finds either what was there before or all of the new content.
+
+    A symbolic link stays one, an existing file keeps its mode. What is no regular file, such as /dev/null or a pipe,
+    is written to as it is.
+
+    Raises:
+        OSError: It could not be written; nothing is left beside it.
+    """
+    target = _target(path)
+    if _is_special(target):
+        target.write_bytes(data)
+        return
+    descriptor, fresh = _beside(target)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        if target.exists():
+            fresh.chmod(stat.S_IMODE(target.stat().st_mode))
+        fresh.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            fresh.unlink()
+        raise
+
+
+def _target(path: Path) -> Path:
+    return Path(os.path.realpath(path))
+
+
+def _is_special(path: Path) -> bool:
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _beside(target: Path) -> tuple[int, Path]:
+    """Create an empty file in the folder of the target, with the mode that the user's umask leaves."""
+    fresh = target.parent / f".grade-{secrets.token_hex(8)}.tmp"
+    return os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666), fresh
+
+
+_FILE_WIDTH = 100
+# Longer lines are hard to read, however wide the terminal is.
+_WIDEST = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """One report to deliver; without a path it goes to standard output."""
+
+    format: str
+    path: Path | None = None
+
+
+def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
+    """Return all that is to be delivered, files first, after making sure that it can be.
+
+    If nothing goes to standard output, the text does.
+
+    Raises:
+        GraderError: A file cannot be written, two reports would go to one place, or a format lacks what only its
+            platform can tell.
+    """
+    for output in outputs:
+        check_surroundings(output.format)
+    printed = [output for output in outputs if output.path is None]
+    if len(printed) > 1:
+        raise GraderError("standard output: expected one report, found more", "write the others to files")
+    files = [output for output in outputs if output.path is not None]
+    _refuse_twins([output.path for output in files if output.path is not None])
+    for output in files:
+        _check(output)
+    return (*files, *(printed or [Output("text")]))
+
+
+def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
+    """Deliver every report; one that cannot be does not keep the others back.
+
+    Args:
+        report: The whole of it.
+        outputs: The formats, and where they go.
+        readers: Who reads them, and when.
+
+    Raises:
+        GraderError: A report could not be written.
+    """
+    problems = [problem for output in outputs if (problem := _delivered(report, output, readers))]
+    if problems:
+        raise problems[0]
+
+
+def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Callable[[Report], None] | None:
+    """Return what writes partial reports to the files whose platform may end this run at any time; None without any.
+
+    A report that cannot be written is passed over: the whole one will say why.
+    """
+    files = [output for output in outputs if output.path is not None and FORMATS[output.format].written_early]
+
+    def write(report: Report) -> None:
+        with suppress(GraderError):
+            deliver(report, files, readers)
+
+    return write if files else None
+
+
+def show(render: Callable[[Layout], str], *, for_people: bool) -> None:
+    """Print something on standard output.
+
+    Args:
+        render: Makes the text, as wide and as coloured as it is told.
+        for_people: Whether a terminal with a poor encoding gets plain signs; programs read UTF-8.
+
+    Raises:
+        OSError: It cannot be written; a reader that had enough is no problem.
+    """
+    if sys.stdout is not None:
+        layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
+        _print(encoded(render(layout), sys.stdout.encoding if for_people else "utf-8"))
+
+
+def _refuse_twins(paths: Sequence[Path]) -> None:
+    targets = [os.path.realpath(path) for path in paths]
+    for path, target in zip(paths, targets, strict=True):
+        if targets.count(target) > 1:
+            raise GraderError(f"{path}: expected one report, found more", "give each report its own file")
+
+
+def _check(output: Output) -> None:
+    assert output.path is not None
+    try:
+        check_writable(output.path)
+    except OSError as error:
+        raise _unwritable(output, error) from error
+
+
+def _delivered(report: Report, output: Output, readers: Readers) -> GraderError | None:
+    try:
+        _write(report, output, readers)
+    except OSError as error:
+        return _unwritable(output, error)
+    return None
+
+
+def _unwritable(output: Output, error: OSError) -> GraderError:
+    where = output.path or "standard output"
+    return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
+
+
+def _write(report: Report, output: Output, readers: Readers) -> None:
+    if output.path is not None:
+        text = rendered(output.format, report, Layout(_FILE_WIDTH, colour=False), readers)
+        write_whole(output.path, text.encode("utf-8"))
+    else:
+        show(lambda layout: rendered(output.format, report, layout, readers), for_people=output.format == "text")
+
+
+def _coloured(stream: TextIO) -> bool:
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def _print(data: bytes) -> None:
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.flush()
+    except OSError as error:
+        # What is still buffered must not fail once more when Python ends.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        # A reader that had enough, such as `head`, is no problem.
+        if not isinstance(error, BrokenPipeError):
+            raise

@@ -1,0 +1,88 @@
+"""Explanations of criteria and checks, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+
+from grader.core.explanation import CheckExplanation, CriterionExplanation, Parameter
+from grader.reporting.escape import shown
+
+SCHEMA = "grader/explanation/v1"
+_LABEL = 12
+#: Widest column of parameters with their values.
+_VALUE = 32
+
+
+def render_explanations(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
+    """Return explanations as text, one after the other, no line longer than `width` where words allow it."""
+    parts = [_criterion(e, width) if isinstance(e, CriterionExplanation) else _check(e, width) for e in found]
+    return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
+
+
+def explanations_to_json(found: Sequence[CriterionExplanation | CheckExplanation]) -> str:
+    """Return explanations as JSON text."""
+    rows = [
+        {"kind": "criterion", **asdict(e), "points": float(e.points)}
+        if isinstance(e, CriterionExplanation)
+        else {"kind": "check", **asdict(e)}
+        for e in found
+    ]
+    return json.dumps({"schema": SCHEMA, "explanations": rows}, indent=2) + "\n"
+
+
+def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
+    """Return the checks among explanations as a list: name, and what it asks."""
+    checks = [e for e in found if isinstance(e, CheckExplanation)]
+    column = max((len(e.name) for e in checks), default=0) + 2
+    lines = (line for e in checks for line in _wrapped(f"{e.name:<{column}}", shown(e.asks), width, after=column))
+    return "\n".join(lines) + "\n"
+
+
+def _criterion(e: CriterionExplanation, width: int) -> Iterator[str]:
+    yield f"{e.id}: {shown(e.title)}"
+    yield from _row("exercise", e.exercise, width)
+    yield from _row("points", f"{float(e.points):g}", width)
+    yield from _row("chapter", e.chapter or "no part of the chapter asks for it", width)
+    if e.needs:
+        yield from _row("needs", ", ".join(e.needs), width)
+    yield from _row("situation", e.situation, width)
+    yield from _row("asks", e.asks, width)
+    yield from _row("measured", f"by the check {e.check}. {e.details}", width)
+    yield from _parameters(e.parameters, width)
+    if e.hint:
+        yield from _row("hint", e.hint, width)
+
+
+def _check(e: CheckExplanation, width: int) -> Iterator[str]:
+    yield f"{e.name}: a check that rubrics can use"
+    yield from _row("asks", e.asks, width)
+    if e.details:
+        yield from _row("measured", e.details, width)
+    yield from _parameters(e.parameters, width)
+    yield from _row("used by", ", ".join(e.used_by) or "no criterion here", width)
+
+
+def _parameters(parameters: Sequence[Parameter], width: int) -> Iterator[str]:
+    given = [f"{p.name}: {shown(p.value) or ('(to be given)' if p.required else '')}" for p in parameters]
+    column = min(max(map(len, given), default=0), _VALUE) + 2
+    if parameters:
+        yield "  parameters"
+    for parameter, text in zip(parameters, given, strict=True):
+        start = f"    {text:<{column}}"
+        if len(start) > column + 4:
+            yield start
+            start = " " * (column + 4)
+        yield from _wrapped(start, shown(parameter.meaning), width, after=column + 4)
+
+
+def _row(label: str, text: str, width: int) -> Iterator[str]:
+    for number, line in enumerate(text.split("\n")):
+        yield from _wrapped(f"  {label if number == 0 else '':<{_LABEL}}", shown(line, limit=2000), width)
+
+
+def _wrapped(start: str, text: str, width: int, *, after: int = _LABEL + 2) -> Iterator[str]:
+    lines = textwrap.wrap(text.strip(), max(40, width), initial_indent=start, subsequent_indent=" " * after)
+    yield from lines or [start.rstrip()]

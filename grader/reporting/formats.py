@@ -1,0 +1,124 @@
+"""The formats that a report can be delivered in, one row each; what renders one is imported when it is first used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from grader.core.exercise import Audience
+from grader.core.report import Report
+from grader.reporting.audience import ANYBODY, Readers
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a text is laid out; formats for programs do not care."""
+
+    width: int
+    colour: bool
+
+
+def _nothing(report: Report, layout: Layout) -> Mapping[str, Any]:
+    del report, layout
+    return {}
+
+
+def _layout(report: Report, layout: Layout) -> Mapping[str, Any]:
+    del report
+    return {"width": layout.width, "colour": layout.colour}
+
+
+def _folder(report: Report, layout: Layout) -> Mapping[str, Any]:
+    from grader.reporting.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
+
+    del layout
+    return {"folder": repository_folder(report.path, os.environ)}
+
+
+def _handed_in(report: Report, layout: Layout) -> Mapping[str, Any]:
+    from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
+
+    del report, layout
+    return {"handed_in": handed_in(os.environ)}
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format that a report can be delivered in.
+
+    Attributes:
+        renderer: What makes the text of a report: `module:function` in `grader.reporting`.
+        suffix: How the name of a file in this format ends.
+        usual: Who reads it unless somebody is named: students, where a platform shows it to them.
+        arguments: What the renderer is given besides the report.
+        withholds: Whether it leaves out by itself what students must not see yet: its platform shows that later.
+        illustrated: Whether it shows pictures, which take about as long to draw as judging takes.
+        written_early: Whether its platform ends a run that takes too long, and then takes what is there.
+    """
+
+    renderer: str
+    suffix: str
+    usual: Audience
+    arguments: Callable[[Report, Layout], Mapping[str, Any]] = _nothing
+    withholds: bool = False
+    illustrated: bool = False
+    written_early: bool = False
+
+    def __call__(self, report: Report, layout: Layout, **arguments: Any) -> str:
+        """Return the text of a report."""
+        module, _, function = self.renderer.partition(":")
+        text: str = getattr(import_module(f"grader.reporting.{module}"), function)(
+            report, **self.arguments(report, layout), **arguments
+        )
+        return text
+
+
+#: Every format that a report can be delivered in.
+FORMATS: dict[str, Format] = {
+    "json": Format("json_report:dumps", ".json", Audience.INSTRUCTOR),
+    "text": Format("text:render_text", ".txt", Audience.INSTRUCTOR, _layout),
+    "html": Format("html.render:render_html", ".html", Audience.INSTRUCTOR, illustrated=True),
+    "markdown": Format("markdown:render_markdown", ".md", Audience.INSTRUCTOR),
+    "junit": Format("junit:render_junit", ".xml", Audience.INSTRUCTOR, _folder),
+    "github": Format("platforms.github:render_github", ".txt", Audience.STUDENT, _folder),
+    "gradescope": Format(
+        "platforms.gradescope:render_gradescope", ".json", Audience.STUDENT, withholds=True, written_early=True
+    ),
+    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", Audience.STUDENT),
+    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", Audience.STUDENT, _handed_in),
+    "classroom": Format("platforms.classroom:render_classroom", ".json", Audience.STUDENT),
+}
+
+
+def check_surroundings(name: str) -> None:
+    """Make sure that the environment tells what a format needs and a report does not know.
+
+    Raises:
+        GraderError: It does not.
+    """
+    if FORMATS[name].arguments is _handed_in:
+        from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
+
+        handed_in(os.environ)
+
+
+def rendered(name: str, report: Report, layout: Layout, readers: Readers = ANYBODY) -> str:
+    """Return a report in a format, with what its reader may see of it.
+
+    Args:
+        name: One of `FORMATS`.
+        report: The whole of it.
+        layout: How a text is laid out.
+        readers: Who reads it, and when.
+    """
+    format_ = FORMATS[name]
+    if readers.of(format_.usual) is Audience.INSTRUCTOR:
+        return format_(report, layout)
+    if format_.withholds:
+        return format_(report, layout, day=readers.day)
+    from grader.reporting.audience import for_student  # noqa: PLC0415  as above
+
+    return format_(for_student(report, readers.day), layout)

@@ -1,0 +1,87 @@
+"""The template environment, scripts and style sheets of HTML pages."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from grader.reporting.escape import shown
+
+
+def page_environment(package: str) -> Environment:
+    """Return what renders the templates of a package, with the filter `shown` for what students wrote."""
+    templates = Environment(
+        loader=PackageLoader(package),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["shown"] = shown
+    return templates
+
+
+_LIBRARIES = "vendor/echarts-6.1.0.common.min.js", "vendor/dagre-3.1.3.min.js"
+#: Libraries whose file does not hold its licence; it goes wherever they go.
+_LICENCES = "vendor/echarts.LICENSE-d3", "vendor/dagre.LICENSE"
+_OWN = ("assets/charts.js", "assets/graphs.js", "assets/page.js")
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """All that the page needs besides its content."""
+
+    script: str
+    style: str
+
+    @property
+    def script_digest(self) -> str:
+        """The script's digest as a Content-Security-Policy writes it."""
+        return policy_digest(self.script)
+
+    @property
+    def style_digest(self) -> str:
+        """The style sheet's digest as a Content-Security-Policy writes it."""
+        return policy_digest(self.style)
+
+    @property
+    def script_name(self) -> str:
+        """File name of the script where reports share it; another version has another name."""
+        return f"report-{_short(self.script)}.js"
+
+    @property
+    def style_name(self) -> str:
+        """File name of the style sheet where reports share it."""
+        return f"report-{_short(self.style)}.css"
+
+
+@cache
+def bundle() -> Bundle:
+    """Return the bundle of this version of the grader."""
+    licences = "".join(f"/*\n{_read(name).strip()}\n*/\n" for name in _LICENCES)
+    scripts = "".join(f"{_read(name).strip()}\n" for name in (*_LIBRARIES, *_OWN))
+    return Bundle(f"{licences}{scripts}", _read("assets/report.css"))
+
+
+def shared_assets() -> dict[str, bytes]:
+    """Return file name -> content of what reports rendered with `assets=...` load from there."""
+    made = bundle()
+    return {made.script_name: made.script.encode(), made.style_name: made.style.encode()}
+
+
+def _read(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def policy_digest(text: str) -> str:
+    """Return the digest of an inline script or style sheet as a Content-Security-Policy writes it."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -1,0 +1,201 @@
+"""The report as one HTML page, rendered from a template that escapes everything it is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment
+from markupsafe import Markup
+
+from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Series, Stage
+from grader.core.exercise import Location, Outcome, exercise_name
+from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.trace import ClockKind, Endpoint
+from grader.reporting import wording
+from grader.reporting.escape import script_json, shown
+from grader.reporting.html.assets import bundle, page_environment
+
+_TEXT_LIMIT = 200
+_NAME_LIMIT = 60
+#: More nodes and topics than this are no drawing any more.
+_MOST_BOXES = 60
+
+
+def figure_values(figure: Figure) -> dict[str, Any]:
+    """Return a figure as JSON values; numbers that JSON cannot say are None."""
+    return _graph(figure) if isinstance(figure, GraphFigure) else _chart(figure)
+
+
+def _chart(chart: Chart) -> dict[str, Any]:
+    return {
+        "kind": "chart",
+        "title": shown(chart.title),
+        "x": {"title": chart.x_title, "unit": chart.x_unit},
+        "square": chart.square,
+        "panels": [_panel(panel) for panel in chart.panels],
+        "moments": [
+            {"x": _number(m.x), "label": shown(m.label, limit=_NAME_LIMIT), "tone": m.tone.value} for m in chart.moments
+        ],
+    }
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {
+        "title": shown(panel.title, limit=_NAME_LIMIT),
+        "unit": panel.unit,
+        "series": [_series(series) for series in panel.series],
+        "bands": [
+            {"low": _number(b.low), "high": _number(b.high), "label": shown(b.label), "tone": b.tone.value}
+            for b in panel.bands
+        ],
+        "levels": [{"value": _number(level.value), "label": shown(level.label)} for level in panel.levels],
+        "lanes": [shown(lane, limit=_NAME_LIMIT) for lane in panel.lanes],
+        "grid": list(panel.grid) if panel.grid else None,
+    }
+
+
+def _series(series: Series) -> dict[str, Any]:
+    return {
+        "name": shown(series.name, limit=_NAME_LIMIT),
+        "look": series.look.value,
+        "tone": series.tone.value,
+        "points": [[_number(x), _number(y)] for x, y in series.points],
+        "texts": [shown(text, limit=_TEXT_LIMIT) for text in series.texts],
+    }
+
+
+def _graph(figure: GraphFigure) -> dict[str, Any]:
+    return {
+        "kind": "graph",
+        "title": shown(figure.title),
+        "stages": [_stage(stage) for stage in figure.stages],
+    }
+
+
+def _stage(stage: Stage) -> dict[str, Any]:
+    """Return nodes, topics and arrows; ids tell a node from a topic of the same name."""
+    endpoints = [e for e in stage.graph.endpoints if "/_" not in e.topic]
+    nodes = list(dict.fromkeys((*stage.graph.nodes, *(e.node for e in endpoints))))[:_MOST_BOXES]
+    topics = list(dict.fromkeys(e.topic for e in endpoints))[:_MOST_BOXES]
+    drawn = [e for e in endpoints if e.node in nodes and e.topic in topics]
+    return {
+        "title": shown(stage.title, limit=_NAME_LIMIT),
+        "nodes": [{"id": f"n{k}", "name": shown(name, limit=_NAME_LIMIT)} for k, name in enumerate(nodes)],
+        "topics": [
+            {"id": f"t{k}", "name": shown(name, limit=_NAME_LIMIT), **_types(name, drawn)}
+            for k, name in enumerate(topics)
+        ],
+        "edges": [_edge(e, f"n{nodes.index(e.node)}", f"t{topics.index(e.topic)}") for e in drawn],
+    }
+
+
+def _types(topic: str, endpoints: Iterable[Endpoint]) -> dict[str, Any]:
+    types = list(dict.fromkeys(e.type for e in endpoints if e.topic == topic))
+    return {"types": [shown(t, limit=_NAME_LIMIT) for t in types[:5]], "quarrel": len(types) > 1}
+
+
+def _edge(endpoint: Endpoint, node: str, topic: str) -> dict[str, Any]:
+    ends = (node, topic) if endpoint.kind == "publisher" else (topic, node)
+    said = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
+    said += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
+    said += f", depth {endpoint.depth}" if endpoint.depth else ""
+    return {"from": ends[0], "to": ends[1], "text": shown(said, limit=_TEXT_LIMIT)}
+
+
+def _number(value: float) -> float | int | None:
+    """Return a number with as many digits as a picture shows."""
+    if not math.isfinite(value):
+        return None
+    short = float(f"{value:.7g}")
+    return int(short) if short.is_integer() and abs(short) < 1e15 else short
+
+
+_CIRCUMFERENCE = 100
+_LINE_LIMIT = 160
+
+
+def render_html(report: Report, *, assets: str | None = None) -> str:
+    """Return a report as an HTML page that loads nothing from anywhere.
+
+    Args:
+        report: What is shown; all its text is taken for hostile.
+        assets: Where the page finds the files of `shared_assets`, relative to itself, e.g. `../assets`; None puts them
+            into the page, which then stands alone.
+    """
+    page = _templates().get_template("report.html")
+    figures = {figure.id: figure_values(figure) for e in report.exercises for figure in e.figures}
+    return page.render(
+        report=report,
+        bundle=bundle(),
+        assets=assets,
+        figures=Markup(script_json(figures)),  # noqa: S704  the function exists to make it safe in a script element
+        embedded=Markup,
+        clock_wall=ClockKind.WALL,
+        command=" ".join(wording.command(report)),
+    )
+
+
+@cache
+def _templates() -> Environment:
+    templates = page_environment("grader.reporting.html")
+    templates.filters["exercise_name"] = exercise_name
+    templates.globals |= {
+        "wording": wording,
+        "outcome_word": _outcome_word,
+        "open_at_first": _open_at_first,
+        "percent": _percent,
+        "excerpt_at": _excerpt_at,
+        "excerpts_left": _excerpts_left,
+        "figures_for": _figures_for,
+        "code_line": _code_line,
+        "segments": _segments,
+    }
+    return templates
+
+
+def _outcome_word(outcome: Outcome) -> str:
+    return wording.OUTCOME_WORDS[outcome]
+
+
+def _open_at_first(verdict: Verdict) -> bool:
+    """Return whether a criterion is shown unfolded: what cost points is what people look for."""
+    return verdict.outcome in (Outcome.NOT_MET, Outcome.PARTLY, Outcome.UNDECIDED)
+
+
+def _percent(score: Fraction, max_score: Fraction) -> float:
+    return round(float(_CIRCUMFERENCE * score / max_score), 2) if max_score else 0.0
+
+
+def _excerpt_at(exercise: ExerciseReport, place: Location | None) -> Excerpt | None:
+    if place is None:
+        return None
+    return next((e for e in exercise.excerpts if (e.file, e.line) == (place.file, place.line)), None)
+
+
+def _excerpts_left(exercise: ExerciseReport, fault: ReportedFault) -> list[Excerpt]:
+    """Return the source around a fault, unless a criterion shows it already."""
+    shown_above = {verdict.location for verdict in exercise.verdicts}
+    place = Location(fault.file, fault.line)
+    excerpt = _excerpt_at(exercise, place)
+    return [excerpt] if excerpt and place not in shown_above else []
+
+
+def _figures_for(exercise: ExerciseReport, criterion: str) -> list[Figure]:
+    return [figure for figure in exercise.figures if criterion in figure.criteria]
+
+
+def _code_line(line: str) -> str:
+    return shown(line, limit=_LINE_LIMIT)
+
+
+def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:
+    """Return where each criterion begins on a strip as long as all their points, how long it is, and its outcome."""
+    parts, start = [], Fraction(0)
+    for verdict in verdicts:
+        parts.append((float(start), float(verdict.max_score), verdict.outcome.value))
+        start += verdict.max_score
+    return parts

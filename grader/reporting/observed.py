@@ -1,0 +1,190 @@
+"""Shows a summary: as text for people, as JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from grader.core.quantities import seconds
+from grader.core.summary import Summary, TopicSummary
+from grader.core.trace import Endpoint, Fault, LogRecord, OutputLine
+from grader.reporting.escape import shown, valid_unicode
+from grader.reporting.graph import draw_graph
+
+SCHEMA = "grader/observation/v1"
+#: The text shows so many lines of a kind, and counts the rest.
+SHOWN_LINES = 12
+SHOWN_RANGES = 8
+WIDTH = 100
+
+
+def render_summary(summary: Summary) -> str:
+    """Return a summary as plain text."""
+    return "\n".join(_lines(summary)) + "\n"
+
+
+def _lines(summary: Summary) -> Iterator[str]:
+    yield f"{', '.join(map(shown, summary.processes))}: {summary.duration_s:.1f} s on the {summary.clock.value} clock"
+    if summary.clock_reason:
+        yield f"  note: {shown(summary.clock_reason)}"
+    yield from (f"  note: {shown(note)}" for note in summary.notes)
+    yield from _section("Nodes", map(shown, summary.nodes))
+    yield from _section("Topics", (line for topic in summary.topics for line in _topic(topic)))
+    offers = (f"{o.kind} {shown(o.name)} {_offered(o.kind, o.detail)}" for o in summary.offers)
+    yield from _section("Services and parameters", offers)
+    if summary.graph is not None and len(summary.graph.nodes) > 1:
+        yield from _section("Graph", draw_graph(summary.graph, width=WIDTH))
+    yield from _section("Log records", _cut(_record(r) for r in summary.records))
+    yield from _section("Other output", _cut(_line(o) for o in summary.lines))
+    yield from _section("Faults", (line for fault in summary.faults for line in _fault(fault)))
+    yield f"isolation {shown(summary.isolation)}"
+
+
+def _section(title: str, lines: Iterator[str] | Sequence[str]) -> Iterator[str]:
+    body = list(lines)
+    if body:
+        yield f"{title}:"
+        yield from (f"  {line}" for line in body)
+
+
+def _offered(kind: str, detail: str) -> str:
+    return f"= {shown(detail)}" if kind == "parameter" else f"[{shown(detail)}]"
+
+
+def _topic(topic: TopicSummary) -> Iterator[str]:
+    yield f"{shown(topic.name)} [{', '.join(map(shown, topic.types))}]"
+    yield from (f"  published by {_end(e)}" for e in topic.publishers)
+    yield from (f"  subscribed by {_end(e)}" for e in topic.subscriptions)
+    if topic.publishers:
+        yield f"  {_traffic(topic)}"
+    ranges = list(topic.ranges.items())
+    yield from (f"  {shown(name)}: {_range(*limits)}" for name, limits in ranges[:SHOWN_RANGES])
+    if len(ranges) > SHOWN_RANGES:
+        yield f"  and {len(ranges) - SHOWN_RANGES} more fields (--json shows them)"
+
+
+def _traffic(topic: TopicSummary) -> str:
+    if topic.first_s is None:
+        return "no message"
+    text = f"{topic.messages} messages, the first at t = {topic.first_s:.3f} s"
+    pace = topic.pace
+    if pace is None:
+        return text
+    return (
+        f"{text}; average rate: {pace.rate_hz:.3f} Hz, min: {pace.min_s:.3f} s, max: {pace.max_s:.3f} s, "
+        f"std dev: {pace.std_dev_s:.5f} s"
+    )
+
+
+def _end(end: Endpoint) -> str:
+    return f"{shown(end.node)} ({end.reliability.replace('_', ' ')}, {end.durability.replace('_', ' ')})"
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _cut(lines: Iterator[str]) -> list[str]:
+    every = list(lines)
+    if len(every) <= SHOWN_LINES:
+        return every
+    return [*every[:SHOWN_LINES], f"and {len(every) - SHOWN_LINES} more (--json shows them)"]
+
+
+def _record(record: LogRecord) -> str:
+    return f"t = {seconds(record.t_ns):.3f} s [{shown(record.severity)}] [{shown(record.logger)}]: {shown(record.text)}"
+
+
+def _line(line: OutputLine) -> str:
+    return f"t = {seconds(line.t_ns):.3f} s {line.stream}: {shown(line.text)}"
+
+
+def _fault(fault: Fault) -> Iterator[str]:
+    place = f" ({shown(fault.file)}:{fault.line})" if fault.file else ""
+    yield f"t = {seconds(fault.t_ns):.3f} s {shown(fault.process)}: {shown(fault.text)}{place}"
+    yield from (f"  {shown(frame)}" for frame in fault.frames)
+
+
+def summary_to_json(summary: Summary) -> str:
+    """Return a summary as JSON text; times in seconds."""
+    data: dict[str, Any] = {
+        "schema": SCHEMA,
+        "processes": list(summary.processes),
+        "starts": [
+            {
+                "process": s.process,
+                "file": s.file,
+                "way": s.way.value,
+                "target": s.target or None,
+                "hidden": list(s.hidden),
+            }
+            for s in summary.starts
+        ],
+        "clock": summary.clock.value,
+        "clock_reason": summary.clock_reason or None,
+        "duration_s": summary.duration_s,
+        "isolation": summary.isolation,
+        "nodes": list(summary.nodes),
+        "topics": [_topic_json(topic) for topic in summary.topics],
+        "offers": [{"process": o.process, "kind": o.kind, "name": o.name, "detail": o.detail} for o in summary.offers],
+        "records": [
+            {
+                "t_s": seconds(r.t_ns),
+                "process": r.process,
+                "severity": r.severity,
+                "logger": r.logger,
+                "text": r.text,
+                "file": r.file,
+                "line": r.line,
+            }
+            for r in summary.records
+        ],
+        "lines": [
+            {"t_s": seconds(o.t_ns), "process": o.process, "stream": o.stream, "text": o.text} for o in summary.lines
+        ],
+        "faults": [
+            {
+                "t_s": seconds(f.t_ns),
+                "process": f.process,
+                "kind": f.kind.value,
+                "text": f.text,
+                "file": f.file,
+                "line": f.line,
+                "frames": list(f.frames),
+            }
+            for f in summary.faults
+        ],
+        "notes": list(summary.notes),
+    }
+    return json.dumps(_valid(data), indent=2, allow_nan=False) + "\n"
+
+
+def _topic_json(topic: TopicSummary) -> dict[str, Any]:
+    pace = topic.pace
+    return {
+        "name": topic.name,
+        "types": list(topic.types),
+        "publishers": [_end_json(e) for e in topic.publishers],
+        "subscriptions": [_end_json(e) for e in topic.subscriptions],
+        "messages": topic.messages,
+        "first_s": topic.first_s,
+        "rate_hz": pace.rate_hz if pace else None,
+        "min_s": pace.min_s if pace else None,
+        "max_s": pace.max_s if pace else None,
+        "std_dev_s": pace.std_dev_s if pace else None,
+        "ranges": {name: list(limits) for name, limits in topic.ranges.items()},
+    }
+
+
+def _end_json(end: Endpoint) -> dict[str, Any]:
+    return {"node": end.node, "type": end.type, "reliability": end.reliability, "durability": end.durability}
+
+
+def _valid(value: Any) -> Any:
+    """Return JSON values whose texts hold no lone surrogates."""
+    if isinstance(value, str):
+        return valid_unicode(value)
+    if isinstance(value, dict):
+        return {valid_unicode(key): _valid(field) for key, field in value.items()}
+    return [_valid(field) for field in value] if isinstance(value, list) else value

@@ -1,0 +1,89 @@
+"""The report as workflow commands of GitHub Actions: annotations beside the lines that they are about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from grader.core.exercise import Location, Outcome, exercise_name
+from grader.core.report import ExerciseReport, Report, Verdict
+from grader.reporting import wording
+from grader.reporting.escape import log_lines, shown, workflow_message, workflow_property
+
+#: GitHub shows no more annotations of one kind than this of one step, and drops the rest without a word.
+MOST_OF_A_KIND = 10
+_KINDS = {Outcome.NOT_MET: "error", Outcome.PARTLY: "warning", Outcome.UNDECIDED: "warning"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Annotation:
+    kind: str
+    title: str
+    message: str
+    location: Location | None = None
+
+
+def render_github(report: Report, *, folder: str | None) -> str:
+    """Return the lines to be printed in a step.
+
+    An error for each criterion that is not met, a warning for each that is partly met or undecided, and one notice with
+    the score. What is blocked has its cause among them. Lines without a command repeat the report's end in the log.
+
+    Args:
+        report: What is annotated.
+        folder: Where the submission lies in the repository, POSIX form, empty for its root; None if it does not, and
+            then no annotation names a file.
+    """
+    annotations = [_notice(report), *_warnings(report)]
+    annotations += [_annotation(e, v) for e in report.exercises for v in e.verdicts if v.outcome in _KINDS]
+    kept = [a for kind in ("notice", "error", "warning") for a in _within_limit(annotations, kind)]
+    lines = [_line(annotation, folder) for annotation in kept]
+    lines += [
+        log_lines(f"{wording.exercise_line(e)}: {remark}") for e in report.exercises for remark in wording.remarks(e)
+    ]
+    return "\n".join([*lines, *map(log_lines, wording.ending(report))]) + "\n"
+
+
+def _notice(report: Report) -> _Annotation:
+    notes = [line for line in wording.opening(report) if line.startswith("note: ")]
+    message = "\n".join([wording.headline(report), wording.summary(report), *notes, *wording.ending(report)])
+    return _Annotation("notice", f"Score: {wording.score_line(report)}", message)
+
+
+def _warnings(report: Report) -> list[_Annotation]:
+    said = [_Annotation("warning", "The score is not final", warning) for warning in wording.warnings(report)]
+    if wording.without_walls(report):
+        said.append(_Annotation("warning", "No isolation", f"isolation: {wording.isolation(report)}"))
+    return said
+
+
+def _annotation(exercise: ExerciseReport, verdict: Verdict) -> _Annotation:
+    score = f"{wording.points(verdict.score)}/{wording.points(verdict.max_score)}"
+    number = shown(exercise.number, limit=wording.NAME_LIMIT)
+    word = wording.OUTCOME_WORDS[verdict.outcome]
+    return _Annotation(
+        kind=_KINDS[verdict.outcome],
+        title=f"{exercise_name(number)}, {shown(verdict.title)}: {word}, {score}",
+        message="\n".join(wording.explanation(verdict)),
+        location=verdict.location,
+    )
+
+
+def _within_limit(annotations: list[_Annotation], kind: str) -> list[_Annotation]:
+    """Return the annotations of a kind; if they are too many, the last one says how many are missing."""
+    found = [annotation for annotation in annotations if annotation.kind == kind]
+    if len(found) <= MOST_OF_A_KIND:
+        return found
+    kept = found[: MOST_OF_A_KIND - 1]
+    more = len(found) - len(kept)
+    titles = "\n".join(annotation.title for annotation in found[len(kept) :])
+    return [*kept, _Annotation(kind, f"And {more} more", titles)]
+
+
+def _line(annotation: _Annotation, folder: str | None) -> str:
+    properties = [f"title={workflow_property(annotation.title)}"]
+    place = annotation.location
+    if place is not None and folder is not None:
+        file = PurePosixPath(folder, place.file).as_posix()
+        properties = [f"file={workflow_property(file, limit=4096)}", f"line={place.line}", *properties]
+    return f"::{annotation.kind} {','.join(properties)}::{workflow_message(annotation.message)}"

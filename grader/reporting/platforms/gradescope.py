@@ -1,0 +1,90 @@
+"""The report as Gradescope's results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Outcome
+from grader.core.report import ExerciseReport, Report, Verdict
+from grader.reporting import wording
+from grader.reporting.audience import for_student
+from grader.reporting.escape import json_value, shown
+from grader.reporting.json_report import json_text
+
+#: What a criterion waits for -> when the platform shows its test.
+_VISIBILITIES = {DUE_DATE: "after_due_date", PUBLISHED: "after_published"}
+_HIDDEN, _VISIBLE = "hidden", "visible"
+_FOR_STAFF = "What was found is in the standard output, which only staff see."
+
+
+def render_gradescope(report: Report, *, day: str | None = None) -> str:
+    """Return the results.json of a report; its texts are plain, so that nothing in them is markup to the platform.
+
+    What is undecided earns nothing yet, and the output says so before anything else. The score counts every criterion,
+    also those whose tests the platform hides.
+
+    Args:
+        report: The whole of it.
+        day: The day by which dates in the rubric are over or not; None to show everything to everybody.
+    """
+    seen = report if day is None else for_student(report, day)
+    return json_text(
+        {
+            "score": json_value(report.score),
+            "execution_time": json_value(round(report.duration_s, 3)),
+            "output": "\n".join(_output(seen)),
+            "output_format": "text",
+            "visibility": _VISIBLE,
+            "stdout_visibility": _HIDDEN,
+            "tests": _tests(report, seen),
+            "extra_data": {
+                "max_score": json_value(report.max_score),
+                "final": report.final,
+                "pending": list(report.pending),
+                "isolation": report.environment.isolation,
+                "submission": report.digest,
+            },
+        }
+    )
+
+
+def _output(report: Report) -> list[str]:
+    lines = [*wording.opening(report), wording.run_line(report)]
+    for exercise in report.exercises:
+        remarks = wording.remarks(exercise)
+        lines += ["", wording.exercise_line(exercise), *remarks] if remarks else []
+    return [*lines, "", *wording.ending(report)]
+
+
+def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:
+    """Return a test for every criterion, as far as students see it; the rest in it is only for the platform."""
+    visible = {(exercise.id, verdict.id): verdict for exercise in seen.exercises for verdict in exercise.verdicts}
+    found = []
+    for exercise in report.exercises:
+        for number, verdict in enumerate(exercise.verdicts, start=1):
+            shown_one = visible.get((exercise.id, verdict.id))
+            found.append(_test(exercise, number, shown_one) if shown_one else _unshown(exercise, number, verdict))
+    return found
+
+
+def _unshown(exercise: ExerciseReport, number: int, verdict: Verdict) -> dict[str, Any]:
+    """Return a test that the platform hides, whole where it shows the test later, else with its points alone."""
+    visibility = _VISIBILITIES.get(exercise.feedback.get(verdict.id, OPEN).until, _HIDDEN)
+    kept = {"output": _FOR_STAFF} if visibility == _HIDDEN else {}
+    return {**_test(exercise, number, verdict), **kept, "visibility": visibility}
+
+
+def _test(exercise: ExerciseReport, number: int, verdict: Verdict) -> dict[str, Any]:
+    return {
+        "name": f"{shown(verdict.title)} ({shown(verdict.id)})",
+        "name_format": "text",
+        "number": f"{shown(exercise.number, limit=wording.NAME_LIMIT)}.{number}",
+        "score": json_value(verdict.score),
+        "max_score": json_value(verdict.max_score),
+        "status": "passed" if verdict.outcome is Outcome.MET else "failed",
+        "output": "\n".join([wording.OUTCOME_WORDS[verdict.outcome], *wording.explanation(verdict)]),
+        "output_format": "text",
+        "tags": [verdict.outcome.value],
+        "visibility": _VISIBLE,
+        "extra_data": {"exercise": exercise.id, "criterion": verdict.id, "outcome": verdict.outcome.value},
+    }

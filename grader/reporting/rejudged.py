@@ -1,0 +1,214 @@
+"""Reports that were judged again: what changed for whom, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from grader.reporting.escape import shown
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What a criterion came to in one report, as its JSON says."""
+
+    outcome: str
+    score: float
+    max_score: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionChange:
+    """One criterion whose outcome or points changed; None where a report has no such criterion."""
+
+    exercise: str
+    criterion: str
+    before: Standing | None
+    after: Standing | None
+
+    @property
+    def gain(self) -> float:
+        """Points won; negative for points lost."""
+        return (self.after.score if self.after else 0) - (self.before.score if self.before else 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What changed for one submission.
+
+    Attributes:
+        name: What people call the submission.
+        before: Points of the first report, of the exercises compared.
+        before_max: Points there were to be had.
+        after: Points of the new report.
+        after_max: Points there are to be had.
+        criteria: Those that changed, in the order of the new report, removed ones last.
+    """
+
+    name: str
+    before: float
+    before_max: float
+    after: float
+    after_max: float
+    criteria: tuple[CriterionChange, ...]
+
+    @property
+    def gain(self) -> float:
+        """Points won; negative for points lost."""
+        return round(self.after - self.before, 6)
+
+    @property
+    def share_gain(self) -> float:
+        """Share of the points won, in [-1, 1]: what counts where the rubric gives other points than before."""
+        return round(_share(self.after, self.after_max) - _share(self.before, self.before_max), 9)
+
+
+def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Change:
+    """Return what changed between two reports as JSON, of the exercises that the second one has.
+
+    Raises:
+        KeyError, TypeError, ValueError: `before` is no report.
+    """
+    exercises = [e["id"] for e in after["exercises"]]
+    old = {key: row for key, row in _standings(before) if key[0] in exercises}
+    new = dict(_standings(after))
+    changed = [
+        CriterionChange(*key, old.get(key), new.get(key))
+        for key in dict.fromkeys([*new, *old])
+        if _mark(old.get(key)) != _mark(new.get(key))
+    ]
+    return Change(name, *_sums(old.values()), *_sums(new.values()), tuple(changed))
+
+
+def dropped_first(changes: Sequence[Change]) -> list[Change]:
+    """Return those with any difference: the greatest loss first, by the share of the points, the greatest gain last."""
+    return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
+
+
+def _standings(report: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], Standing]]:
+    for exercise in report["exercises"]:
+        for row in exercise["criteria"]:
+            standing = Standing(str(row["outcome"]), float(row["score"]), float(row["max_score"]), str(row["reason"]))
+            yield (str(exercise["id"]), str(row["id"])), standing
+
+
+def _mark(standing: Standing | None) -> tuple[str, float, float] | None:
+    return None if standing is None else (standing.outcome, standing.score, standing.max_score)
+
+
+def _sums(standings: Any) -> tuple[float, float]:
+    rows = list(standings)
+    return round(sum(r.score for r in rows), 6), round(sum(r.max_score for r in rows), 6)
+
+
+def _share(score: float, max_score: float) -> float:
+    return score / max_score if max_score else 0.0
+
+
+SCHEMA = "grader/rejudged/v1"
+_OUTCOMES = {"not_met": "not met"}
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One submission judged again, or refused.
+
+    Attributes:
+        name: What people call the submission.
+        problem: Why its evidence cannot be used, on one line; empty if it can.
+        score: Points earned.
+        max_score: Points to be had.
+        code: Exit code that this submission alone would have.
+        change: What changed since its first report; None if nobody asked, or there is none to compare with.
+        report: The new report as JSON text; empty if nobody asked for it.
+    """
+
+    name: str
+    problem: str = ""
+    score: float = 0.0
+    max_score: float = 0.0
+    code: int = 0
+    change: Change | None = None
+    report: str = ""
+
+
+def render_results(results: Sequence[Result]) -> str:
+    """Return one line for each submission, in the order given, and what was refused."""
+    judged = [r for r in results if not r.problem]
+    width = max((len(_name(r.name)) for r in judged), default=0)
+    lines = [f"{_name(r.name):<{width}}  {_points(r.score)}/{_points(r.max_score)}" for r in judged]
+    return "\n".join([*lines, *_refused(results), _count(results)]) + "\n"
+
+
+def render_changes(results: Sequence[Result]) -> str:
+    """Return what changed for whom, dropped marks first, and what was refused."""
+    judged = [r for r in results if not r.problem]
+    changes = dropped_first([r.change for r in judged if r.change is not None])
+    lines = [line for change in changes for line in _change(change)]
+    incomparable = [f"{_name(r.name)}: no first report to compare with" for r in judged if r.change is None]
+    same = len(judged) - len(changes) - len(incomparable)
+    return "\n".join([*lines, *incomparable, *_refused(results), f"unchanged: {same} of {len(judged)}"]) + "\n"
+
+
+def results_to_json(results: Sequence[Result], *, changes: bool) -> str:
+    """Return a class as JSON text: every report, or with `changes` what changed, dropped marks first."""
+    judged = [r for r in results if not r.problem]
+    data: dict[str, Any] = {"schema": SCHEMA}
+    if changes:
+        ordered = dropped_first([r.change for r in judged if r.change is not None])
+        data["changed"] = [{**asdict(c), "gain": c.gain} for c in ordered]
+        data["unchanged"] = [r.name for r in judged if r.change is not None and not r.change.criteria]
+        data["not_compared"] = [r.name for r in judged if r.change is None]
+    else:
+        data["submissions"] = [{"name": r.name, "report": json.loads(r.report)} for r in judged]
+    data["refused"] = [{"name": r.name, "problem": r.problem} for r in results if r.problem]
+    return json.dumps(data, indent=2, allow_nan=False) + "\n"
+
+
+def _change(change: Change) -> Iterator[str]:
+    of, said = _points(change.after_max), f"{_signed(change.gain)} points"
+    if change.before_max != change.after_max:
+        of += f" (of {_points(change.before_max)} before)"
+        said += f", {_signed(100 * change.share_gain)} % of all"
+    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {said}"
+    for row in change.criteria:
+        yield f"    {shown(row.exercise)}/{shown(row.criterion)}: {_row(row)}"
+
+
+def _row(row: CriterionChange) -> str:
+    if row.after is None:
+        return f"was {_standing(row.before)}, is asked no more"
+    before = "was not asked" if row.before is None else f"was {_standing(row.before)}"
+    return f"{before}, is {_standing(row.after)}: {shown(row.after.reason, limit=200)}"
+
+
+def _standing(standing: Standing | None) -> str:
+    if standing is None:
+        return "nothing"
+    outcome = _OUTCOMES.get(standing.outcome, standing.outcome)
+    return f"{shown(outcome)} {_points(standing.score)}/{_points(standing.max_score)}"
+
+
+def _refused(results: Sequence[Result]) -> list[str]:
+    return [f"refused: {_name(r.name)}: {shown(r.problem)}" for r in results if r.problem]
+
+
+def _count(results: Sequence[Result]) -> str:
+    refused = sum(bool(r.problem) for r in results)
+    judged = len(results) - refused
+    return f"judged: {judged}" + (f", refused: {refused}" if refused else "")
+
+
+def _signed(points: float) -> str:
+    return f"{'+' if points > 0 else ''}{_points(points)}"
+
+
+def _points(points: float) -> str:
+    return f"{round(points, 3):g}"
+
+
+def _name(name: str) -> str:
+    return shown(name, limit=80)

@@ -1,0 +1,244 @@
+"""The words that every format uses: outcomes, points, places, faults, and what a reader must know first."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from fractions import Fraction
+
+from grader.core.checkup import NO_WALLS, summarised
+from grader.core.exercise import Outcome, exercise_name
+from grader.core.quantities import seconds
+from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.trace import ClockKind
+from grader.reporting.escape import shown
+from grader.reporting.shell import quoted
+
+#: More faults or notes than this are counted, not shown.
+MOST_FAULTS = 10
+MOST_NOTES = 20
+#: Longest name of a submission, a scenario or a node that is shown.
+NAME_LIMIT = 100
+# No path is longer; a word that was cut would make another command.
+_WORD_LIMIT = 20_000
+_DIGEST_LENGTH = len("sha256:") + 12
+#: Words carry the outcome, so that nothing is lost without colour.
+OUTCOME_WORDS = {
+    Outcome.MET: "met",
+    Outcome.PARTLY: "partly",
+    Outcome.NOT_MET: "not met",
+    Outcome.BLOCKED: "blocked",
+    Outcome.UNDECIDED: "undecided",
+}
+_WHAT_HAPPENED = {
+    "syntax_error": "could not be compiled",
+    "exception": "raised an exception",
+    "exited": "ended by itself",
+    "hung": "did not come back",
+    "killed": "was ended",
+}
+# The first frames say where it began, the last where it broke; a deep recursion repeats itself between.
+_FIRST_FRAMES, _LAST_FRAMES = 3, 5
+
+
+def points(value: Fraction) -> str:
+    """Return points with two digits at most, and none where they would be zero."""
+    return f"{float(value):.2f}".rstrip("0").rstrip(".")
+
+
+def headline(report: Report) -> str:
+    """Return whose report it is and the score; safe to show as a line of text."""
+    return f"{shown(report.name, limit=NAME_LIMIT)}: {score_line(report)}"
+
+
+def score_line(report: Report) -> str:
+    """Return the score, e.g. `87.5 of 100 points`."""
+    return f"{points(report.score)} of {points(report.max_score)} points"
+
+
+def exercise_line(exercise: ExerciseReport) -> str:
+    """Return number, title and score of an exercise; safe to show as a line of text."""
+    number, title = (shown(text, limit=NAME_LIMIT) for text in (exercise.number, exercise.title))
+    score = f"{points(exercise.score)} of {points(exercise.max_score)} points"
+    return f"{exercise_name(number)}: {title} ({score}{'' if exercise.required else ', optional'})"
+
+
+def warnings(report: Report) -> list[str]:
+    """Return what must be read with the score: that the report is partial or not final, or had no walls."""
+    said = [_partial(report)] if report.pending else []
+    judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
+    undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
+    if undecided:
+        said.append(_not_final(undecided))
+    return said
+
+
+def summary(report: Report) -> str:
+    """Return how many criteria came to which outcome."""
+    verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
+    counts = Counter(verdict.outcome for verdict in verdicts)
+    parts = [f"{counts[outcome]} {word}" for outcome, word in OUTCOME_WORDS.items() if counts[outcome]]
+    judged = [f"{counts[Outcome.MET]} of {len(verdicts)} criteria met", *parts[bool(counts[Outcome.MET]) :]]
+    return f"{'Final' if report.final else 'So far'}: {', '.join(judged)}."
+
+
+def reason(verdict: Verdict) -> str:
+    """Return a verdict's reason; of a blocked one only what it needs. Not yet safe to show."""
+    return verdict.reason.removeprefix(NOT_JUDGED) if verdict.outcome is Outcome.BLOCKED else verdict.reason
+
+
+def explanation(verdict: Verdict) -> list[str]:
+    """Return why a verdict is what it is, what to do and where; each safe to show as a line of text."""
+    said = [shown(reason(verdict))]
+    if verdict.hint:
+        said.append(f"hint: {shown(verdict.hint)}")
+    if verdict.location is not None:
+        where = place(verdict.location.file, verdict.location.line)
+        said += [f"at {where}"] if where not in said[0] else []
+    return said
+
+
+def opening(report: Report) -> list[str]:
+    """Return what a reader must know before the criteria; each safe to show as a line of text."""
+    blocked = any(v.outcome is Outcome.BLOCKED for e in report.exercises for v in e.verdicts)
+    return [
+        headline(report),
+        *warnings(report),
+        summary(report),
+        *(["Blocked criteria are judged once what they need is met."] if blocked else []),
+        *_capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes"),
+    ]
+
+
+def remarks(exercise: ExerciseReport) -> list[str]:
+    """Return what an exercise's criteria do not say: faults, clock and notes; each safe to show as a line of text."""
+    faults = [f"fault: {happened(fault)}: {shown(fault.text)}" for fault in exercise.faults]
+    notes = [f"note: {shown(note)}" for note in exercise.notes]
+    clock_note = f"note: judged on the wall clock: {shown(exercise.clock_reason)}"
+    return [
+        *_capped(faults, MOST_FAULTS, "faults"),
+        *([clock_note] if exercise.clock is ClockKind.WALL else []),
+        *_capped(notes, MOST_NOTES, "notes"),
+    ]
+
+
+def ending(report: Report) -> list[str]:
+    """Return what gives the report again, the command last; each safe to show as a line of text."""
+    rows = [f"{name}: {value}" for name, value in reproduction(report)]
+    return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
+
+
+def _capped(lines: list[str], most: int, what: str) -> list[str]:
+    left_out = len(lines) - most
+    return [*lines[:most], f"and {left_out} more {what}; all are in the JSON report"] if left_out > 0 else lines
+
+
+def place(file: str, line: int) -> str:
+    """Return a place as people click on it; safe to show as a line of text."""
+    return f"{shown(file)}:{line}" if line else shown(file)
+
+
+def happened(fault: ReportedFault) -> str:
+    """Return what happened where and when, without the fault's own words; safe to show as a line of text."""
+    what = _WHAT_HAPPENED.get(fault.kind, shown(fault.kind))
+    when = f" at t = {seconds(fault.t_ns):.3f} s" if fault.t_ns else ""
+    where = place(fault.file, fault.line) or "the node"
+    return f"{where} {what}{when} (scenario {shown(fault.scenario, limit=NAME_LIMIT)})"
+
+
+def frames(all_frames: Sequence[str]) -> list[str]:
+    """Return the frames worth reading, each safe to show as a line of text."""
+    left_out = len(all_frames) - _FIRST_FRAMES - _LAST_FRAMES
+    if left_out <= 1:
+        return [shown(frame) for frame in all_frames]
+    first, last = all_frames[:_FIRST_FRAMES], all_frames[-_LAST_FRAMES:]
+    return [*map(shown, first), f"({left_out} more calls)", *map(shown, last)]
+
+
+def versions(report: Report) -> str:
+    """Return what the report was made with."""
+    made_with = report.environment
+    return (
+        f"grader {made_with.grader}, rclpy {made_with.rclpy} ({made_with.ros_distro}), "
+        f"{made_with.rmw}, Python {made_with.python}"
+    )
+
+
+def clock(report: Report) -> str:
+    """Return which clock the nodes ran on."""
+    walls = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
+    if not walls:
+        return "virtual"
+    first = exercise_name(walls[0]).replace("Exercise", "exercise", 1)
+    return f"virtual, but the wall clock in {', '.join([first, *walls[1:]])}"
+
+
+def isolation(report: Report) -> str:
+    """Return what held the student's code back; loud if nothing did."""
+    return summarised(report.environment.isolation, report.environment.containment)
+
+
+def without_walls(report: Report) -> bool:
+    """Return whether the student's code ran without a sandbox."""
+    return report.environment.isolation == NO_WALLS
+
+
+def run_line(report: Report) -> str:
+    """Return what belongs to this run alone, so that nothing else in a report differs between two runs."""
+    return f"graded {shown(report.path)} in {report.duration_s:.1f} s"
+
+
+def starts(report: Report) -> list[str]:
+    """Return how each file was started; each safe to show as a line of text."""
+    found = dict.fromkeys(start for exercise in report.exercises for start in exercise.starts)
+    return [shown(f"{start.process}: run {start.words}", limit=_WORD_LIMIT) for start in found]
+
+
+def reproduction(report: Report) -> list[tuple[str, str]]:
+    """Return name and value of all that gives the report again, except the command; safe to show as lines of text."""
+    rows = [("versions", versions(report)), ("isolation", isolation(report))]
+    rows[:0] = [] if report.seed is None else [("seed", str(report.seed))]
+    rows.append(("clock", clock(report)))
+    if report.reproduce.rubrics:
+        rows.append(("rubrics", ", ".join(f"{id_} {_short(digest)}" for id_, digest in report.reproduce.rubrics)))
+    if report.reproduce.recording:
+        rows.append(("recording", _short(report.reproduce.recording)))
+    return [(name, shown(value, limit=_WORD_LIMIT)) for name, value in rows]
+
+
+def command(report: Report) -> list[str]:
+    """Return the command that gives the report again, quoted for a shell and safe to show as text.
+
+    Its pieces are to be joined by spaces; an option and its value are one piece.
+    """
+    pieces: list[str] = []
+    for word in report.reproduce.command:
+        text = shown(quoted(word), limit=_WORD_LIMIT)
+        if pieces and pieces[-1].startswith("--") and " " not in pieces[-1]:
+            pieces[-1] += f" {text}"
+        else:
+            pieces.append(text)
+    return pieces
+
+
+def _short(digest: str) -> str:
+    """Return as much of a digest as tells files apart; all of it is in the JSON report."""
+    return digest[:_DIGEST_LENGTH]
+
+
+def _partial(report: Report) -> str:
+    open_ones = [e for e in report.exercises if e.id in report.pending]
+    numbers = ", ".join(shown(e.number, limit=NAME_LIMIT) for e in open_ones)
+    rest = points(sum((e.max_score for e in open_ones), Fraction(0)))
+    several = "exercises" if len(open_ones) > 1 else "exercise"
+    return f"This report is partial: it was made before {several} {numbers} ({rest} points) had been graded."
+
+
+def _not_final(undecided: Sequence[Verdict]) -> str:
+    count = len(undecided)
+    criteria = "1 criterion is" if count == 1 else f"{count} criteria are"
+    open_points = points(sum((v.max_score for v in undecided), Fraction(0)))
+    return (
+        f"This score is not final: {criteria} undecided through no fault of the student, "
+        f"{open_points} points are still open. Grade again."
+    )

@@ -1,0 +1,1 @@
+"""Turns rubric files, which authors write, into values of the core."""

@@ -1,0 +1,269 @@
+"""What a rubric leaves to the seed: fields, times, counts, and the order of cases."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
+from typing_extensions import Self, TypeAliasType
+
+from grader.core.scenario import (
+    AnyOrder,
+    Between,
+    Choose,
+    CountBetween,
+    FieldSpec,
+    InOrder,
+    SomeOf,
+    TimeBetween,
+    Written,
+)
+from grader.rubrics.check_parameters import Shape
+from grader.rubrics.types import Duration, LongDuration, Matching, Real, Text, Whole, YesNo, wrong
+
+#: Most decimals that a text shows of a drawn number.
+DECIMALS = 9
+
+
+def rising(low_high: tuple[float, float]) -> tuple[float, float]:
+    """Refuse two numbers that leave nothing to draw."""
+    if not low_high[0] < low_high[1]:
+        raise wrong("two numbers, the lower one first")
+    return low_high
+
+
+def _decimals(count: int) -> int:
+    if not 0 <= count <= DECIMALS:
+        raise wrong(f"a number of decimals from 0 to {DECIMALS}")
+    return count
+
+
+#: Unlike the numbers of checks, a field may be `.nan` or `.inf`: sensors send them.
+FieldNumber = Annotated[float, Strict()]
+FieldName = Annotated[str, Matching("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
+LowHigh = Annotated[tuple[Real, Real], AfterValidator(rising)]
+Option = Annotated[str, Strict()] | YesNo | Whole | FieldNumber
+
+
+class DrawnFieldShape(Shape):
+    """A value that is drawn from the seed: a number, one of several values, or a text with a number in it."""
+
+    between: LowHigh | None = None
+    choose: tuple[Option, ...] | None = Field(default=None, min_length=1)
+    text: Text | None = None
+    decimals: Annotated[Whole, AfterValidator(_decimals)] = 1
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        if ("between" in given) == ("choose" in given):
+            raise wrong("exactly one of between and choose")
+        if "choose" in given and given & {"text", "decimals"}:
+            raise wrong("`text` and `decimals` beside `between` only")
+        if "decimals" in given and self.text is None:
+            raise wrong("`decimals` beside `text` only")
+        if self.text is not None and self.text.count("{}") != 1:
+            raise wrong("a text that holds {} once, where the number goes")
+        return self
+
+
+def _kind(value: object) -> str:
+    """Return the tag of what was written; tags are no names of fields, so that places stay right."""
+    if isinstance(value, Mapping):
+        return "<drawn>" if value.keys() & {"between", "choose"} else "<parts>"
+    kinds = {list: "<list>", tuple: "<list>", str: "<text>", bool: "<bool>", int: "<whole>"}
+    return kinds.get(type(value), "<number>")
+
+
+if TYPE_CHECKING:
+    FieldValue = Any  # an alias that holds itself is beyond the type checker; pydantic reads the one below
+else:
+    FieldValue = TypeAliasType(
+        "FieldValue",
+        Annotated[
+            Annotated[DrawnFieldShape, Tag("<drawn>")]
+            | Annotated[dict[FieldName, "FieldValue"], Tag("<parts>")]
+            | Annotated[tuple["FieldValue", ...], Tag("<list>")]
+            | Annotated[str, Strict(), Tag("<text>")]
+            | Annotated[YesNo, Tag("<bool>")]
+            | Annotated[Whole, Tag("<whole>")]
+            | Annotated[FieldNumber, Tag("<number>")],
+            Discriminator(_kind),
+        ],
+    )
+Fields = dict[FieldName, FieldValue]
+
+
+def fields_of(written: Mapping[str, Any]) -> Mapping[str, FieldSpec]:
+    """Return the fields of one message as a scenario holds them."""
+    return {name: field_of(value) for name, value in written.items()}
+
+
+def field_of(value: Any) -> FieldSpec:
+    """Return one field as a scenario holds it."""
+    if isinstance(value, DrawnFieldShape):
+        return _drawn(value)
+    if isinstance(value, Mapping):
+        return fields_of(value)
+    return tuple(field_of(item) for item in value) if isinstance(value, tuple) else value
+
+
+def _drawn(value: DrawnFieldShape) -> FieldSpec:
+    if value.choose is not None:
+        return Choose(value.choose)
+    low, high = value.between or (0.0, 1.0)
+    return Between(low, high) if value.text is None else Written(value.text, Between(low, high), value.decimals)
+
+
+#: Most cases of one list, and most times that one of them comes.
+CASES = 1_000
+
+
+def _rising(low_high: tuple[int, int]) -> tuple[int, int]:
+    if not low_high[0] < low_high[1]:
+        raise wrong("two of them, the lower one first")
+    return low_high
+
+
+def _some(low_high: tuple[int, int]) -> tuple[int, int]:
+    if not 0 <= low_high[0] < low_high[1] <= CASES:
+        raise wrong(f"two whole numbers from 0 to {CASES:,}, the lower one first")
+    return low_high
+
+
+def _no_fewer_than_0(count: int) -> int:
+    if not 0 <= count <= CASES:
+        raise wrong(f"a whole number from 0 to {CASES:,}")
+    return count
+
+
+class DrawnTimeShape(Shape):
+    """A time that is drawn from the seed."""
+
+    between: Annotated[tuple[Duration, Duration], AfterValidator(_rising)]
+
+
+class DrawnLongTimeShape(Shape):
+    """A time above 0 that is drawn from the seed."""
+
+    between: Annotated[tuple[LongDuration, LongDuration], AfterValidator(_rising)]
+
+
+class DrawnCountShape(Shape):
+    """A count that is drawn from the seed."""
+
+    between: Annotated[tuple[Whole, Whole], AfterValidator(_some)]
+
+
+def drawn_or_not(value: object) -> str:
+    """Return the tag of what was written; tags are no names of fields, so that places stay right."""
+    return "<drawn>" if isinstance(value, Mapping) else "<fixed>"
+
+
+SomeTime = Annotated[
+    Annotated[Duration, Tag("<fixed>")] | Annotated[DrawnTimeShape, Tag("<drawn>")], Discriminator(drawn_or_not)
+]
+SomeLongTime = Annotated[
+    Annotated[LongDuration, Tag("<fixed>")] | Annotated[DrawnLongTimeShape, Tag("<drawn>")],
+    Discriminator(drawn_or_not),
+]
+SomeCount = Annotated[
+    Annotated[Whole, AfterValidator(_no_fewer_than_0), Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")],
+    Discriminator(drawn_or_not),
+]
+
+
+class InOrderShape(Shape):
+    """Cases that follow each other as written, wherever among others they come."""
+
+    in_order: Any
+
+
+class SomeOfShape(Shape):
+    """A number of cases, each one of those listed, drawn from the seed."""
+
+    some_of: Any
+    count: SomeCount
+
+
+class AnyOrderShape(Shape):
+    """Cases that all come, in an order drawn from the seed."""
+
+    any_order: Any
+
+
+_LISTS = ("any_order", "in_order", "some_of")
+
+
+def _kind_of_case(value: object) -> str:
+    """Return the tag of one entry in a list of cases."""
+    found = [name for name in _LISTS if isinstance(value, Mapping) and name in value]
+    return f"<{found[0]}>" if found else "<case>"
+
+
+def _spelt(value: object) -> object:
+    """Refuse a word about order that is misspelt: what it stands for would be taken for a case."""
+    for key in value if isinstance(value, Mapping) else ():
+        near = [] if key in _LISTS else difflib.get_close_matches(str(key), _LISTS, n=1, cutoff=0.85)
+        if near:
+            raise wrong("a case, `any_order`, `in_order` or `some_of`", f"did you mean `{near[0]}`?")
+    return value
+
+
+def cases_model(case: Any, name: str) -> Any:
+    """Return what an entry in a list of cases may be: a case, or several with a word about their order.
+
+    Args:
+        case: What one case may be.
+        name: What the shapes are called in the JSON Schema.
+    """
+    listed = (_list_of(case), Field(min_length=1))
+    in_order = create_model(f"{name}InOrder", __base__=InOrderShape, __doc__=InOrderShape.__doc__, in_order=listed)
+    some_of = create_model(f"Some{name}", __base__=SomeOfShape, __doc__=SomeOfShape.__doc__, some_of=listed)
+    inner = {"<case>": case, "<in_order>": in_order, "<some_of>": some_of}
+    mixed = (_list_of(_one_of(inner)), Field(min_length=1))
+    any_order = create_model(
+        f"{name}InAnyOrder", __base__=AnyOrderShape, __doc__=AnyOrderShape.__doc__, any_order=mixed
+    )
+    return _one_of({**inner, "<any_order>": any_order})
+
+
+def _one_of(kinds: Mapping[str, Any]) -> Any:
+    tagged = tuple(Annotated[kind, Tag(tag)] for tag, kind in kinds.items())
+    return Annotated[Union[tagged], Discriminator(_kind_of_case), BeforeValidator(_spelt)]  # noqa: UP007
+
+
+def _list_of(case: Any) -> Any:
+    return tuple[case, ...]
+
+
+def cases_of(written: tuple[Any, ...], one: Callable[[Any], Any]) -> tuple[Any, ...]:
+    """Return a list of cases as a scenario holds it.
+
+    Args:
+        written: The entries.
+        one: Returns one case as a scenario holds it.
+    """
+    return tuple(_case(entry, one) for entry in written)
+
+
+def _case(entry: Any, one: Callable[[Any], Any]) -> Any:
+    if isinstance(entry, AnyOrderShape):
+        return AnyOrder(cases_of(entry.any_order, one))
+    if isinstance(entry, InOrderShape):
+        return InOrder(cases_of(entry.in_order, one))
+    if isinstance(entry, SomeOfShape):
+        return SomeOf(cases_of(entry.some_of, one), count_of(entry.count))
+    return one(entry)
+
+
+def time_of(written: int | DrawnTimeShape | DrawnLongTimeShape) -> int | TimeBetween:
+    """Return a time as a scenario holds it."""
+    return written if isinstance(written, int) else TimeBetween(*written.between)
+
+
+def count_of(written: int | DrawnCountShape) -> int | CountBetween:
+    """Return a count as a scenario holds it."""
+    return written if isinstance(written, int) else CountBetween(*written.between)

@@ -1,0 +1,382 @@
+"""Reads rubric files: YAML in, an Exercise out, every mistake with its line and column."""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from grader.core.errors import RubricError
+from grader.core.exercise import Check, Criterion, Exercise, Feedback, Variant
+from grader.core.limits import Limits
+from grader.core.quantities import duration
+from grader.core.scenario import Scenario, Span, Stimulus, TimeBetween, is_open, longest, longest_course_ns, shortest
+from grader.judging.checks import CHECKS
+from grader.rubrics.check_parameters import build
+from grader.rubrics.drawing import DrawnLongTimeShape, DrawnTimeShape, time_of
+from grader.rubrics.feedback import feedback_of
+from grader.rubrics.mistakes import mistakes_of, nearest
+from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, limits_of, rubric_model
+from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
+from grader.rubrics.stimuli import stimulus_of
+from grader.rubrics.types import CHECK_FILE
+from grader.rubrics.variants import (
+    Draw,
+    First,
+    Options,
+    has_variants,
+    options_of,
+    tried,
+    variants_model,
+    varied_digest,
+    with_values,
+)
+from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
+from grader.submissions.collected import listed, shown
+
+
+def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
+    """Return the mistakes of a rubric whose every part is well formed by itself.
+
+    Args:
+        rubric: The rubric.
+        tree: The document it came from, for places.
+    """
+    scenario_ids = [scenario.id for scenario in rubric.scenarios]
+    criterion_ids = [criterion.id for criterion in rubric.criteria]
+    return [
+        *_repeated(rubric.files, ("files",), tree),
+        *_repeated(scenario_ids, ("scenarios",), tree, "id"),
+        *_repeated(criterion_ids, ("criteria",), tree, "id"),
+        *(m for i, scenario in enumerate(rubric.scenarios) for m in _in_scenario(scenario, i, rubric.files, tree)),
+        *(m for i, criterion in enumerate(rubric.criteria) for m in _in_criterion(criterion, i, rubric, tree)),
+    ]
+
+
+def _repeated(names: Sequence[str], path: TreePath, tree: YamlTree, key: str = "") -> Iterator[Mistake]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            where = tree.values.get((*path, index, key) if key else (*path, index), TOP)
+            what = f"each {key or 'name'} in `{path[-1]}` once"
+            yield where.mistake(f"expected {what}, found `{shown(name)}` again")
+
+
+def _unknown(name: str, known: Iterable[str], what: str, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    known = list(dict.fromkeys(known))
+    if name not in known:
+        text = f"expected {what} ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
+        yield tree.values.get(path, TOP).mistake(text, nearest(name, known))
+
+
+def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree: YamlTree) -> Iterator[Mistake]:
+    path: TreePath = ("scenarios", index)
+    yield from _repeated(scenario.processes, (*path, "processes"), tree)
+    for number, process in enumerate(scenario.processes):
+        yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree)
+    yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
+    for number, process in enumerate(scenario.may_exit):
+        yield from _unknown(process, scenario.processes, "one of `processes`", (*path, "may_exit", number), tree)
+    for process, start_ns in scenario.start.items():
+        yield from _key_unknown(process, scenario.processes, (*path, "start", process), tree)
+        yield from _too_late(start_ns, scenario, (*path, "start", process), tree)
+    for number, stimulus in enumerate(scenario.stimuli):
+        kind, parameters = stimulus.chosen
+        yield from _in_stimulus(kind, parameters, scenario, (*path, "stimuli", number, kind), tree)
+        yield from _cut_off(stimulus_of(stimulus), scenario, (*path, "observe", "duration"), tree)
+
+
+def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    if name not in known:
+        text = f"expected one of `processes` ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
+        yield tree.keys.get(path, TOP).mistake(text, nearest(name, known))
+
+
+def _too_late(
+    start: int | DrawnTimeShape | DrawnLongTimeShape, scenario: ScenarioShape, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    if (
+        longest(time_of(start)) >= shortest(time_of(scenario.observe.duration))
+        and scenario.observe.after_first_message_on is None
+    ):
+        yield tree.values.get(path, TOP).mistake("expected a start before the end of `observe`")
+
+
+def _in_stimulus(
+    kind: str, parameters: Any, scenario: ScenarioShape, path: TreePath, tree: YamlTree
+) -> Iterator[Mistake]:
+    yield from _too_late(parameters.start, scenario, (*path, "start"), tree)
+    if kind == "numbers" and shortest(time_of(parameters.hold)) < parameters.period:
+        text = "expected each number to be held for at least one period, found a shorter `hold`"
+        yield tree.values.get((*path, "hold"), TOP).mistake(text)
+    stop_ns = getattr(parameters, "stop", None)
+    if stop_ns is not None and stop_ns <= longest(time_of(parameters.start)):
+        yield tree.values.get((*path, "stop"), TOP).mistake("expected a stop after the start")
+
+
+def _cut_off(stimulus: Stimulus, scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield the mistake that some draw leaves out a case, because the observation ends before it."""
+    observed = time_of(scenario.observe.duration)
+    needed_ns = longest_course_ns(stimulus)
+    if (isinstance(observed, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(observed):
+        text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
+        text += f"{'as little as ' if isinstance(observed, TimeBetween) else ''}{duration(shortest(observed))}"
+        yield tree.values.get(path, TOP).mistake(text)
+
+
+def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    path: TreePath = ("criteria", index)
+    scenarios = {scenario.id: scenario for scenario in rubric.scenarios}
+    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", (*path, "scenario"), tree)
+    yield from _needs(criterion, index, rubric, tree)
+    name, parameters = criterion.check.chosen
+    process = parameters.model_dump(by_alias=True).get("process")
+    if isinstance(process, str) and criterion.scenario in scenarios:
+        known = scenarios[criterion.scenario].processes
+        what = f"a process of the scenario {criterion.scenario}"
+        yield from _unknown(process, known, what, (*path, "check", name, "process"), tree)
+
+
+def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield the needs that name no earlier criterion; so there are no cycles."""
+    path: TreePath = ("criteria", index, "needs")
+    earlier = [other.id for other in rubric.criteria[:index]]
+    yield from _repeated(criterion.needs, path, tree)
+    for number, need in enumerate(criterion.needs):
+        where = tree.values.get((*path, number), TOP)
+        if need == criterion.id:
+            yield where.mistake(f"expected an earlier criterion, found `{need}` itself")
+        elif need in (other.id for other in rubric.criteria[index:]):
+            yield where.mistake(f"expected an earlier criterion, found `{need}`, which comes later", "change the order")
+        elif not earlier:
+            yield where.mistake(f"expected no needs in the first criterion, found `{need}`")
+        else:
+            yield from _unknown(need, earlier, "the id of an earlier criterion", (*path, number), tree)
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+#: Largest rubric file.
+MAX_BYTES = 256 * 1024
+
+#: How the names of files end that lie beside rubrics and are none: notes on their self-tests.
+NOTES = ".selftest.yaml"
+
+#: Mistakes listed at once.
+MAX_MISTAKES = 10
+
+
+class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
+    """A rubric has mistakes.
+
+    Args:
+        where: The file, as messages show it.
+        mistakes: All of them; the message lists the first ones.
+    """
+
+    def __init__(self, where: str, mistakes: Iterable[Mistake]) -> None:
+        self.where = where
+        self.mistakes = tuple(sorted(set(mistakes)))
+        lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in self.mistakes[:MAX_MISTAKES]]
+        if len(self.mistakes) > MAX_MISTAKES:
+            lines.append(f"{where}: {len(self.mistakes) - MAX_MISTAKES} more")
+        hinted = [m for m in self.mistakes[:MAX_MISTAKES] if m.hint]
+        hints = [m.hint if len(self.mistakes) == 1 else f"{m.line}:{m.column}: {m.hint}" for m in hinted]
+        super().__init__("\n".join(lines), "; ".join(hints))
+
+
+def read_rubric(
+    path: Path,
+    *,
+    checks: Mapping[str, type] = CHECKS,
+    submissions: Sequence[Path] = (),
+    draw: Draw | None = None,
+) -> Exercise:
+    """Read one rubric file; where it names checks of its own, their files are run.
+
+    Args:
+        path: The file; messages show it as given.
+        checks: The table of checks that the rubric may use, besides its own.
+        submissions: What students write: no check is taken from there.
+        draw: Says what variants come to; without it, a rubric that has some is refused.
+
+    Returns:
+        The exercise.
+
+    Raises:
+        RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
+    """
+    content = _content(path)
+    tree = _tree(path, content)
+    files = own_files(path, _own_names(path, tree), submissions)
+    checks = {**checks, **load(files, checks)}
+    digest = digest_of(content, files)
+    if not has_variants(tree):
+        return _exercise(path, tree, checks, digest)
+    options = options_of(_validated(path, tree, variants_model()))
+    known = {option.name: option.value(0) for option in options}
+    nobodys = _exercise(path, with_values(tree, known), checks, digest)
+    for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
+        _exercise(path, with_values(tree, values), checks, digest)
+    variant = _variant(path, tree, nobodys, options, draw)
+    exercise = _exercise(path, with_values(tree, dict(variant.values)), checks, varied_digest(digest, variant))
+    return replace(exercise, variant=variant)
+
+
+def _variant(path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[Options], draw: Draw | None) -> Variant:
+    """Return the values that were drawn; raises RubricError where nobody is named, or a value is not known."""
+    if draw is None:
+        hint = "name the student and the course key: --student ID --variant-key FILE"
+        text = "expected a student, because this rubric has variants, found none"
+        _refuse(path, [tree.keys[("variants",)].mistake(text, hint)])
+    values = [(option.name, draw.value(exercise.id, option)) for option in options]
+    unknown = [name for name, value in values if value is None]
+    if unknown:
+        text = "expected a variant that was graded, found one of which no value was kept"
+        _refuse(path, [tree.keys[("variants", name)].mistake(text, "grade the submission again") for name in unknown])
+    return Variant(draw.student, tuple((name, value) for name, value in values if value is not None))
+
+
+def _exercise(path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str) -> Exercise:
+    rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
+    mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
+    criteria = tuple(_criteria(rubric, checks, tree, mistakes))
+    if mistakes:
+        _refuse(path, mistakes)
+    limits = limits_of(rubric.limits)
+    return Exercise(
+        id=rubric.exercise.id,
+        number=rubric.exercise.number,
+        title=rubric.exercise.title,
+        required=rubric.exercise.required,
+        files=rubric.files,
+        scenarios=tuple(_scenario(shape, limits) for shape in rubric.scenarios),
+        criteria=criteria,
+        digest=digest,
+        by_request=rubric.exercise.by_request,
+    )
+
+
+def own_check_files(path: Path) -> tuple[OwnFile, ...]:
+    """Return the files of checks that a rubric names, without running them; raises RubricError as reading it does."""
+    return own_files(path, _own_names(path, _tree(path, _content(path))))
+
+
+def own_checks(path: Path) -> Mapping[str, type]:
+    """Return the checks of a rubric's own by name, whether it uses them or not; raises RubricError as above."""
+    return load(own_check_files(path), CHECKS)
+
+
+def _tree(path: Path, content: bytes) -> YamlTree:
+    try:
+        return read_yaml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        _refuse(path, [_not_utf8(content, error)])
+    except YamlSyntaxError as error:
+        _refuse(path, [error.mistake])
+
+
+def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
+    """Return the files of checks that are named; raises RubricError for a name that leads elsewhere."""
+    names = named_files(tree.data)
+    wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
+    if wrong:
+        text = "expected a Python file in the rubric's folder such as my_checks.py, found"
+        _refuse(path, [tree.values.get(("checks", n), TOP).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+    return names
+
+
+def _content(path: Path) -> bytes:
+    where = shown(str(path), 500)
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise RubricError(f"{where}: expected a rubric file, found a folder", "name the YAML file inside it")
+        if not stat.S_ISREG(mode):
+            raise RubricError(f"{where}: expected a rubric file, found something that is no plain file")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        raise RubricError(f"{where}: expected a rubric file, found nothing there", "check the path") from None
+    except OSError as error:
+        raise RubricError(f"{where}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise RubricError(f"{where}: expected a path, found one with a null character") from None
+    if len(content) > MAX_BYTES:
+        raise RubricError(f"{where}: expected at most {MAX_BYTES // 1024} KiB, found more")
+    return content
+
+
+def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
+    before = content[: error.start].decode("utf-8", "replace")
+    column = len(before) - (before.rfind("\n") + 1) + 1
+    text = f"expected UTF-8 text, found the byte 0x{content[error.start]:02x}"
+    return Mistake(before.count("\n") + 1, column, text, "save the file as UTF-8")
+
+
+def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
+    """Raise the error that lists mistakes, one a line; with several, each hint says which it belongs to."""
+    raise RubricMistakes(shown(str(path), 500), mistakes)
+
+
+def _validated(path: Path, tree: YamlTree, model: type[_Model]) -> _Model:
+    if tree.data is None:
+        _refuse(path, [TOP.mistake("expected a rubric, found an empty file")])
+    try:
+        return model.model_validate(tree.data)
+    except ValidationError as error:
+        known = {(m.line, m.column) for m in tree.mistakes}
+        others = [m for m in mistakes_of(error, tree, model) if (m.line, m.column) not in known]
+        _refuse(path, [*tree.mistakes, *others])
+
+
+def _criteria(
+    rubric: RubricShape, checks: Mapping[str, type], tree: YamlTree, mistakes: list[Mistake]
+) -> Iterator[Criterion]:
+    """Yield the criteria; one whose check refuses its parameters becomes a mistake."""
+    for index, shape in enumerate(rubric.criteria):
+        name, parameters = shape.check.chosen
+        try:
+            check: Check = build(checks[name], parameters)
+        except ValueError as error:
+            where = tree.keys[("criteria", index, "check", name)]
+            mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
+            continue
+        yield _criterion(shape, check, feedback_of(shape.feedback, feedback_of(rubric.feedback)))
+
+
+def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Criterion:
+    return Criterion(
+        id=shape.id,
+        title=shape.title,
+        points=shape.points,
+        scenario=shape.scenario,
+        check=check,
+        needs=shape.needs,
+        hint=" ".join((shape.hint or "").split()),
+        chapter=" ".join((shape.chapter or "").split()),
+        feedback=feedback,
+        check_name=shape.check.chosen[0],
+    )
+
+
+def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
+    span = Span(
+        duration_ns=time_of(shape.observe.duration),
+        after_first_message_on=shape.observe.after_first_message_on,
+        wait_at_most_ns=shape.observe.wait_at_most,
+    )
+    return Scenario(
+        id=shape.id,
+        processes=shape.processes,
+        span=span,
+        stimuli=tuple(stimulus_of(stimulus) for stimulus in shape.stimuli),
+        limits=limits,
+        starts_ns=tuple((name, time_of(shape.start[name])) for name in shape.processes if name in shape.start),
+        may_exit=shape.may_exit,
+        shutdown_ns=shape.shutdown or 0,
+    )

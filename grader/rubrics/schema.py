@@ -1,0 +1,114 @@
+"""The JSON Schema of rubric files, which lets editors complete and check them.
+
+`python -m grader.rubrics.schema` prints it as it is shipped.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from grader.judging.checks import CHECKS
+from grader.rubrics.model import rubric_model
+from grader.rubrics.variants import REFERENCE
+
+_SCALARS = frozenset({"string", "number", "integer", "boolean"})
+_VARIANT = "VariantReference"
+_REFERS = {"$ref": f"#/$defs/{_VARIANT}"}
+_REFERENCE = {
+    "type": "object",
+    "description": "The value that one of `variants` has for the student who is graded.",
+    "properties": {REFERENCE: {"type": "string"}},
+    "required": [REFERENCE],
+    "additionalProperties": False,
+}
+#: Definitions in which nothing varies, and those in which only some keys do.
+_FIXED = frozenset({"ExerciseShape", "FeedbackShape", "LimitsShape", "VariantShape", "Check", "StimulusShape"})
+_FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
+
+
+def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of rubric files.
+
+    Args:
+        checks: The table of checks that rubrics may use.
+    """
+    schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
+    tidy = _tidy(schema)
+    tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **tidy}
+
+
+def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
+    """Return the schema as text; that of the grader's own checks is shipped."""
+    return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
+
+
+def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
+    """Return the definition of a mapping in which variants may stand for values."""
+    if name in _FIXED:
+        return node
+    if "properties" not in node:
+        return _or_variant(node)
+    kept = _FREE.get(name, tuple(node["properties"]))
+    free = {key: _or_variant(value) if key in kept else value for key, value in node["properties"].items()}
+    return {**node, "properties": free}
+
+
+def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema of values, each of which may be a variant instead."""
+    for word in ("anyOf", "oneOf"):
+        if word in node:
+            rest = {key: value for key, value in node.items() if key != word}
+            options = [_inside(option) for option in node[word]]
+            # One mapping may look like several things: the fields of a message, something drawn, a variant.
+            return {**rest, "anyOf": [*options, _REFERS] if any(map(_is_scalar, node[word])) else options}
+    return {"anyOf": [node, _REFERS]} if _is_scalar(node) else _inside(node)
+
+
+def _inside(node: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema of a list or a mapping whose values may be variants."""
+    found = dict(node)
+    for word in ("items", "additionalProperties"):
+        if isinstance(node.get(word), dict):
+            found[word] = _or_variant(node[word])
+    if "prefixItems" in node:
+        found["prefixItems"] = [_or_variant(item) for item in node["prefixItems"]]
+    return found
+
+
+def _is_scalar(node: dict[str, Any]) -> bool:
+    options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if options:
+        return any(map(_is_scalar, options))
+    kinds = node.get("type", ())
+    return bool({kinds} & _SCALARS if isinstance(kinds, str) else set(kinds) & _SCALARS)
+
+
+def _tidy(node: Any, *, names: bool = False) -> Any:
+    """Drop what speaks of Python only: generated titles, and defaults that a rubric could not write.
+
+    Args:
+        node: Part of a schema.
+        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not words of the schema.
+    """
+    if isinstance(node, list):
+        return [_tidy(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    kept = node if names else {key: value for key, value in node.items() if not _misleads(key, value, node)}
+    return {key: _tidy(value, names=not names and key in ("properties", "$defs")) for key, value in kept.items()}
+
+
+def _misleads(key: str, value: object, node: dict[str, Any]) -> bool:
+    """Return whether a word of the schema speaks of Python instead of what a rubric holds."""
+    if key == "title":
+        return isinstance(value, str)
+    # A default of nanoseconds is no text with a unit.
+    return key == "default" and (value is None or (node.get("type") == "string" and not isinstance(value, str)))
+
+
+if __name__ == "__main__":
+    sys.stdout.write(schema_text())

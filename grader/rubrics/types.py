@@ -1,0 +1,183 @@
+"""The scalars of a rubric file as pydantic types: names, quantities with units, points, formulas and patterns."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import AllowInfNan, BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, Strict
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from grader.core.quantities import Unit
+from grader.judging.formula import FormulaError, curve
+from grader.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
+
+
+def wrong(expected: str, hint: str = "") -> PydanticCustomError:
+    """Return the error that says what should stand at a place in a rubric."""
+    return PydanticCustomError("rubric", "{expected}", {"expected": expected, "hint": hint})
+
+
+@dataclass(frozen=True, slots=True)
+class Matching:
+    """Marks a text that has to match a pattern as a whole.
+
+    Attributes:
+        pattern: Regular expression that Python and JavaScript read alike.
+        expected: What a message says should stand there.
+        example: One that matches.
+    """
+
+    pattern: str
+    expected: str
+    example: str
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check the text after its type."""
+        return core_schema.no_info_after_validator_function(self._check, core_schema.str_schema(strict=True))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe the text to editors."""
+        return {"type": "string", "pattern": f"^(?:{self.pattern})$", "examples": [self.example]}
+
+    def _check(self, text: str) -> str:
+        if re.fullmatch(self.pattern, text) is None:
+            raise wrong(self.expected)
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Marks a number that is written with its unit; `above_zero` excludes 0."""
+
+    unit: Unit
+    above_zero: bool = False
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the text in place of the number's own validation."""
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe the text to editors."""
+        return {"type": "string", "pattern": quantity_pattern(self.unit), "examples": [quantity_example(self.unit)]}
+
+    def _read(self, value: object) -> int | float:
+        try:
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                raise missing_unit(str(value), self.unit.symbol)
+            quantity = parse_quantity(value if isinstance(value, str) else "", self.unit)
+        except QuantityError as error:
+            raise wrong(error.expected, error.hint) from None
+        if self.above_zero and not quantity > 0:
+            raise wrong(f"more than 0 {self.unit.symbol}")
+        return quantity
+
+
+_POINTS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?|[0-9]{1,9}/[1-9][0-9]{0,8}")
+
+
+class PointsRule:
+    """Marks points: a whole, decimal or common fraction above 0, kept exactly."""
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the fraction in place of pydantic's own validation."""
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe points to editors."""
+        fraction = {"type": "string", "pattern": r"^[0-9]+( */ *[1-9][0-9]*|\.[0-9]+)?$", "examples": ["1/3"]}
+        return {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, fraction]}
+
+    @staticmethod
+    def _read(value: object) -> Fraction:
+        is_number = isinstance(value, (int, float, str)) and not isinstance(value, bool)
+        text = str(value).replace(" ", "") if is_number else ""
+        if text.startswith("-") or (_POINTS.fullmatch(text) and Fraction(text) == 0):
+            raise wrong("points above 0")
+        if not _POINTS.fullmatch(text):
+            raise wrong("points such as 6, 2.5 or 1/3")
+        return Fraction(text)
+
+
+def _as_text(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+_NAME = "[A-Za-z_][A-Za-z0-9_]*"
+
+Text = Annotated[str, Matching(r"[\s\S]*\S[\s\S]*", "text that is not empty", "Publishes at 20 Hz")]
+Id = Annotated[str, Matching("[a-z][a-z0-9_]*", "an id of small letters, digits and _, a letter first", "rate")]
+Topic = Annotated[str, Matching(f"(?:/{_NAME})+", "an absolute topic name such as /cmd_vel", "/cmd_vel")]
+MessageType = Annotated[
+    str, Matching(f"[a-z][a-z0-9_]*/msg/{_NAME}", "a message type such as std_msgs/msg/Float32", "std_msgs/msg/Float32")
+]
+ServiceType = Annotated[
+    str, Matching(f"[a-z][a-z0-9_]*/srv/{_NAME}", "a service type such as std_srvs/srv/Trigger", "std_srvs/srv/Trigger")
+]
+ActionType = Annotated[
+    str,
+    Matching(f"[a-z][a-z0-9_]*/action/{_NAME}", "an action type such as pkg/action/Move", "test_msgs/action/Fibonacci"),
+]
+PythonFile = Annotated[
+    str,
+    Matching(r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"),
+]
+#: Where a file of checks may lie: beside the rubric or below; never outside, never hidden.
+CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
+CheckFile = Annotated[
+    str, Matching(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
+]
+Number = Annotated[Text, BeforeValidator(_as_text)]
+Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
+Whole = Annotated[int, Strict()]
+YesNo = Annotated[bool, Strict()]
+Duration = Annotated[int, Quantity(Unit("s"))]
+LongDuration = Annotated[int, Quantity(Unit("s"), above_zero=True)]
+Frequency = Annotated[float, Quantity(Unit("Hz"))]
+Size = Annotated[int, Quantity(Unit("B"), above_zero=True)]
+Points = Annotated[Fraction, PointsRule()]
+
+
+_LONGEST_PATTERN = 400
+
+
+def _formula(text: str) -> str:
+    try:
+        curve(text)
+    except FormulaError as error:
+        raise wrong(str(error)) from None
+    return text
+
+
+def _pattern(text: str) -> str:
+    if not 0 < len(text) <= _LONGEST_PATTERN:
+        raise wrong(f"a regular expression of at most {_LONGEST_PATTERN} characters")
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise wrong("a regular expression of Python", str(error)) from None
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class _Readable:
+    """Marks a text that a reader has to understand."""
+
+    example: str
+    is_formula: bool
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the text after its type was checked."""
+        read = _formula if self.is_formula else _pattern
+        return core_schema.no_info_after_validator_function(read, core_schema.str_schema(strict=True))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe the text to editors."""
+        described: dict[str, Any] = {"type": "string", "examples": [self.example]}
+        return described if self.is_formula else {**described, "format": "regex"}
+
+
+FormulaText = Annotated[str, _Readable("sin(0.1 * n)", is_formula=True)]
+PatternText = Annotated[str, _Readable("[0-9]+", is_formula=False)]

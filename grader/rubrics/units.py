@@ -1,0 +1,172 @@
+"""Quantities as people write them: `10 s`, `200 ms`, `20 Hz`; parsed exactly and printed back."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+
+from grader.core.quantities import GIB, KIB, MIB, NS_PER_MS, NS_PER_S, Unit
+from grader.submissions.collected import listed, shown
+
+
+class QuantityError(ValueError):
+    """A quantity cannot be read.
+
+    Args:
+        expected: What should stand there, e.g. ``a duration with its unit, such as `10 s```.
+        hint: One thing to do; empty if nothing is very likely right.
+    """
+
+    def __init__(self, expected: str, hint: str = "") -> None:
+        super().__init__(expected)
+        self.expected = expected
+        self.hint = hint
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """One dimension: its words for messages, and each unit as a multiple of the stored one, largest first.
+
+    `whole` names what is stored, where parts of it cannot be.
+    """
+
+    noun: str
+    example: str
+    units: Mapping[str, Fraction]
+    spellings: Mapping[str, str]
+    usual: tuple[str, ...]
+    whole: str = ""
+
+
+_KINDS: Mapping[str, _Kind] = {
+    "s": _Kind(
+        noun="a duration",
+        example="10 s",
+        units={
+            "h": Fraction(3600 * NS_PER_S),
+            "min": Fraction(60 * NS_PER_S),
+            "s": Fraction(NS_PER_S),
+            "ms": Fraction(NS_PER_MS),
+            "us": Fraction(1000),
+            "ns": Fraction(1),
+        },
+        spellings={
+            **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+            **dict.fromkeys(("m", "mins", "minute", "minutes"), "min"),
+            **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+            **dict.fromkeys(("msec", "millis", "millisecond", "milliseconds"), "ms"),
+            **dict.fromkeys(("\N{MICRO SIGN}s", "\N{GREEK SMALL LETTER MU}s", "microseconds"), "us"),
+        },
+        usual=("s", "ms"),
+        whole="nanoseconds",
+    ),
+    "Hz": _Kind(
+        noun="a frequency",
+        example="20 Hz",
+        units={"kHz": Fraction(1000), "Hz": Fraction(1)},
+        spellings={"hertz": "Hz", "kilohertz": "kHz"},
+        usual=("Hz",),
+    ),
+    "B": _Kind(
+        noun="a size",
+        example="512 MiB",
+        units={"GiB": Fraction(GIB), "MiB": Fraction(MIB), "KiB": Fraction(KIB), "B": Fraction(1)},
+        spellings={
+            **dict.fromkeys(("byte", "bytes"), "B"),
+            **dict.fromkeys(("k", "kb", "kilobytes"), "KiB"),
+            **dict.fromkeys(("m", "mb", "megabytes"), "MiB"),
+            **dict.fromkeys(("g", "gb", "gigabytes"), "GiB"),
+        },
+        usual=("MiB", "KiB"),
+        whole="bytes",
+    ),
+}
+
+# Digits are bounded: an exact fraction of a million digits would take minutes.
+_NUMBER = r"(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})"
+_QUANTITY = re.compile(rf"(?P<sign>[-+\N{{MINUS SIGN}}]?)(?P<number>{_NUMBER})\s*(?P<unit>[^\W\d_]{{0,20}})")
+
+
+def parse_quantity(text: str, unit: Unit) -> int | float:
+    """Read a quantity that is written with its unit.
+
+    Args:
+        text: Number and unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
+        unit: The dimension wanted, named by its base unit.
+
+    Returns:
+        Whole nanoseconds for `Unit("s")`, whole bytes for `Unit("B")`, a float in hertz for `Unit("Hz")`; at least 0.
+
+    Raises:
+        QuantityError: Not a number, no unit, an unknown unit, below zero, or a part of a nanosecond or byte.
+    """
+    kind = _KINDS[unit.symbol]
+    found = _QUANTITY.fullmatch(text.strip())
+    if found is None:
+        raise QuantityError(f"{kind.noun} such as `{kind.example}`")
+    if found["sign"] not in ("", "+"):
+        raise QuantityError(f"{kind.noun} of at least 0")
+    factor = _factor(found["number"], found["unit"], unit.symbol)
+    value = Fraction(found["number"].rstrip(".")) * factor
+    if not kind.whole:
+        return _finite(value, kind)
+    if value.denominator != 1:
+        raise QuantityError(f"a whole number of {kind.whole}")
+    return int(value)
+
+
+def _factor(number: str, written: str, symbol: str) -> Fraction:
+    kind = _KINDS[symbol]
+    if not written:
+        raise missing_unit(number, symbol)
+    if written in kind.units:
+        return kind.units[written]
+    known = {name.casefold(): name for name in kind.units} | dict(kind.spellings)
+    nearest = known.get(written.casefold())
+    hint = f"write `{shown(number, 30)} {nearest}`" if nearest else ""
+    raise QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
+
+
+def _finite(value: Fraction, kind: _Kind) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise QuantityError(f"{kind.noun} that a float can hold") from None
+
+
+def missing_unit(number: str, symbol: str) -> QuantityError:
+    """Return the error for a bare number where a quantity in `symbol` is wanted."""
+    kind = _KINDS[symbol]
+    number = shown(number, 30)
+    return QuantityError(
+        f"{kind.noun} with its unit, such as `{kind.example}`",
+        f"write {listed([f'`{number} {name}`' for name in kind.usual])}",
+    )
+
+
+def format_quantity(value: int | float, unit: Unit) -> str:
+    """Return a quantity as `parse_quantity` reads it, with nothing lost.
+
+    Args:
+        value: Nanoseconds for `Unit("s")`, bytes for `Unit("B")`, hertz for `Unit("Hz")`; finite and at least 0.
+        unit: The dimension, named by its base unit.
+    """
+    kind = _KINDS[unit.symbol]
+    if not kind.whole:
+        digits = format(Decimal(repr(float(value))), "f")
+        return f"{digits.removesuffix('.0')} {unit.symbol}"
+    if value == 0:
+        return f"0 {unit.symbol}"
+    name, count = next((n, int(value / f)) for n, f in kind.units.items() if int(value) % f == 0)
+    return f"{count} {name}"
+
+
+def quantity_pattern(unit: Unit) -> str:
+    """Return a regular expression, for a JSON Schema, that quantities of a dimension match."""
+    return rf"^\s*\+?([0-9]+\.?[0-9]*|\.[0-9]+)\s*({'|'.join(_KINDS[unit.symbol].units)})\s*$"
+
+
+def quantity_example(unit: Unit) -> str:
+    """Return a quantity of a dimension as an example."""
+    return _KINDS[unit.symbol].example

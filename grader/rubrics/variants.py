@@ -1,0 +1,282 @@
+"""The `variants` of a rubric: what they may be, and a document in which each has the value that was drawn."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from typing import Annotated, Any, Protocol
+
+from pydantic import AfterValidator, ConfigDict, WithJsonSchema, model_validator
+from typing_extensions import Self
+
+from grader.core.exercise import Drawn, Value, Variant
+from grader.rubrics.check_parameters import Shape
+from grader.rubrics.mistakes import nearest
+from grader.rubrics.types import Id, wrong
+from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
+from grader.submissions.collected import listed, shown
+
+#: What stands in the place of a value: `{variant: rate}`.
+REFERENCE = "variant"
+#: Most values that a variant may have.
+MOST = 10_000
+#: Of a variant with more values than this, the first and the last are tried when a rubric is checked.
+TRIED = 24
+#: Where a variant may stand, by the keys below `scenarios` and `criteria`; what names something else never varies.
+_FIXED_IN_SCENARIOS = ("id", "processes", "may_exit", "start")
+_FREE_IN_CRITERIA = ("check", "title", "hint")
+_AMOUNT = re.compile(r"([+-]?[0-9]{1,30}(?:\.[0-9]{1,30})?)\s*([^\W\d_][^\s\d]{0,20})?")
+
+
+def _scalar(value: object) -> object:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise wrong("a finite number")
+    if not isinstance(value, (str, int, float)) or value == "":
+        raise wrong("a value such as 10 Hz, /cmd_vel or 0.5")
+    return value
+
+
+def _split(value: object) -> tuple[Decimal, str]:
+    """Return number and unit; raises ValueError for what is neither a number nor a number with its unit."""
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise ValueError("no number")
+    found = _AMOUNT.fullmatch(value.strip()) if isinstance(value, str) else None
+    if isinstance(value, str) and found is None:
+        raise ValueError("no number")
+    number = Decimal(repr(value)) if found is None else Decimal(found[1])
+    if not number.is_finite():
+        raise ValueError("no finite number")
+    return number, "" if found is None else found[2] or ""
+
+
+def _amount(value: object) -> object:
+    try:
+        _split(value)
+    except ValueError:
+        raise wrong("a number, with its unit if it has one, such as 0.5 or 10 Hz") from None
+    return value
+
+
+_Scalar = Annotated[Any, AfterValidator(_scalar), WithJsonSchema({"type": ["string", "number", "boolean"]})]
+_Amount = Annotated[Any, AfterValidator(_amount), WithJsonSchema({"type": ["string", "number"]})]
+
+
+def _several(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len({(type(value), value) for value in values}) < max(2, len(values)):
+        raise wrong("two or more different values")
+    return values
+
+
+def _two(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len(values) != 2:
+        raise wrong("two numbers, the lower one first")
+    return values
+
+
+def _not_empty(variants: dict[str, VariantShape]) -> dict[str, VariantShape]:
+    if not variants:
+        raise wrong("at least one variant")
+    return variants
+
+
+_Choice = Annotated[tuple[_Scalar, ...], AfterValidator(_several)]
+_Pair = Annotated[tuple[_Amount, ...], AfterValidator(_two)]
+
+
+class VariantShape(Shape):
+    """What one value may be: one of those in `choose`, or those `between` two, a `step` apart."""
+
+    choose: _Choice | None = None
+    between: _Pair | None = None
+    step: _Amount | None = None
+
+    @model_validator(mode="after")
+    def _has_a_meaning(self) -> Self:
+        if (self.choose is None) == (self.between is None) or (self.between is None) != (self.step is None):
+            raise wrong("either `choose`, or `between` and `step`")
+        if self.between is not None:
+            _span(self)
+        return self
+
+
+VariantsField = dict[Id, VariantShape]
+
+
+def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
+    """Return the least value, the step, how many values there are, and their unit."""
+    assert shape.between is not None
+    (low, *units), (high, unit), (step, last) = map(_split, (*shape.between, shape.step))
+    if {unit, last} != {*units}:
+        raise wrong("one unit in `between` and `step`")
+    if not (step > 0 and low < high):
+        raise wrong("two numbers, the lower one first, and a step above 0")
+    count = int((high - low) / step) + 1
+    if not 2 <= count <= MOST:
+        raise wrong(f"a step that gives 2 to {MOST:,} values")
+    return low, step, count, unit
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """All that a variant may be.
+
+    Attributes:
+        name: Its name.
+        count: How many values there are.
+    """
+
+    name: str
+    count: int
+    _shape: VariantShape
+
+    def value(self, index: int) -> Value:
+        """Return one of the values, counted from 0."""
+        if self._shape.choose is not None:
+            chosen: Value = self._shape.choose[index]
+            return chosen
+        low, step, _, unit = _span(self._shape)
+        number = low + index * step
+        if unit:
+            return f"{number} {unit}"
+        return int(number) if number == number.to_integral_value() and low % 1 == step % 1 == 0 else float(number)
+
+    def tried(self) -> Iterator[Value]:
+        """Yield the values that a check of the rubric tries."""
+        every = range(self.count)
+        few = every if self.count <= TRIED else (*every[: TRIED // 2], *every[-TRIED // 2 :])
+        yield from map(self.value, few)
+
+
+class Draw(Protocol):
+    """Says which value a variant has for a student."""
+
+    @property
+    def student(self) -> str:
+        """Whose values they are."""
+        ...
+
+    def value(self, exercise: str, options: Options) -> Value | None:
+        """Return the value of a variant; None if it is not known."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class First:
+    """Nobody's variant: the first value of each, for reading a rubric that is not to be graded by."""
+
+    student: str = ""
+
+    def value(self, exercise: str, options: Options) -> Value | None:
+        """Return the first value."""
+        del exercise
+        return options.value(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """The variant that was graded, for judging what was recorded then.
+
+    Attributes:
+        drawn: Its values.
+    """
+
+    drawn: Drawn
+
+    @property
+    def student(self) -> str:
+        """Whose values they are."""
+        return self.drawn.student
+
+    def value(self, exercise: str, options: Options) -> Value | None:
+        """Return the value that was kept."""
+        return self.drawn.values.get(exercise, {}).get(options.name)
+
+
+def tried(options: Sequence[Options], usual: Mapping[str, Value]) -> Iterator[Mapping[str, Value]]:
+    """Yield the combinations that a check of the rubric tries: each value once, the others as usual."""
+    for option in options:
+        yield from ({**usual, option.name: value} for value in option.tried())
+
+
+class _Variants(Shape):
+    """A rubric, of which only the variants are looked at."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    variants: Annotated[VariantsField, AfterValidator(_not_empty)]
+
+
+def variants_model() -> type[Shape]:
+    """Return the model that the variants of a rubric are validated by, whatever else is in it."""
+    return _Variants
+
+
+def options_of(validated: Shape) -> tuple[Options, ...]:
+    """Return what the variants may be, of a rubric that `variants_model` has validated."""
+    assert isinstance(validated, _Variants)
+    return tuple(
+        Options(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
+        for name, shape in validated.variants.items()
+    )
+
+
+def has_variants(tree: YamlTree) -> bool:
+    """Return whether a rubric speaks of variants at all."""
+    return isinstance(tree.data, Mapping) and "variants" in tree.data
+
+
+def with_values(tree: YamlTree, values: Mapping[str, Value]) -> YamlTree:
+    """Return a document in which every `{variant: name}` has become its value; places stay what they were.
+
+    Mistakes in how variants are used are added to the document's own.
+    """
+    mistakes = list(tree.mistakes)
+    used: set[str] = set()
+
+    def replaced(node: object, path: TreePath) -> object:
+        if isinstance(node, list):
+            return [replaced(item, (*path, index)) for index, item in enumerate(node)]
+        if not isinstance(node, Mapping):
+            return node
+        name = node.get(REFERENCE)
+        if path[:1] == ("variants",) or set(node) != {REFERENCE} or not isinstance(name, str):
+            return {key: replaced(item, (*path, key)) for key, item in node.items()}
+        used.add(name)
+        mistakes.extend(_misuse(name, path, values, tree))
+        return values.get(name, node)
+
+    data = replaced(tree.data, ())
+    for name in values:
+        if name not in used:
+            where = tree.keys.get(("variants", name), TOP)
+            mistakes.append(where.mistake(f"expected `{{variant: {name}}}` somewhere in the rubric, found none"))
+    return replace(tree, data=data, mistakes=mistakes)
+
+
+def _misuse(name: str, path: TreePath, known: Mapping[str, Value], tree: YamlTree) -> Iterator[Mistake]:
+    where = tree.values.get(path, TOP)
+    if name not in known:
+        names = listed([f"`{one}`" for one in known])
+        yield where.mistake(f"expected one of `variants` ({names}), found `{shown(name)}`", nearest(name, known))
+    elif not _may_vary(path):
+        text = f"expected a value of its own here, found the variant `{shown(name)}`"
+        yield where.mistake(text, "variants stand in scenarios, checks, titles and hints")
+
+
+def _may_vary(path: Sequence[str | int]) -> bool:
+    if len(path) < 3:
+        return False
+    if path[0] == "scenarios":
+        return path[2] not in _FIXED_IN_SCENARIOS
+    return path[0] == "criteria" and path[2] in _FREE_IN_CRITERIA
+
+
+def varied_digest(digest: str, variant: Variant) -> str:
+    """Return the digest of a rubric with the values of a variant in it."""
+    text = json.dumps([digest, variant.values])
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

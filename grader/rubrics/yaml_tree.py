@@ -1,0 +1,212 @@
+"""YAML text as plain values, with the line and column of every key and value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import cast
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from grader.submissions.collected import shown
+
+#: Deepest nesting, and most values once aliases are written out: a small file can name itself a billion times.
+MAX_DEPTH = 24
+MAX_VALUES = 20_000
+
+#: Keys and list indices from the top of a document down to a value.
+TreePath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Mistake:
+    """One thing that is wrong in a file; line and column count from 1."""
+
+    line: int
+    column: int
+    text: str
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Position:
+    """A place in a file; line and column count from 1."""
+
+    line: int
+    column: int
+
+    def mistake(self, text: str, hint: str = "") -> Mistake:
+        """Return a mistake at this place."""
+        return Mistake(self.line, self.column, text, hint)
+
+
+TOP = Position(1, 1)
+
+
+@dataclass(slots=True)
+class YamlTree:
+    """A parsed document.
+
+    Attributes:
+        data: Mappings with text keys, lists and scalars.
+        values: Where each value starts.
+        keys: Where the key of each value in a mapping stands.
+        mistakes: What plain YAML data may not hold: duplicate keys, keys that are not text, odd tags.
+    """
+
+    data: object = None
+    values: dict[TreePath, Position] = field(default_factory=dict)
+    keys: dict[TreePath, Position] = field(default_factory=dict)
+    mistakes: list[Mistake] = field(default_factory=list)
+
+
+class YamlSyntaxError(Exception):
+    """The text is not a YAML document at all."""
+
+    def __init__(self, mistake: Mistake) -> None:
+        super().__init__(mistake.text)
+        self.mistake = mistake
+
+
+def read_yaml(text: str) -> YamlTree:
+    """Parse one YAML 1.2 document.
+
+    Args:
+        text: The document; its size is the caller's business.
+
+    Returns:
+        The tree; `data` is None for an empty document.
+
+    Raises:
+        YamlSyntaxError: Not valid YAML, several documents, or nested or multiplied beyond the limits.
+    """
+    try:
+        _refuse_excess(text)
+        root = _yaml().compose(text)
+    except ReaderError as error:
+        raise YamlSyntaxError(_unreadable_character(text, error)) from None
+    except MarkedYAMLError as error:
+        raise YamlSyntaxError(_syntax_mistake(error)) from None
+    except (YAMLError, ValueError, LookupError, AttributeError, AssertionError) as error:
+        # The parser lets a few of its own slips through on mangled directives and escapes.
+        raise YamlSyntaxError(TOP.mistake(f"not valid YAML: {shown(str(error))}")) from None
+    tree = YamlTree()
+    if root is not None:
+        tree.data = _Reader(tree).value(root, ())
+    return tree
+
+
+def _yaml() -> YAML:
+    return YAML(typ="safe", pure=True)
+
+
+def _refuse_excess(text: str) -> None:
+    """Look at the stream of events first: composing a hundred thousand open brackets exhausts the stack."""
+    depth = 0
+    for count, event in enumerate(_yaml().parse(text)):
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        if count > MAX_VALUES:
+            raise YamlSyntaxError(
+                _position(event.start_mark).mistake(f"expected at most {MAX_VALUES} values, found more")
+            )
+        if depth > MAX_DEPTH + 2:  # the stream and the document count as well
+            raise YamlSyntaxError(
+                _position(event.start_mark).mistake(f"expected at most {MAX_DEPTH} levels, found more")
+            )
+
+
+def _position(mark: StreamMark | None) -> Position:
+    return TOP if mark is None else Position(mark.line + 1, mark.column + 1)
+
+
+def _unreadable_character(text: str, error: ReaderError) -> Mistake:
+    before = text[: error.position]
+    line = before.count("\n") + 1
+    column = len(before) - (before.rfind("\n") + 1) + 1
+    return Mistake(
+        line, column, f"expected text, found the control character {shown(text[error.position : error.position + 1])}"
+    )
+
+
+def _syntax_mistake(error: MarkedYAMLError) -> Mistake:
+    where = _position(error.problem_mark or error.context_mark)
+    problem = str(error.problem or error.context)
+    if problem.startswith("but "):
+        problem = f"{error.context}, {problem}"
+    problem = shown(" ".join(problem.split()), 160)
+    hint = "indent with spaces, not with tabs" if "\\t" in problem else ""
+    return where.mistake(f"not valid YAML: {problem}", hint)
+
+
+class _Reader:
+    """Turns nodes into plain values and notes where they stand."""
+
+    def __init__(self, tree: YamlTree) -> None:
+        self._tree = tree
+        self._count = 0
+        self._construct = _yaml().constructor.construct_object
+
+    def value(self, node: Node, path: TreePath) -> object:
+        where = _position(node.start_mark)
+        self._count += 1
+        if self._count > MAX_VALUES or len(path) > MAX_DEPTH:
+            raise YamlSyntaxError(where.mistake("expected a small document, found aliases that multiply it"))
+        self._tree.values[path] = where
+        if isinstance(node, MappingNode):
+            return self._mapping(node, path)
+        if isinstance(node, SequenceNode):
+            return [self.value(item, (*path, i)) for i, item in enumerate(node.value)]
+        return self._scalar(cast("ScalarNode", node))
+
+    def _mapping(self, node: MappingNode, path: TreePath) -> Mapping[str, object]:
+        found: dict[str, object] = {}
+        for key_node, value_node in node.value:
+            where = _position(key_node.start_mark)
+            if not isinstance(key_node, ScalarNode):
+                self._tree.mistakes.append(where.mistake("expected a key of one word, found a list or a mapping"))
+                continue
+            key = str(key_node.value)
+            if key in found:
+                first = self._tree.keys[(*path, key)].line
+                text = f"expected each key once, found `{shown(key)}` again (first in line {first})"
+                self._tree.mistakes.append(where.mistake(text))
+                continue
+            self._tree.keys[(*path, key)] = where
+            found[key] = self.value(value_node, (*path, key))
+            if value_node.value == "":  # a value that is not there begins wherever the next thing does
+                self._tree.values[(*path, key)] = where
+        return found
+
+    def _scalar(self, node: ScalarNode) -> object:
+        where = _position(node.start_mark)
+        tag = re.sub(r"^tag:yaml\.org,2002:", "!!", str(node.tag))
+        if tag not in _PLAIN_TAGS:
+            self._tree.mistakes.append(where.mistake(f"expected a plain value, found the tag {shown(tag)}"))
+            return str(node.value)
+        if tag in _TEXT_TAGS:
+            return str(node.value)
+        try:
+            return self._construct(node)
+        except (YAMLError, ValueError, KeyError, OverflowError):
+            text = f"expected a value of the kind {tag}, found `{shown(str(node.value))}`"
+            self._tree.mistakes.append(where.mistake(text))
+            return str(node.value)
+
+
+# A date, and the `=` and `<<` of older YAML, are text here.
+_TEXT_TAGS = frozenset({"!!str", "!!timestamp", "!!value", "!!merge"})
+_PLAIN_TAGS = _TEXT_TAGS | {"!!int", "!!float", "!!bool", "!!null"}
+
+
+def nearest_position(positions: Mapping[TreePath, Position], path: Iterable[str | int]) -> tuple[TreePath, Position]:
+    """Return the deepest known part of a path and where it stands; parts that name nothing in the file are skipped."""
+    known: TreePath = ()
+    for part in path:
+        if (*known, part) in positions:
+            known = (*known, part)
+    return known, positions.get(known, TOP)

@@ -1,0 +1,1 @@
+"""Turns what students hand in, folders and archives, into values of the core."""

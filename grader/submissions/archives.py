@@ -1,0 +1,469 @@
+"""Unpacks an archive in memory, within limits and by rules of our own; nothing is written."""
+
+from __future__ import annotations
+
+import bz2
+import contextlib
+import io
+import lzma
+import re
+import stat
+import struct
+import tarfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from grader.core.errors import SubmissionError
+from grader.submissions.collected import (
+    MAX_DEPTH,
+    MAX_ENTRIES,
+    MAX_FILE_BYTES,
+    MAX_FILES,
+    MAX_TOTAL_BYTES,
+    Collected,
+    LeftOut,
+    collision,
+    folders_of,
+    generated_folders,
+    objection,
+    passed_over,
+    shown,
+)
+
+FILE, FOLDER = "a file", "a folder"
+
+REPACK = "pack the folder again with your system's own zip and hand that in"
+HAND_IN_ZIP = "pack the folder with your .py files as a zip"
+FEWER = "pack only your own .py files"
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One member of an archive, not yet unpacked.
+
+    Attributes:
+        name: As the archive has it, with `/` between the parts and none at the end; may be hostile.
+        kind: `FILE`, `FOLDER`, or the words for what else it is, such as `a link`.
+        size: Bytes it claims to have.
+        read: Unpacks it and returns at most so many bytes of it.
+    """
+
+    name: str
+    kind: str
+    size: int
+    read: Callable[[int], bytes]
+
+
+class UnusableArchiveError(Exception):
+    """An archive cannot be used; whoever reads it adds which one it is.
+
+    Args:
+        problem: What was expected and what was found.
+        hint: One thing to do.
+    """
+
+    def __init__(self, problem: str, hint: str = REPACK) -> None:
+        super().__init__(problem)
+        self.problem = problem
+        self.hint = hint
+
+
+BLOCK = 512
+
+#: Longest header that only describes the next member.
+MAX_EXTENDED_BYTES = 64 << 10
+
+#: Compressed streams one after the other that are read as one: parallel compressors write several.
+MAX_STREAMS = 100
+
+#: Most memory of a decompressor of xz, in bytes; `xz -9` asks for 65 MiB.
+MAX_XZ_BYTES = 128 << 20
+
+_ENCODING, _ERRORS = "utf-8", "surrogateescape"
+_PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
+_EXTENDED = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
+# In older versions of Python, tarfile needs time that grows with the square of such a run.
+_MANY_DIGITS = re.compile(rb"[0-9]{40}")
+_KINDS = {tarfile.LNKTYPE: "a link", tarfile.SYMTYPE: "a link", tarfile.DIRTYPE: FOLDER}
+
+
+class _Stream(Protocol):
+    @property
+    def eof(self) -> bool: ...
+
+    @property
+    def unused_data(self) -> bytes: ...
+
+    def decompress(self, data: bytes, max_length: int, /) -> bytes: ...
+
+
+_STREAMS: dict[str, Callable[[], _Stream]] = {
+    "gzip": lambda: zlib.decompressobj(wbits=31),
+    "bzip2": bz2.BZ2Decompressor,
+    "xz": lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MAX_XZ_BYTES),
+}
+
+
+def is_tar(head: bytes) -> bool:
+    """Return whether data begins with the header of a tar archive, which holds a checksum of itself."""
+    try:
+        tarfile.TarInfo.frombuf(head[:BLOCK], _ENCODING, _ERRORS)
+    except tarfile.HeaderError:
+        return False
+    return True
+
+
+def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
+    """Return what compressed data holds.
+
+    Args:
+        data: The whole compressed file.
+        compression: `gzip`, `bzip2` or `xz`.
+        most: Most bytes of the result; nothing is computed beyond.
+        limit: The same in words.
+
+    Raises:
+        UnusableArchiveError: The data is damaged or cut off, or holds more.
+    """
+    whole = bytearray()
+    for _ in range(MAX_STREAMS):
+        stream = _STREAMS[compression]()
+        try:
+            whole += stream.decompress(data, most - len(whole) + 1)
+        except (zlib.error, OSError, lzma.LZMAError, EOFError, ValueError):
+            raise _damaged_tar() from None
+        if len(whole) > most:
+            raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
+        if not stream.eof:
+            raise _damaged_tar()
+        data = stream.unused_data.lstrip(b"\0")
+        if not data:
+            return bytes(whole)
+    raise UnusableArchiveError(f"expected at most {MAX_STREAMS} compressed parts, found more")
+
+
+def tar_members(data: bytes, *, most: int) -> list[Member]:
+    """Return the members of an uncompressed tar archive in their order.
+
+    Args:
+        data: The whole archive.
+        most: Most members.
+
+    Raises:
+        UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses what no student needs.
+    """
+    places = _places(data, most)
+    try:
+        with tarfile.open(fileobj=io.BytesIO(data), mode="r:", encoding=_ENCODING, errors=_ERRORS) as archive:
+            found = archive.getmembers()
+    except (tarfile.TarError, ValueError, OSError, EOFError, OverflowError):
+        raise _damaged_tar() from None
+    return [_tar_member(data, info, places) for info in found]
+
+
+def _tar_member(data: bytes, info: tarfile.TarInfo, places: set[tuple[int, int]]) -> Member:
+    if not info.isreg():
+        kind = _KINDS.get(info.type, "a device, pipe or other special file")
+        return Member(info.name, kind, 0, lambda most: b"")  # noqa: ARG005 - there is nothing to read
+    # An extended header can move and stretch a member; then the two readings of the archive differ.
+    if info.issparse() or (info.offset_data, info.size) not in places:
+        raise _unusual()
+    start, size = info.offset_data, info.size
+    return Member(info.name, FILE, size, lambda most: data[start : start + min(size, most)])
+
+
+def _places(data: bytes, most: int) -> set[tuple[int, int]]:
+    """Walk over the headers and return where the contents lie, as offset and size; tarfile trusts what is said here."""
+    places: set[tuple[int, int]] = set()
+    at = headers = 0
+    while True:
+        block = data[at : at + BLOCK]
+        if len(block) < BLOCK:
+            raise _damaged_tar()
+        if not any(block):
+            return places
+        headers += 1
+        if headers > 3 * most:  # a member may have two extended headers
+            raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+        at += BLOCK
+        size = _size(block)
+        if at + size > len(data):
+            raise _damaged_tar()
+        if block[156:157] in _EXTENDED:
+            _check_extended(data[at : at + size], pax=block[156:157] in _PAX)
+        else:
+            places.add((at, size))
+        at += -(-size // BLOCK) * BLOCK
+
+
+def _size(block: bytes) -> int:
+    try:
+        info = tarfile.TarInfo.frombuf(block, _ENCODING, _ERRORS)
+    except (tarfile.HeaderError, ValueError):
+        raise _damaged_tar() from None
+    if info.type == tarfile.GNUTYPE_SPARSE or info.size < 0:
+        raise _unusual()
+    if info.type in _EXTENDED and info.size > MAX_EXTENDED_BYTES:
+        raise _unusual()
+    carries = info.type in _EXTENDED or info.isreg() or info.type not in tarfile.SUPPORTED_TYPES
+    return info.size if carries else 0
+
+
+def _check_extended(header: bytes, *, pax: bool) -> None:
+    """Refuse records that are not exactly `LENGTH KEY=VALUE` and a line break, and those about sparse files."""
+    if not pax:
+        return
+    if b"GNU.sparse" in header or _MANY_DIGITS.search(header):
+        raise _unusual()
+    at = 0
+    while at < len(header):
+        length = header[at : at + 8].partition(b" ")[0]
+        record = header[at : at + int(length)] if length.isdigit() else b""
+        if not record.endswith(b"\n") or b"=" not in record or len(record) != int(length):
+            raise _damaged_tar()
+        at += len(record)
+
+
+def _damaged_tar() -> UnusableArchiveError:
+    return UnusableArchiveError("expected a whole tar archive, found a damaged or incomplete one")
+
+
+def _unusual() -> UnusableArchiveError:
+    return UnusableArchiveError("expected a tar archive of plain files, found a feature that is not supported")
+
+
+_DIRECTORY_ENTRY = b"PK\x01\x02"
+_ENCRYPTED = 0x1 | 0x40 | 0x2000  # with a password, strongly, the directory too
+_NAMED_IN_UTF8 = 0x800
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+# What zipfile and zlib raise for a damaged archive.
+_DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, NotImplementedError, KeyError)
+
+
+def zip_members(data: bytes, *, most: int) -> list[Member]:
+    """Return the members of a zip archive in the order of its directory.
+
+    Args:
+        data: The whole archive.
+        most: Most members.
+
+    Raises:
+        UnusableArchiveError: The archive is damaged, encrypted, compressed in an uncommon way, or has too many members.
+    """
+    # Before zipfile builds an object for each: of a few megabytes it could make gigabytes.
+    if data.count(_DIRECTORY_ENTRY) > most:
+        raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except _DAMAGE:
+        raise _damaged_zip() from None
+    # Members that share their bytes could be unpacked for hours, however little comes out.
+    if sum(info.compress_size for info in archive.infolist()) > len(data):
+        raise _damaged_zip()
+    return [_zip_member(archive, info) for info in archive.infolist()]
+
+
+def _zip_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Member:
+    if info.flag_bits & _ENCRYPTED:
+        raise UnusableArchiveError("expected an archive without a password, found an encrypted one")
+    if info.compress_type not in _COMPRESSIONS:
+        found = f"method {info.compress_type}"
+        raise UnusableArchiveError(f"expected a zip with the usual compression (deflate), found {found}")
+
+    def read(most: int) -> bytes:
+        try:
+            with archive.open(info) as file:
+                return file.read(most)
+        except _DAMAGE:
+            raise _damaged_zip() from None
+
+    name = _name(info)
+    return Member(name.rstrip("/") or name, _kind(info, name), info.file_size, read)
+
+
+def _name(info: zipfile.ZipInfo) -> str:
+    """Return a member's whole name; zipfile would cut it at a NUL."""
+    name = info.orig_filename
+    if not info.flag_bits & _NAMED_IN_UTF8:
+        # macOS writes UTF-8 and does not say so.
+        with contextlib.suppress(UnicodeError):
+            name = name.encode("cp437").decode("utf-8")
+    return name.replace("\\", "/")  # what old Windows programs write between the parts
+
+
+def _kind(info: zipfile.ZipInfo, name: str) -> str:
+    mode = info.external_attr >> 16
+    if stat.S_ISLNK(mode):
+        return "a link"
+    if stat.S_IFMT(mode) and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        return "a device, pipe or socket"
+    return FOLDER if name.endswith("/") else FILE
+
+
+def _damaged_zip() -> UnusableArchiveError:
+    return UnusableArchiveError("expected a whole zip archive, found a damaged or incomplete one")
+
+
+#: Largest archive.
+MAX_ARCHIVE_BYTES = 64 << 20
+
+#: Most that compressed tar archives unpack to, headers and files that are left out included.
+MAX_UNPACKED_BYTES = 64 << 20
+
+#: Most bytes that one byte of an archive may become, once more than `RATIO_FREE_BYTES` have come of it.
+MAX_RATIO = 200
+RATIO_FREE_BYTES = 4 << 20
+_RATIO = f"{MAX_RATIO} times the size of the archive"
+
+#: Bytes of a file that tell what kind of archive it is.
+HEAD_BYTES = BLOCK
+
+#: What archives are called; what is in them decides.
+ARCHIVE_SUFFIXES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".tbz2", ".xz", ".txz", ".zst", ".7z", ".rar")
+
+_MAGIC = {
+    b"PK\x03\x04": "zip",
+    b"PK\x05\x06": "zip",
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\x00": "xz",
+    b"PK\x07\x08": "split zip",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+    b"Rar!\x1a\x07": "rar",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"LZIP": "lzip",
+}
+_READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
+
+
+def archive_kind(head: bytes) -> str | None:
+    """Return what kind of archive or compressed file begins like this, or None.
+
+    Args:
+        head: The first `HEAD_BYTES` of a file, or all of a shorter one.
+
+    Returns:
+        `zip`, `tar`, `gzip`, `bzip2` or `xz`, which can be read, or the name of another kind, which cannot.
+    """
+    for magic, kind in _MAGIC.items():
+        if head.startswith(magic):
+            return kind
+    return "tar" if is_tar(head) else None
+
+
+def collect_archive(data: bytes, *, where: str) -> Collected:
+    """Return the files that an archive holds.
+
+    What a folder would be copied without is left out in the same way, so the same files give the same result packed or
+    not.
+
+    Args:
+        data: The whole archive, at most `MAX_ARCHIVE_BYTES`.
+        where: The archive as messages show it.
+
+    Raises:
+        SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system
+            could not keep or would keep elsewhere.
+    """
+    if len(data) > MAX_ARCHIVE_BYTES:
+        raise SubmissionError(f"{where}: expected at most {MAX_ARCHIVE_BYTES >> 20} MiB, found more", FEWER)
+    try:
+        left = LeftOut()
+        members = _without_generated(_wanted(_members(data)), left)
+        files = tuple(_contents(members, len(data), left))
+    except UnusableArchiveError as error:
+        raise SubmissionError(f"{where}: {error.problem}", error.hint) from None
+    return Collected(files, left.notes())
+
+
+def _members(data: bytes) -> list[Member]:
+    kind = archive_kind(data[:HEAD_BYTES])
+    if kind is None:
+        raise UnusableArchiveError("expected a zip or tar archive, found another kind of file", HAND_IN_ZIP)
+    if kind not in _READABLE:
+        raise UnusableArchiveError(f"expected a zip or tar archive, found {kind}, which cannot be read", HAND_IN_ZIP)
+    if kind == "zip":
+        return zip_members(data, most=MAX_ENTRIES)
+    if kind != "tar":
+        allowed = _allowed(len(data))
+        limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
+        data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, allowed), limit=limit)
+        if not is_tar(data[:HEAD_BYTES]):
+            raise UnusableArchiveError(
+                f"expected a tar archive inside the {kind}, found another kind of file", HAND_IN_ZIP
+            )
+    return tar_members(data, most=MAX_ENTRIES)
+
+
+def _allowed(packed: int) -> int:
+    return max(RATIO_FREE_BYTES, packed * MAX_RATIO)
+
+
+def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
+    """Yield the files that are the student's, with clean names; raises for what no archive may hold."""
+    for member in members:
+        name = _relative(member)
+        if not name:  # the top itself
+            continue
+        problem = objection(name)
+        if problem:
+            raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
+        if passed_over(name if member.kind != FOLDER else f"{name}/x"):
+            continue
+        if member.kind == FOLDER:
+            continue
+        if member.kind != FILE:
+            hint = "replace it by the file itself" if member.kind == "a link" else REPACK
+            raise UnusableArchiveError(f"expected plain files, found {member.kind}: {shown(member.name)}", hint)
+        yield name, member
+
+
+def _relative(member: Member) -> str:
+    """Return a member's name without the `./` that `tar -c .` writes; empty for the top of the archive."""
+    name = member.name
+    while name.startswith("./"):
+        name = name[2:]
+    return "" if name == "." and member.kind == FOLDER else name
+
+
+def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> list[tuple[str, Member]]:
+    """Leave out what tools made, then hold the rest to the limits that need no unpacking."""
+    every = list(named)
+    generated = generated_folders(name for name, _ in every)
+    kept = []
+    for name, member in every:
+        folder = next((folder for folder in folders_of(name) if folder in generated), None)
+        if folder is None:
+            kept.append((name, member))
+        else:
+            left.add(f"it holds {generated[folder]}, so a tool made it", folder)
+    if len(kept) > MAX_FILES:
+        raise UnusableArchiveError(f"expected at most {MAX_FILES} files, found more", FEWER)
+    if any(name.count("/") > MAX_DEPTH for name, _ in kept):
+        raise UnusableArchiveError(f"expected at most {MAX_DEPTH} folders inside each other, found more", FEWER)
+    twins = collision([name for name, _ in kept])
+    if twins is not None:
+        found = f"found {shown(twins[0])} and {shown(twins[1])}" if twins[0] != twins[1] else f"found {shown(twins[0])}"
+        raise UnusableArchiveError(f"expected different names, {found}{' twice' if twins[0] == twins[1] else ''}")
+    return kept
+
+
+def _contents(members: Sequence[tuple[str, Member]], packed: int, left: LeftOut) -> Iterator[tuple[str, bytes]]:
+    """Unpack, counting what really comes and not what was promised."""
+    total = 0
+    for name, member in members:
+        content = member.read(MAX_FILE_BYTES + 1) if member.size <= MAX_FILE_BYTES else None
+        if content is None or len(content) > MAX_FILE_BYTES:
+            left.add(f"larger than {MAX_FILE_BYTES >> 20} MiB", name)
+            continue
+        if len(content) != member.size:  # another program would see another file
+            raise UnusableArchiveError("expected a whole archive, found a damaged or incomplete one")
+        total += len(content)
+        if total > MAX_TOTAL_BYTES:
+            raise UnusableArchiveError(f"expected at most {MAX_TOTAL_BYTES >> 20} MiB in all, found more", FEWER)
+        if total > _allowed(packed):
+            raise UnusableArchiveError(f"expected at most {_RATIO}, found more", FEWER)
+        yield name, content

@@ -1,0 +1,192 @@
+"""What an intake collected before anything is written, and which names it may hold."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+#: Longest piece of foreign text in a message, in characters.
+SHOWN_LENGTH = 80
+
+
+def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
+    """Return text as one printable line: control characters and lone surrogates escaped, cut in the middle.
+
+    Args:
+        text: Anything: file names and YAML scalars may hold line breaks, escapes and undecodable bytes.
+        limit: Longest result, in characters.
+    """
+    kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
+    if len(line) <= limit and len(kept) == len(text):
+        return line
+    head = (limit - 1) // 2
+    return f"{line[: limit - 1 - head]}…{line[len(line) - head :]}"
+
+
+def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
+    """Return names as a phrase: `a`, `a or b`, `a, b or c`; at least one name."""
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} {conjunction} {names[-1]}"
+
+
+#: A folder that holds one of these was made by a tool: a virtual environment, or what `colcon build` left behind.
+GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
+
+#: Longest path inside a submission: the system refuses longer ones once the staging folder stands before it.
+MAX_PATH_BYTES = 2_000
+
+#: Longest name of one file or folder that Linux can hold.
+MAX_NAME_BYTES = 255
+
+_BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
+_SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
+# What file managers leave in every folder; `._x` is what macOS puts beside every file x in an archive.
+_SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+_DRIVE = re.compile(r"[A-Za-z]:")
+_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?")
+# Windows drops these, so that two names become one; other systems keep them.
+_ENDS_ODDLY = re.compile(r"[ .]\Z")
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+
+_OBJECTIONS: dict[str, Callable[[str], object]] = {
+    "an absolute name": lambda path: path.startswith("/") or _DRIVE.match(path),
+    "a name that leads out of the archive": lambda path: ".." in path.split("/"),
+    "a name with a control character": _CONTROLS.search,
+    "a name with an empty part": lambda path: not {"", "."}.isdisjoint(path.split("/")),
+    "a name with a backslash": lambda path: "\\" in path,
+    "a name with a part that ends in a blank or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
+    "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
+    "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
+}
+
+
+def passed_over_folder(name: str) -> bool:
+    """Return whether a folder of this name is no work of the student: caches, environments, version control."""
+    return name in _SKIPPED_FOLDERS or name.startswith(".")
+
+
+def passed_over_file(name: str) -> bool:
+    """Return whether a file of this name was put there by an operating system."""
+    return name in _SKIPPED_FILES or name.startswith("._")
+
+
+def unnoticed(name: str, *, is_folder: bool) -> str:
+    """Return why a submission of this name would be passed over, as a phrase.
+
+    Empty if it would not be, or if a system or interpreter has put it there: then nobody looks for it.
+    """
+    if passed_over_file(name) or (is_folder and name in _BY_SYSTEMS):
+        return ""
+    if name.startswith("."):
+        return "its name begins with a dot"
+    return "its name is that of a tool's folder" if is_folder and passed_over_folder(name) else ""
+
+
+def passed_over(path: str) -> bool:
+    """Return whether a path, relative and with `/`, is or lies in something that is passed over."""
+    *folders, name = path.split("/")
+    return passed_over_file(name) or any(map(passed_over_folder, folders))
+
+
+def generated_folders(paths: Iterable[str]) -> dict[str, str]:
+    """Return the folders made by a tool, as path -> marker; never the whole submission."""
+    found: dict[str, str] = {}
+    for path in paths:
+        folder, _, name = path.rpartition("/")
+        if folder and name in GENERATED_MARKERS:
+            known = found.get(folder, name)
+            found[folder] = min(known, name, key=GENERATED_MARKERS.index)
+    return found
+
+
+def folders_of(path: str) -> Iterator[str]:
+    """Yield the folders that a path lies in, the outermost first."""
+    at = path.find("/")
+    while at >= 0:
+        yield path[:at]
+        at = path.find("/", at + 1)
+
+
+def objection(path: str) -> str:
+    """Return what is wrong with the name of a member of an archive, as a phrase; empty if nothing is."""
+    return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
+
+
+def collision(files: Iterable[str]) -> tuple[str, str] | None:
+    """Return two names of which some system could keep only one, or None.
+
+    Two files of one name, names that differ only in case or in how letters are composed, and a file where another
+    needs a folder.
+    """
+    kept: dict[str, tuple[str, bool]] = {}
+    for path in files:
+        if _folded(path) in kept:
+            return kept[_folded(path)][0], path
+        kept[_folded(path)] = (path, True)
+        for folder in folders_of(path):
+            other, is_file = kept.setdefault(_folded(folder), (folder, False))
+            if is_file or other != folder:
+                return other, folder
+    return None
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def _bytes(name: str) -> int:
+    return len(os.fsencode(name))
+
+
+def _longest_part(path: str) -> int:
+    return max(map(_bytes, path.split("/")))
+
+
+MAX_FILES = 2_000
+MAX_TOTAL_BYTES = 50 << 20
+MAX_FILE_BYTES = 8 << 20
+MAX_DEPTH = 20
+
+#: Entries of any kind that are looked at before a folder or an archive is taken for something else than a submission.
+MAX_ENTRIES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """Files that were read, not yet written anywhere.
+
+    Attributes:
+        files: Relative POSIX path and content; every path stays inside, and no two are the same.
+        notes: Sentences about what was left out.
+    """
+
+    files: tuple[tuple[str, bytes], ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class LeftOut:
+    """Names of what was left out, by the reason."""
+
+    by_reason: dict[str, dict[str, None]] = field(default_factory=dict)
+
+    def add(self, reason: str, relative: str) -> None:
+        """Take note of a path that is left out, once."""
+        self.by_reason.setdefault(reason, {})[relative] = None
+
+    def notes(self) -> tuple[str, ...]:
+        """Return one sentence per reason, in an order that does not depend on how the system lists folders."""
+        return tuple(
+            self._note(reason, sorted(names, key=os.fsencode)) for reason, names in sorted(self.by_reason.items())
+        )
+
+    @staticmethod
+    def _note(reason: str, names: Sequence[str]) -> str:
+        first = [shown(name) for name in names[:3]]
+        more = [f"{len(names) - 3} more"] if len(names) > 3 else []
+        return f"not copied: {listed([*first, *more], 'and')} ({reason})"

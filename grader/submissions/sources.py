@@ -1,0 +1,309 @@
+"""The text of the graded files, and what in it reaches for the insides of its process."""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from grader.core.submission import Submission
+from grader.judging.code import Code, code_of
+from grader.judging.source import LONGEST_SOURCE, chain, read
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+#: What is said of a file that is too long to be looked through.
+LONG = "a very long file"
+#: Modules that show or change the insides of a process, or start others.
+_MODULES = _words(
+    "gc ctypes cffi inspect dis marshal types tracemalloc faulthandler resource psutil time_machine "
+    "freezegun subprocess multiprocessing pty fcntl mmap _thread _socket _ctypes _posixsubprocess pickle code codeop "
+    "runpy imp weakref builtins __main__ site sysconfig importlib pkgutil zipimport cProfile profile pdb bdb select "
+    "selectors forbiddenfruit wrapt mock platform"
+)
+#: Names in modules that anybody uses: whole dotted names.
+_NAMES = _words(
+    "sys._getframe sys._current_frames sys._current_exceptions sys.modules sys.settrace sys.setprofile sys.gettrace "
+    "sys.getprofile sys.addaudithook sys.meta_path sys.path_hooks sys.flags sys.orig_argv sys.getrefcount "
+    "sys._clear_type_cache sys.excepthook sys.setswitchinterval sys.getswitchinterval sys.__stdout__ sys.__stderr__ "
+    "os.times os.stat os.lstat os.fstat os.scandir os.walk os.system os.popen os.fork os.forkpty os.posix_spawn "
+    "os.posix_spawnp os.getppid os.getpid os.read os.write os.dup os.dup2 os.pipe os.fdopen os.readlink os.kill "
+    "os.register_at_fork os.sched_yield os.getloadavg os.nice os.path.getmtime os.path.getctime os.path.getatime "
+    "os.urandom os.getrandom time.process_time time.process_time_ns time.thread_time time.thread_time_ns "
+    "time.clock_gettime time.clock_gettime_ns time.get_clock_info time.pthread_getcpuclockid threading.enumerate "
+    "threading.active_count threading._active threading.main_thread threading.settrace threading.setprofile "
+    "threading.get_native_id threading.get_ident threading._start_new_thread socket.socket socket.fromfd "
+    "socket.create_connection socket.socketpair socket.SOCK_STREAM asyncio.create_subprocess_exec "
+    "asyncio.create_subprocess_shell atexit._run_exitfuncs atexit._clear signal.setitimer signal.set_wakeup_fd "
+    "rclpy.impl rclpy.impl.implementation_singleton rclpy._rclpy_pybind11 traceback.extract_stack traceback.walk_stack "
+    "traceback.format_stack traceback.print_stack traceback.walk_tb traceback.extract_tb traceback.StackSummary "
+    "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1"
+)
+#: Attributes of whatever they are read.
+_ATTRIBUTES = _words(
+    "__closure__ __globals__ __code__ __wrapped__ __builtins__ __subclasses__ __mro__ __bases__ __getattribute__ "
+    "__loader__ __spec__ __self__ __func__ __defaults__ __kwdefaults__ __qualname__ __module__ __dict__ cell_contents "
+    "f_back f_globals f_locals f_code f_builtins tb_frame gi_frame cr_frame ag_frame co_filename co_names co_consts "
+    "st_mtime st_mtime_ns st_ctime st_ctime_ns st_atime st_atime_ns st_ino exec_module load_module reload "
+    "import_module getrusage CLOCK_PROCESS_CPUTIME_ID CLOCK_THREAD_CPUTIME_ID CLOCK_BOOTTIME CLOCK_MONOTONIC_RAW "
+    "CLOCK_REALTIME CLOCK_MONOTONIC handle implementation_singleton rclpy_implementation tm_year tm_mon tm_mday "
+    "tm_yday year month day toordinal fromordinal "
+    "__traceback__ tb_next relativeCreated"
+)
+#: Functions of Python that run or find what no text names.
+_BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id")
+#: Functions that tell what kind of thing something is; asked about a function of a module they tell who replaced it.
+_ASKING = _words("type repr str isinstance issubclass hasattr getattr setattr delattr callable hash format")
+#: Parts of texts that name places or settings of the process.
+_TEXTS = (
+    *("/proc", "/sys/", "/dev/shm", "/dev/fd", "/submission", "_grader", "grader_host"),  # noqa: S108 - looked for
+    *("RCUTILS_", "FASTRTPS", "FASTDDS", "PYTHONHASHSEED", "LD_PRELOAD", "_ROS_WHEELS", "GRADER_"),
+    *("_rclpy", "__class__", "__code__", "__wrapped__", "__globals__"),
+)
+#: What tells the time, by the clock that it reads: a program with two may compare them.
+_CLOCKS = {
+    "time.time": "system",
+    "time.time_ns": "system",
+    "datetime.datetime.now": "system",
+    "datetime.datetime.utcnow": "system",
+    "datetime.datetime.today": "system",
+    "time.monotonic": "steady",
+    "time.monotonic_ns": "steady",
+    "time.perf_counter": "steady",
+    "time.perf_counter_ns": "steady",
+}
+#: What tells the date or the time of day; comparing it, or a part of it, with anything is more than telling it.
+_CALENDARS = _words(
+    "time.strftime time.ctime time.asctime time.localtime time.gmtime email.utils.formatdate datetime.date.today"
+)
+_TOLD = _words("strftime isoformat isocalendar isoweekday weekday timetuple ctime")
+#: Differences of clocks that no program acts upon.
+_TINY_S = 1e-3
+#: Seconds, or nanoseconds, since 1970 between these are a date that a program compares with.
+_DATES = ((1.5e9, 2.5e9), (1.5e18, 2.5e18))
+
+
+def reaching(text: str) -> tuple[str, ...]:
+    """Return by what names a file reaches for the insides of its process, each once, in order; empty for most files."""
+    source = read("", text)
+    if source.tree is None:
+        return (LONG,) if len(text) > LONGEST_SOURCE or _can_run(text) else ()
+    code = code_of(source)
+    found = (*_imports(source.nodes), *_named(source.nodes, code), *_computed(source.nodes, code))
+    return tuple(dict.fromkeys((*found, *_timing(source.nodes, code))))
+
+
+def _can_run(text: str) -> bool:
+    try:
+        compile(text, "", "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return True
+
+
+def _imports(nodes: Sequence[ast.AST]) -> Iterator[str]:
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names = [name.name for name in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [f"{node.module}.{name.name}" for name in node.names]
+        else:
+            continue
+        for name in names:
+            if name.partition(".")[0] in _MODULES or any(name == n or name.startswith(f"{n}.") for n in _NAMES):
+                yield name
+            yield from (part for part in _TEXTS if part in name)
+
+
+def _named(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+    for node in nodes:
+        if isinstance(node, ast.Attribute):
+            name = code.resolved(node)
+            if node.attr in _ATTRIBUTES or name in _NAMES:
+                yield node.attr if node.attr in _ATTRIBUTES else name
+            elif node.attr == "__doc__" or (_is_private(node.attr) and chain(node.value) in code.aliases):
+                yield name
+        elif isinstance(node, ast.Name) and node.id in (_BUILTINS | _ATTRIBUTES):
+            yield node.id
+        elif isinstance(node, ast.Constant) and isinstance(node.value, (str, bytes)):
+            value = node.value if isinstance(node.value, str) else node.value.decode("latin-1")
+            yield from (part for part in _TEXTS if part in value)
+        elif isinstance(node, ast.keyword) and node.arg in ("stack_info", "stacklevel"):
+            yield node.arg
+        elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+            if any(low <= node.value <= high for low, high in _DATES):
+                yield "a date"
+
+
+def _is_private(name: str) -> bool:
+    return name.startswith("_") and not name.endswith("__")
+
+
+def _computed(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+    """Yield names that are looked up by a text that is worked out, and functions that are asked what they are."""
+    spelt = _loops_over_texts(nodes)
+    for call in (node for node in nodes if isinstance(node, ast.Call)):
+        name = chain(call.func)
+        if name in ("getattr", "setattr", "delattr") and not _is_spelt_out(call, spelt):
+            yield f"{name} of a name that is worked out"
+        elif name in ("getattr", "setattr", "delattr", "hasattr") and _named_by_text(call, code):
+            yield f"{name} of {_named_by_text(call, code)}"
+        elif name in _ASKING and any(_of_module(argument, code) for argument in call.args):
+            yield f"{name} of a function"
+        elif name.endswith("environ.items") or (name in ("dict", "list", "sorted", "len") and _takes_environ(call)):
+            yield "os.environ"
+
+
+def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
+    """Return the names that loops give to texts which stand in the file, and that nothing else gives."""
+    inner = [n.generators for n in nodes if isinstance(n, (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp))]
+    loops: list[ast.For | ast.comprehension] = [n for n in nodes if isinstance(n, ast.For)]
+    loops += [loop for generators in inner for loop in generators]
+    named = [
+        loop.target.id
+        for loop in loops
+        if isinstance(loop.target, ast.Name)
+        and isinstance(loop.iter, (ast.Tuple, ast.List, ast.Set))
+        and not any(_is_telling(text) for text in loop.iter.elts)
+    ]
+    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    return frozenset(name for name in named if given.count(name) == named.count(name))
+
+
+def _is_telling(node: ast.expr) -> bool:
+    """Return whether an expression is anything but a text that names nothing inside."""
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
+        return True
+    return node.value in _ATTRIBUTES or any(node.value == name.rpartition(".")[2] for name in _NAMES)
+
+
+def _is_spelt_out(call: ast.Call, spelt: frozenset[str]) -> bool:
+    """Return whether it can be read which attribute a call is about; what a program sets in itself is its own."""
+    if len(call.args) > 1 and (isinstance(call.args[1], ast.Constant) or chain(call.args[1]) in spelt):
+        return True
+    return chain(call.func) == "setattr" and bool(call.args) and chain(call.args[0]) == "self"
+
+
+def _named_by_text(call: ast.Call, code: Code) -> str:
+    """Return the name that a call looks up by its text, if it is one that is looked for; empty otherwise."""
+    if len(call.args) < 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
+        return ""
+    name = f"{code.resolved(call.args[0])}.{call.args[1].value}"
+    return name if name in _NAMES or call.args[1].value in _ATTRIBUTES else ""
+
+
+def _of_module(node: ast.expr, code: Code) -> bool:
+    """Return whether an expression is something in a module, or a module, and not what calling it gives."""
+    name = chain(node)
+    called = isinstance(node, ast.Call)
+    return not called and name.partition(".")[0] in code.aliases and name.rpartition(".")[2][:1].islower()
+
+
+def _takes_environ(call: ast.Call) -> bool:
+    return any(chain(argument).endswith("environ") for argument in call.args)
+
+
+def _timing(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+    """Yield two clocks in one file, and loops that count how often they look at one."""
+    names = [node for node in nodes if isinstance(node, (ast.Attribute, ast.Name))]
+    clocks = {clock for node in names if (clock := _CLOCKS.get(code.resolved(node)))}
+    if len(clocks) > 1:
+        yield "two clocks"
+    if any(_compares(node, code) for node in nodes):
+        yield "a clock that is compared"
+    for loop in (node for node in nodes if isinstance(node, ast.While)):
+        inside = list(ast.walk(loop))
+        looks = any(isinstance(n, (ast.Attribute, ast.Name)) and code.resolved(n) in _CLOCKS for n in inside)
+        waits = any(isinstance(n, ast.Call) and chain(n.func).rpartition(".")[2] in _WAITING for n in inside)
+        if looks and not waits and any(isinstance(n, ast.AugAssign) for n in inside):
+            yield "a loop that counts"
+
+
+def _compares(node: ast.AST, code: Code) -> bool:
+    """Return whether a date is compared with anything, or a clock as nobody does who waits for time to pass."""
+    if isinstance(node, (ast.Subscript, ast.Attribute)):
+        return _is_date(node.value, code) and (
+            isinstance(node, ast.Subscript) or node.attr in ("startswith", "endswith")
+        )
+    if not isinstance(node, ast.Compare):
+        return False
+    sides = [node.left, *node.comparators]
+    if any(_is_date(side, code) for side in sides):
+        return True
+    numbers = [s.value for s in sides if isinstance(s, ast.Constant) and isinstance(s.value, (int, float))]
+    if any(_is_clock(side, code) for side in sides) and numbers:
+        return True
+    exact = any(isinstance(op, (ast.Eq, ast.NotEq, ast.In, ast.NotIn)) for op in node.ops)
+    looks = any(_is_clock(inner, code) for side in sides for inner in ast.walk(side))
+    return looks and (exact or any(0 < abs(n) < _TINY_S for n in numbers))
+
+
+def _is_clock(node: ast.AST, code: Code) -> bool:
+    return isinstance(node, ast.Call) and code.resolved(node.func) in _CLOCKS
+
+
+def _is_date(node: ast.AST, code: Code) -> bool:
+    if not isinstance(node, ast.Call):
+        return False
+    told = isinstance(node.func, ast.Attribute) and node.func.attr in _TOLD
+    texts = chain(node.func) in ("str", "repr") and any(_is_date(a, code) or _is_clock(a, code) for a in node.args)
+    return told or texts or code.resolved(node.func) in _CALENDARS
+
+
+#: Calls in which a loop waits.
+_WAITING = _words("sleep wait spin spin_once spin_until_future_complete join get publish sleep_for sleep_until")
+
+
+#: Of a file that is longer, no text is given.
+MAX_SOURCE_BYTES = 1 << 20
+#: Of more than this in all files nothing more is read.
+MAX_PROGRAM_BYTES = 4 << 20
+#: Modules that Python imports without their source.
+COMPILED = (".so", ".pyc", ".pyo", ".pth")
+
+
+def read_sources(submission: Submission) -> dict[str, str]:
+    """Return wanted file name -> text, of the staged files that were found and can be decoded as Python does it."""
+    texts = {
+        wanted: source_text(submission.root / file.found)
+        for wanted, file in submission.files.items()
+        if file.found is not None
+    }
+    return {wanted: text for wanted, text in texts.items() if text is not None}
+
+
+def read_reaches(root: Path) -> tuple[str, ...]:
+    """Return by what names the files of a staged submission reach for the insides of their process, each once.
+
+    A module that is no text, or more text than anybody reads, counts as reaching.
+    """
+    found: list[str] = []
+    size = 0
+    for path in sorted(root.rglob("*")):
+        if path.suffix in COMPILED:
+            found.append(f"a {path.suffix} file")
+        elif path.suffix == ".py" and path.is_file():
+            size += path.stat().st_size
+            if size > MAX_PROGRAM_BYTES:
+                return (*dict.fromkeys(found), LONG)
+            text = source_text(path)
+            found += reaching(text) if text is not None else ()
+    return tuple(dict.fromkeys(found))
+
+
+def source_text(path: Path) -> str | None:
+    """Return the text of a staged file, or None if it is too long or not text in the encoding that it names."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_SOURCE_BYTES + 1)
+        if len(content) > MAX_SOURCE_BYTES:
+            return None
+        encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
+        return io.TextIOWrapper(io.BytesIO(content), encoding, newline=None).read()
+    except (OSError, SyntaxError, UnicodeError, LookupError):
+        return None

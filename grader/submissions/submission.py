@@ -1,0 +1,209 @@
+"""Takes in what a student handed in: a staged copy, and which file of it belongs to which process."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import stat
+import unicodedata
+from collections.abc import Iterable, Sequence
+from pathlib import Path, PurePosixPath
+
+from grader.core.errors import SubmissionError
+from grader.core.submission import StudentFile, Submission
+from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
+from grader.submissions.collected import MAX_FILE_BYTES, Collected, listed, shown
+from grader.submissions.staging import collect_folder, read_start, write_files
+
+#: Names at least this alike are shown as a possible misspelling.
+SIMILARITY = 0.8
+
+#: Misspelt names shown for one file.
+MAX_SIMILAR = 3
+
+_EXPECTED = "a folder, a .py file or an archive"
+
+# What browsers, editors and file managers put behind a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
+_EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py))+$")
+_COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
+
+
+def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission:
+    """Copy a submission and find the wanted files in it.
+
+    Args:
+        path: A folder, an archive or one .py file, as the user typed it. A folder or archive without a .py file that
+            holds one archive stands for that: so learning platforms deliver what students upload.
+        wanted: File names of all exercises being graded.
+        into: Empty folder of the caller's, which receives the copy.
+
+    Returns:
+        The submission; a file that is not there has `found` None and names that look like it.
+
+    Raises:
+        SubmissionError: No such path, not a folder, archive or .py file, no .py file inside, a limit is exceeded, or an
+            archive cannot be used.
+        HarnessError: The copy cannot be written.
+    """
+    return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
+
+
+def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
+    """Read a submission without writing anything; as `stage_submission`, which says what is raised.
+
+    Args:
+        path: As there.
+        wanted: As there.
+        into: Where the files will be copied; if that lies in the student's folder, it is no part of the submission.
+    """
+    where = shown(path, 500)
+    source = Path(path)
+    if stat.S_ISDIR(_mode(path, where)):
+        return _with_python(collect_folder(source, into=into, where=where), wanted, where)
+    return _collect_file(source, wanted, where)
+
+
+def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
+    """Write what was read of a submission, and find the wanted files in it.
+
+    Args:
+        collected: What was read, here or on another machine.
+        path: What the submission is called; nothing needs to be there any more.
+        wanted: As for `stage_submission`.
+        into: As for `stage_submission`.
+
+    Raises:
+        HarnessError: The copy cannot be written.
+    """
+    digest = write_files(collected, into)
+    names = [name for name, _ in collected.files]
+    files = {name: _look_for(name, names, wanted) for name in wanted}
+    several = tuple(_several(file) for file in files.values() if file.others)
+    return Submission(
+        name=_name(Path(path)),
+        path=path,
+        root=into,
+        digest=digest,
+        files=files,
+        notes=(*several, *collected.notes),
+    )
+
+
+def _mode(path: str, where: str) -> int:
+    if not path:
+        raise SubmissionError(f"expected {_EXPECTED}, found an empty path", "use . for this folder")
+    try:
+        return os.stat(path).st_mode  # noqa: PTH116 - a Path would change what was typed, e.g. `x.py/`
+    except (FileNotFoundError, NotADirectoryError):
+        text = f"{where}: expected {_EXPECTED}, found nothing there"
+        raise SubmissionError(text, "check the path, and the folder you are in") from None
+    except OSError as error:
+        raise SubmissionError(f"{where}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise SubmissionError(f"{where}: expected a path, found one that no file can have") from None
+
+
+def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
+    if not source.is_file():
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
+    content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
+    kind = archive_kind(content[:HEAD_BYTES])
+    # By chance or on purpose, a program may look like an old tar.
+    if source.suffix.casefold() == ".py" and kind in (None, "tar"):
+        if len(content) > MAX_FILE_BYTES:
+            raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
+        return Collected(((source.name, content),))
+    if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
+        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file")
+    return _with_python(collect_archive(content, where=where), wanted, where)
+
+
+def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
+    """Return what holds .py files: this, or the only archive in it."""
+    names = [name for name, _ in collected.files]
+    if _has_python(names):
+        return collected
+    archives = [(name, content) for name, content in collected.files if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    if len(archives) != 1:
+        raise _no_python(collected, wanted, where)
+    name, packed = archives[0]
+    inside = f"{where.rstrip('/')}/{shown(name)}"
+    inner = collect_archive(packed, where=inside)
+    if not _has_python(name for name, _ in inner.files):
+        raise _no_python(inner, wanted, inside)
+    return Collected(inner.files, (f"graded is what {shown(name)} holds", *collected.notes, *inner.notes))
+
+
+def _has_python(names: Iterable[str]) -> bool:
+    return any(name.casefold().endswith(".py") for name in names)
+
+
+def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> SubmissionError:
+    names = [name for name, _ in collected.files]
+    archives = [name for name in names if name.casefold().endswith(ARCHIVE_SUFFIXES)]
+    similar = [name for want in wanted for name in _similar(want, names, wanted)]
+    hint = ""
+    if similar:
+        hint = f"rename {shown(similar[0])} so that it ends in .py"
+    elif archives:
+        hint = f"unpack {shown(archives[0])} and name the folder that holds your files"
+    elif collected.notes:
+        hint = collected.notes[0]
+    found = f"{len(archives)} archives" if len(archives) > 1 else "none"
+    return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
+
+
+def _name(source: Path) -> str:
+    """Return the name a report shows: the last part of the path, also for `.` and `..`."""
+    return source.name if source.name not in ("", "..") else source.resolve().name or "/"
+
+
+def _look_for(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> StudentFile:
+    files = list(files)
+    exact = sorted((f for f in files if PurePosixPath(f).name == wanted), key=_nearest_the_top)
+    if exact:
+        return StudentFile(wanted, exact[0], others=tuple(exact[1:]))
+    return StudentFile(wanted, None, similar=tuple(_similar(wanted, files, all_wanted)))
+
+
+def _nearest_the_top(relative: str) -> tuple[int, bytes]:
+    return relative.count("/"), os.fsencode(relative)
+
+
+def _several(file: StudentFile) -> str:
+    others = [shown(name) for name in file.others[:3]]
+    more = [f"{len(file.others) - 3} more"] if len(file.others) > 3 else []
+    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {listed([*others, *more], 'and')}"
+
+
+def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:
+    """Return files that look like a misspelling of a wanted name, nearest first."""
+    plain = _plain(wanted)
+    ranked = []
+    for relative in files:
+        name = PurePosixPath(relative).name
+        if name in all_wanted or len(name) > 2 * len(wanted) + 20 or not _may_be_python(name):
+            continue
+        likeness = _likeness(_plain(name), plain)
+        if likeness >= SIMILARITY:
+            ranked.append((-likeness, _nearest_the_top(relative), relative))
+    return [relative for _, _, relative in sorted(ranked)[:MAX_SIMILAR]]
+
+
+def _may_be_python(name: str) -> bool:
+    folded = name.casefold()
+    return "." not in folded or _EXTENSIONS.search(folded) is not None
+
+
+def _plain(name: str) -> str:
+    """Return a file name without what people vary: case, separators, copy marks, extensions."""
+    stem = _EXTENSIONS.sub("", unicodedata.normalize("NFKC", name).casefold())
+    return re.sub(r"[\W_]+", "", _COPY_MARK.sub("", stem))
+
+
+def _likeness(one: str, other: str) -> float:
+    matcher = difflib.SequenceMatcher(None, one, other, autojunk=False)
+    if matcher.real_quick_ratio() < SIMILARITY or matcher.quick_ratio() < SIMILARITY:
+        return 0.0
+    return matcher.ratio()

@@ -1,0 +1,105 @@
+"""A class for tests: submissions, a scheduler that grades without running anything, and what it hands back."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+
+from grader.app.grade import Request
+from grader.classroom.cache_key import unusable_digest
+from grader.classroom.local import Attempt
+from grader.classroom.request import Course
+from grader.classroom.store import Standing, State
+from grader.classroom.watching import SilentWatcher
+from grader.core.errors import SubmissionError
+from grader.submissions.submission import stage_submission
+
+GRADING = Request("", exercises=("velocity_publisher",))
+
+
+def report(score, *, final=True, reason="as expected"):
+    """Return a report as JSON values: one exercise of two criteria, `score` of 10 points."""
+    outcome = ("met" if score == 10 else "not_met") if final else "undecided"
+    rate = {"id": "rate", "title": "Publishes at 20 Hz", "outcome": outcome, "score": score - 4, "max_score": 6}
+    type_ = {"id": "type", "title": "Publishes a Twist", "outcome": "met", "score": 4, "max_score": 4}
+    criteria = [{**type_, "reason": "yes", "hint": None}, {**rate, "reason": reason, "hint": None}]
+    exercise = {"id": "velocity_publisher", "title": "t", "score": score, "max_score": 10, "criteria": criteria}
+    return {"schema": "grader/report/v1", "score": score, "max_score": 10, "final": final, "exercises": [exercise]}
+
+
+class FakeScheduler:
+    """Gives each submission the score in its `score.py`, or the state that this is the name of."""
+
+    def __init__(self, jobs=1, stop_after=None):
+        self.graded = []
+        self.tasks = {}
+        self.stop_after = stop_after
+
+    def __call__(self, jobs):
+        return self
+
+    def prepare(self, isolation):
+        return ["no walls"] if isolation == "none" else []
+
+    def run(self, tasks, hear):
+        for task in tasks:
+            if len(self.graded) == self.stop_after:
+                raise KeyboardInterrupt
+            hear(task.name, "grading")
+            self.graded.append(task.name)
+            self.tasks[task.name] = task
+            yield Attempt(task, self.standing(task))
+
+    def standing(self, task):
+        staging = task.into.parent / "staging"
+        staging.mkdir()
+        try:
+            submission = stage_submission(str(task.submission), (), staging)
+            said = next(iter(staging.rglob("score.py"))).read_text(encoding="utf-8").strip()
+        except SubmissionError as error:
+            key = task.conditions.key(unusable_digest(error))
+            return Standing(State.REFUSED, key, "", task.label, error.message)
+        finally:
+            import shutil
+
+            shutil.rmtree(staging)
+        if said == "failed":
+            return Standing(State.FAILED, "", "", task.label, "the grader ended without a result")
+        final = not said.startswith("undecided")
+        score = int(said.removeprefix("undecided "))
+        task.into.mkdir()
+        values = report(score, final=final)
+        for name in ("report.json", "feedback.json"):
+            (task.into / name).write_text(json.dumps(values), encoding="utf-8")
+        gradescope = {"score": score, "output": "done", "extra_data": {}}
+        (task.into / "gradescope.json").write_text(json.dumps(gradescope), encoding="utf-8")
+        state = State.GRADED if final else State.UNDECIDED
+        key = task.conditions.key(submission.digest)
+        return Standing(state, key, submission.digest, task.label, score=float(score), max_score=10.0)
+
+
+def hand_in(folder, **scores):
+    """Write a submission for each name; what it holds is what the fake scheduler gives it."""
+    for name, score in scores.items():
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        (folder / name / "score.py").write_text(str(score), encoding="utf-8")
+    return folder
+
+
+def course(source, results, **changes):
+    """Return what to grade."""
+    return replace(Course((source,), results, grading=GRADING), **changes)
+
+
+def grade(wanted, scheduler=None, watcher=None):
+    """Grade a class with the fake scheduler, or another one."""
+    from grader.classroom.class_run import grade_class
+
+    return grade_class(wanted, watcher or SilentWatcher(), lambda line: None, scheduler or FakeScheduler())
+
+
+def scores(graded):
+    """Return name -> final score of a class."""
+    return {row.name: row.adjusted.score for row in graded.book.rows}
+
+
+POINTS = Fraction

@@ -1,0 +1,117 @@
+"""What stands in for a cluster: a client whose workers answer as they are told, and tasks to send there."""
+
+from types import SimpleNamespace
+
+from grader.classroom import store as kept
+from grader.classroom.cache_key import Conditions
+from grader.classroom.local import Task
+from grader.classroom.messages import Answer, Errand, Fitness, pack, unpack
+from grader.classroom.store import Standing, State
+
+CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "auto", "auto")
+ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
+
+
+def task(folder, name="ada", **changes):
+    """Return a task for a submission that lies in `folder/name` and holds one program."""
+    place = folder / name
+    place.mkdir(exist_ok=True)
+    (place / "velocity_publisher.py").write_text("pass\n", encoding="utf-8")
+    fields = {
+        "name": name,
+        "label": name,
+        "submission": place,
+        "into": folder / f"{name} result",
+        "exercises": ("velocity_publisher",),
+        "rubrics": (),
+        "odom_bag": None,
+        "conditions": CONDITIONS,
+        "workers": 2,
+        "standalone": False,
+        "deadline_s": 60.0,
+    }
+    return Task(**{**fields, **changes})
+
+
+def graded(name="ada", machine=f"worker {ONE} on lab", score=3.0, key=None):
+    """Return an answer with a result."""
+    key = CONDITIONS.key("sha256:2") if key is None else key
+    standing = Standing(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
+    return Answer(machine, kept.dump(standing), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
+
+
+class FakeFuture:
+    """An answer that is there at once, unless nobody would take the submission."""
+
+    def __init__(self, key, status, value):
+        self.key, self.status, self._value = key, status, value
+
+    def add_done_callback(self, call):
+        if self.status != "pending":
+            call(self)
+
+    def result(self):
+        return self._value
+
+    def exception(self):
+        return self._value
+
+    def release(self):
+        """Do nothing."""
+
+
+class FakeClient:
+    """A cluster: `answers` is called with name and allowed workers, and returns what becomes of a submission."""
+
+    def __init__(self, answers=None, threads=None, versions=None, fitness=None, scheduler="0.1.0"):
+        self.answers = answers or (lambda name, only: graded(name))
+        self.threads = {ONE: 1, TWO: 1} if threads is None else threads
+        self.versions = versions or {}
+        self.fitness = fitness or {}
+        self.scheduler = scheduler
+        self.status = "running"
+        self.sent, self.cancelled, self.keys = [], [], []
+        self.handler = None
+
+    def nthreads(self):
+        if self.status != "running":
+            raise OSError("gone")
+        return self.threads
+
+    def run_on_scheduler(self, function, argument):
+        if isinstance(self.scheduler, Exception):
+            raise self.scheduler
+        return self.scheduler
+
+    def run(self, function, argument, *, workers, on_error):
+        assert on_error == "return"
+        if function.__name__ == "version":
+            return {w: self.versions.get(w, "0.1.0") for w in workers}
+        found = {w: self.fitness.get(w, Fitness(f"worker {w} on lab")) for w in workers}
+        return {w: pack(fit) if isinstance(fit, Fitness) else fit for w, fit in found.items()}
+
+    def submit(self, function, version, terms, errand, topic, *, key, pure, workers):
+        assert pure is False
+        assert key not in self.keys
+        self.keys.append(key)
+        name = unpack(errand.data if isinstance(errand, SimpleNamespace) else errand, Errand).name
+        self.sent.append(name)
+        said = self.answers(name, workers)
+        if isinstance(said, Answer):
+            return FakeFuture(key, "finished", pack(said))
+        if isinstance(said, Exception):
+            return FakeFuture(key, "error", said)
+        return FakeFuture(key, said, None)
+
+    def scatter(self, data, **options):
+        assert options == {"hash": False}
+        return SimpleNamespace(data=data)
+
+    def cancel(self, futures, *, force):
+        self.cancelled += futures
+
+    def subscribe_topic(self, topic, handler):
+        self.handler = handler
+
+    def unsubscribe_topic(self, topic):
+        self.handler = None

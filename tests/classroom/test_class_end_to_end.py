@@ -1,0 +1,93 @@
+"""Real nodes of a real class: graded, killed on the way, finished by the same command."""
+
+import csv
+import io
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.ros
+SUBMISSIONS = Path(__file__).resolve().parent.parent / "submissions"
+ONE = ("--exercise", "velocity_publisher", "--jobs", "1")
+GRADE = (sys.executable, "-c", "from grader.cli.main import main; main()")
+CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo": "broken/syntax_error"}
+
+
+@pytest.fixture
+def class_(tmp_path):
+    """Return a folder of three submissions and one that is none."""
+    for name, source in CLASS.items():
+        shutil.copytree(SUBMISSIONS / source, tmp_path / "class" / name)
+    (tmp_path / "class" / "dan").mkdir()
+    return tmp_path / "class"
+
+
+def run(*arguments):
+    """Run the command, and return it with what it printed."""
+    return subprocess.run([*GRADE, "batch", *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+def points(results):
+    """Return name -> score of a gradebook."""
+    rows = csv.DictReader(io.StringIO((results / "gradebook.csv").read_text(encoding="utf-8"), newline=""))
+    return {row["submission"]: row["score"] for row in rows}
+
+
+def test_a_killed_class_is_finished_by_the_same_command(class_, tmp_path):
+    """What was done is not run again, the scores are those of an undisturbed run, and no process is left."""
+    results = tmp_path / "out"
+    first = subprocess.Popen(
+        [*GRADE, "batch", class_, "-o", results, *ONE], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    assert first.stderr.readline() == "to grade: 4\n"
+    assert first.stderr.readline().startswith("[1/4] ada: 30/30")
+    first.kill()
+    first.communicate()
+    before = (results / "students" / "ada" / "result.json").stat().st_mtime_ns
+
+    second = run(class_, "-o", results, *ONE)
+    assert "to grade: 3, done before: 1" in second.stderr
+    assert (results / "students" / "ada" / "result.json").stat().st_mtime_ns == before
+    assert second.returncode == 1, second.stderr  # one submission cannot be used
+
+    undisturbed = tmp_path / "other"
+    run(class_, "-o", undisturbed, *ONE)
+    assert points(results) == points(undisturbed) == {"ada": "30", "bob": "20", "cleo": "0", "dan": ""}
+    assert "to grade: 0, done before: 4" in run(class_, "-o", results, *ONE).stderr
+
+
+def test_results_are_whole(class_, tmp_path):
+    """Report, page, evidence and what Gradescope takes; the page shares its scripts with the class."""
+    results = tmp_path / "out"
+    shutil.rmtree(class_ / "dan")
+    done = run(class_, "-o", results, *ONE, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["counts"]["graded"] == 3
+    for name in CLASS:
+        place = results / "students" / name
+        assert {p.name for p in place.iterdir()} == {
+            "report.json", "report.html", "feedback.json", "feedback.html", "gradescope.json", "evidence", "result.json"
+        }  # fmt: skip
+        page = (place / "report.html").read_text(encoding="utf-8")
+        script = page.split('src="../../')[1].split('"')[0]
+        assert (results / script).is_file()
+    again = subprocess.run([*GRADE, "rejudge", results / "students"], capture_output=True, text=True, check=False)
+    assert "judged: 3" in again.stdout, again.stderr
+
+
+def test_a_download_is_graded_where_a_student_hides_modules(class_, tmp_path):
+    """The command is given in a folder with a `json.py`: it is not imported."""
+    (tmp_path / "json.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
+    (tmp_path / "grader.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
+    archive = shutil.make_archive(str(tmp_path / "hw"), "zip", class_)
+    command = [Path(sys.executable).with_name("grade"), "batch", "hw.zip", "-o", "out", *ONE]
+    assert archive.endswith("hw.zip")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert points(tmp_path / "out")["ada"] == "30"
+    report = json.loads((tmp_path / "out" / "students" / "ada" / "report.json").read_text(encoding="utf-8"))
+    assert report["submission"]["path"] == "out/unpacked/hw.zip/ada"

@@ -1,0 +1,217 @@
+"""A class from end to end, without running anybody's code: what is graded, what is kept, what is written."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
+
+from grader.app.seeds import SeedKey
+from grader.classroom.gradebook import Status
+from grader.classroom.store import SEED_KEY, State, Store, open_store
+from grader.core.errors import ClassError, HarnessError
+
+
+def regraded(tmp_path, **changes):
+    """Grade the class in `in` again, and return the names of those who were graded."""
+    scheduler = FakeScheduler()
+    graded = grade(course(tmp_path / "in", tmp_path / "out", **changes), scheduler)
+    return scheduler.graded, graded
+
+
+def test_everybody_is_graded_once(tmp_path):
+    """The same command grades nobody again, and says how all stand."""
+    hand_in(tmp_path / "in", ada=10, bob=7)
+    names, graded = regraded(tmp_path)
+    assert names == ["ada", "bob"]
+    assert scores(graded) == {"ada": 10, "bob": 7}
+    names, graded = regraded(tmp_path)
+    assert (names, graded.kept_before) == ([], 2)
+    assert scores(graded) == {"ada": 10, "bob": 7}
+
+
+def test_what_was_handed_in_anew_is_graded(tmp_path):
+    """Only that; who left the class is named, and the result stays."""
+    hand_in(tmp_path / "in", ada=10, bob=7)
+    regraded(tmp_path)
+    hand_in(tmp_path / "in", bob=9, eve=1)
+    assert regraded(tmp_path)[0] == ["bob", "eve"]
+    (tmp_path / "in" / "eve" / "score.py").unlink()
+    (tmp_path / "in" / "eve").rmdir()
+    _, graded = regraded(tmp_path)
+    assert graded.book.foreign == ("eve",)
+    assert (tmp_path / "out" / "students" / "eve" / "report.json").exists()
+
+
+@pytest.mark.parametrize("change", [{"grading": "seed"}, {"grading": "clock"}, {"grading": "exercises"}])
+def test_other_conditions_are_other_results(tmp_path, change):
+    """The seed, the clock and the rubrics are part of the key."""
+    hand_in(tmp_path / "in", ada=10)
+    regraded(tmp_path)
+    others = {"seed": 5, "clock": "wall", "exercises": ("odom_subscriber",)}
+    other = replace(GRADING, **{change["grading"]: others[change["grading"]]})
+    assert regraded(tmp_path, grading=other)[0] == ["ada"]
+
+
+def test_a_stopped_run_goes_on(tmp_path):
+    """What was done is not done again, and nothing is missing in the end."""
+    hand_in(tmp_path / "in", ada=10, bob=7, cleo=5, dan=3)
+    with pytest.raises(KeyboardInterrupt):
+        grade(course(tmp_path / "in", tmp_path / "out"), FakeScheduler(stop_after=2))
+    names, graded = regraded(tmp_path)
+    assert names == ["cleo", "dan"]
+    assert scores(graded) == {"ada": 10, "bob": 7, "cleo": 5, "dan": 3}
+
+
+def test_a_stopped_rerun_goes_on_too(tmp_path):
+    """Everybody is graded again once, not from the beginning after each stop; the next rerun is a new one."""
+    hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
+    regraded(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        grade(course(tmp_path / "in", tmp_path / "out", rerun="all"), FakeScheduler(stop_after=1))
+    assert regraded(tmp_path, rerun="all")[0] == ["bob", "cleo"]
+    assert regraded(tmp_path, rerun="all")[0] == ["ada", "bob", "cleo"]
+
+
+def test_a_failure_is_tried_again_and_is_never_a_mark(tmp_path):
+    """Nothing is known of the score, and the same command tries once more."""
+    hand_in(tmp_path / "in", ada="failed")
+    _, graded = regraded(tmp_path)
+    assert graded.book.rows[0].status is Status.FAILED
+    assert graded.book.rows[0].adjusted.score is None
+    assert regraded(tmp_path)[0] == ["ada"]
+
+
+@pytest.mark.parametrize("later", ["failed", "undecided 6"])
+def test_a_good_result_is_never_replaced_by_a_fault_of_ours(tmp_path, later):
+    """Also not where the files changed: the old result stays, and the row says that it is old."""
+    hand_in(tmp_path / "in", ada=10)
+    regraded(tmp_path)
+    hand_in(tmp_path / "in", ada=later)
+    names, graded = regraded(tmp_path)
+    assert (names, graded.not_replaced) == (["ada"], ("ada",))
+    assert scores(graded) == {"ada": 10}
+    assert graded.book.rows[0].outdated
+    assert regraded(tmp_path)[0] == ["ada"]
+    hand_in(tmp_path / "in", ada=4)
+    graded = regraded(tmp_path)[1]
+    assert (scores(graded), graded.book.rows[0].problem) == ({"ada": 4}, "")
+
+
+def test_rerun_chooses(tmp_path):
+    """Failed ones, undecided ones, or all."""
+    hand_in(tmp_path / "in", ada=10, bob="undecided 6")
+    (tmp_path / "in" / "eve").mkdir()
+    regraded(tmp_path)
+    assert regraded(tmp_path)[0] == []
+    assert regraded(tmp_path, rerun="undecided")[0] == ["bob"]
+    assert regraded(tmp_path, rerun="failed")[0] == ["eve"]
+    assert regraded(tmp_path, rerun="all")[0] == ["ada", "bob", "eve"]
+
+
+def test_what_is_undecided_has_no_final_score(tmp_path):
+    """The points so far are shown as raw ones only."""
+    hand_in(tmp_path / "in", bob="undecided 6")
+    row = regraded(tmp_path)[1].book.rows[0]
+    assert (row.status, row.adjusted.score, row.report["score"]) == (Status.UNDECIDED, None, 6)
+
+
+def test_the_class_is_written_for_programs_and_for_spreadsheets(tmp_path):
+    """batch.json and gradebook.csv name everybody."""
+    hand_in(tmp_path / "in", ada=10, bob="failed")
+    regraded(tmp_path)
+    written = json.loads((tmp_path / "out" / "batch.json").read_text(encoding="utf-8"))
+    assert [(s["name"], s["status"]) for s in written["students"]] == [("ada", "graded"), ("bob", "failed")]
+    lines = (tmp_path / "out" / "gradebook.csv").read_text(encoding="utf-8").splitlines()
+    assert [line.split(",")[0] for line in lines] == ["submission", "ada", "bob"]
+
+
+def test_results_have_one_writer(tmp_path):
+    """A second command on the same folder ends at once."""
+    hand_in(tmp_path / "in", ada=10)
+    with open_store(tmp_path / "out"), pytest.raises(ClassError, match="another process grades into this folder"):
+        regraded(tmp_path)
+
+
+def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path, monkeypatch):
+    """The others would fail too; the same command goes on when there is room again."""
+    hand_in(tmp_path / "in", ada=10, bob="failed", cleo=5)
+    free = Store.free_bytes
+    monkeypatch.setattr(Store, "free_bytes", property(lambda self: 0))
+    with pytest.raises(HarnessError, match="found the disk full"):
+        regraded(tmp_path)
+    monkeypatch.setattr(Store, "free_bytes", free)
+    names, graded = regraded(tmp_path)
+    assert names == ["bob", "cleo"]
+    assert scores(graded) == {"ada": 10, "bob": None, "cleo": 5}
+
+
+def test_a_decision_about_nobody_ends_the_run_before_it_begins(tmp_path):
+    """The message names the line and the nearest name."""
+    hand_in(tmp_path / "in", ada=10)
+    (tmp_path / "adjust.yaml").write_text("students:\n  adda: {days_late: 1}\n", encoding="utf-8")
+    with pytest.raises(ClassError, match=r"adjust\.yaml:2:3: expected a submission or a person") as error:
+        regraded(tmp_path, adjustments=tmp_path / "adjust.yaml")
+    assert error.value.hint == "did you mean `ada`?"
+    assert not (tmp_path / "out" / "students" / "ada").exists()
+
+
+def test_results_survive_in_every_state(tmp_path):
+    """What is written is read back."""
+    hand_in(tmp_path / "in", ada=10, bob="undecided 6", cleo="failed")
+    (tmp_path / "in" / "eve").mkdir()
+    regraded(tmp_path)
+    store = Store(tmp_path / "out")
+    states = [store.kept(name).result.state for name in ("ada", "bob", "cleo", "eve")]
+    assert states == [State.GRADED, State.UNDECIDED, State.FAILED, State.REFUSED]
+
+
+def seeds(scheduler):
+    """Return the seed that each submission was graded with."""
+    return {name: task.conditions.seed for name, task in scheduler.tasks.items()}
+
+
+def test_a_class_keeps_a_key_of_its_own(tmp_path):
+    """Everybody gets a seed that nobody can predict, the same again when graded again."""
+    hand_in(tmp_path / "in", ada=10, bob=7)
+    first, again, elsewhere = FakeScheduler(), FakeScheduler(), FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out"), first)
+    grade(course(tmp_path / "in", tmp_path / "out", rerun="all"), again)
+    grade(course(tmp_path / "in", tmp_path / "other"), elsewhere)
+    assert len(set(seeds(first).values())) == 2
+    assert seeds(again) == seeds(first)
+    assert set(seeds(elsewhere).values()).isdisjoint(seeds(first).values())
+    key = tmp_path / "out" / SEED_KEY
+    assert key.stat().st_mode & 0o777 == 0o600
+
+
+def test_the_key_of_a_class_is_in_nothing_else_that_it_leaves(tmp_path):
+    """Results are handed on: pages, tables, reports."""
+    hand_in(tmp_path / "in", ada=10)
+    scheduler = FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out"), scheduler)
+    key = (tmp_path / "out" / SEED_KEY).read_bytes().strip()
+    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file() and path.name != SEED_KEY]
+    assert files
+    assert [path for path in files if key in path.read_bytes()] == []
+    assert key.decode() not in repr(scheduler.tasks)
+
+
+def test_another_key_is_another_result(tmp_path):
+    """One that is named is not kept; a changed one grades everybody again."""
+    hand_in(tmp_path / "in", ada=10)
+    regraded(tmp_path, seed_key=SeedKey(b"one key of 16 bytes"))
+    assert not (tmp_path / "out" / SEED_KEY).exists()
+    assert regraded(tmp_path, seed_key=SeedKey(b"one key of 16 bytes"))[0] == []
+    assert regraded(tmp_path, seed_key=SeedKey(b"two key of 16 bytes"))[0] == ["ada"]
+    assert regraded(tmp_path)[0] == ["ada"]
+    assert regraded(tmp_path)[0] == []
+
+
+def test_a_seed_for_everybody_needs_no_key(tmp_path):
+    """And none is made."""
+    hand_in(tmp_path / "in", ada=10)
+    scheduler = FakeScheduler()
+    grade(course(tmp_path / "in", tmp_path / "out", grading=replace(GRADING, seed=5)), scheduler)
+    assert seeds(scheduler) == {"ada": 5}
+    assert not (tmp_path / "out" / SEED_KEY).exists()

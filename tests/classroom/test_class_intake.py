@@ -1,0 +1,353 @@
+"""Which submissions are found in folders and downloads, what they are called, and what is named instead of dropped."""
+
+import io
+import os
+import re
+import stat
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from grader.classroom.downloads import AUTO
+from grader.classroom.intake import take_in
+from grader.core.errors import ClassError
+
+PY = b"print('hello')\n"
+
+
+def put(folder, *names):
+    """Write a file for each name."""
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(PY)
+    return folder
+
+
+def zipped(path, files, links=()):
+    """Write a zip of name -> content."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in files.items():
+            info = zipfile.ZipInfo("x")
+            info.filename = name
+            info.external_attr = (stat.S_IFLNK if name in links else stat.S_IFREG | 0o644) << 16
+            archive.writestr(info, content)
+    return path
+
+
+def packed(files):
+    """Return a zip as bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def found(tmp_path, *sources, **how):
+    return take_in(sources, tmp_path / "out", **how)
+
+
+def names(intake):
+    return [entry.name for entry in intake.entries]
+
+
+def contents(entry):
+    """Return the files of an entry that is a folder."""
+    return sorted(p.relative_to(entry.path).as_posix() for p in entry.path.rglob("*") if p.is_file())
+
+
+def test_folders_and_archives_are_submissions(tmp_path):
+    """One a student; what is neither is named, and what systems leave there is not."""
+    class_ = put(tmp_path / "class", "ada/a.py", "Bob Ross/b.py", "notes.txt", ".git/x", "__MACOSX/y", ".DS_Store")
+    zipped(class_ / "cleo.tar.gz", {"c.py": PY})
+    intake = found(tmp_path, class_)
+    assert names(intake) == ["ada", "bob-ross", "cleo"]
+    assert [entry.label for entry in intake.entries] == ["ada", "Bob Ross", "cleo"]
+    assert intake.layouts == ((str(class_), "folders"),)
+    assert [stray.rpartition("/")[2] for stray in intake.strays] == [
+        ".git: its name begins with a dot, so it is not graded",
+        "notes.txt: neither a folder nor an archive",
+    ]
+
+
+HIDDEN = (".ada/a.py", ".bob.zip", "venv/c.py", "dan/d.py", "eve/e.py")
+
+
+def test_what_is_passed_over_for_its_name_is_named(tmp_path):
+    """A student may be called like that; folder or archive, nothing disappears without a word."""
+    intake = found(tmp_path, put(tmp_path / "class", *HIDDEN))
+    assert names(intake) == ["dan", "eve"]
+    assert [stray.rpartition("/")[2].partition(":")[0] for stray in intake.strays] == [".ada", ".bob.zip", "venv"]
+
+
+def test_what_is_passed_over_in_a_download_is_named(tmp_path):
+    """Once for each folder, also when the download was unpacked before; not what a system has put there."""
+    further = (".ada/b.py", "__MACOSX/dan/._d.py", ".DS_Store", "._eve")
+    files = {f"hw/{name}": PY for name in (*HIDDEN, *further)}
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert names(intake) == ["dan", "eve"]
+    assert sorted(re.search("([^/: ]+): its name", stray)[1] for stray in intake.strays) == [".ada", ".bob.zip", "venv"]
+    assert found(tmp_path, tmp_path / "hw.zip") == intake
+
+
+def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path):
+    """Neither at first nor when the command is given again."""
+    class_ = put(tmp_path / "class", "ada/a.py", "out/students/ada/x.py")
+    assert names(take_in([class_], class_ / "out")) == ["ada"]
+
+
+def test_a_link_is_not_followed(tmp_path):
+    """It may lead to somebody else's work."""
+    class_ = put(tmp_path / "class", "ada/a.py")
+    (class_ / "bob").symlink_to(class_ / "ada")
+    intake = found(tmp_path, class_)
+    assert names(intake) == ["ada"]
+    assert intake.strays[0].endswith("bob: a link, which is not followed")
+
+
+@pytest.mark.parametrize("order", [("Ada", "ada"), ("ada", "Ada")])
+def test_names_that_become_the_same_are_told_apart_whatever_the_order(tmp_path, order):
+    """Each name follows from the submission alone."""
+    class_ = put(tmp_path / "class", *(f"{name}/a.py" for name in order))
+    assert {e.label: e.name for e in found(tmp_path, class_).entries} == {"Ada": "ada-2e5fcc", "ada": "ada-64df89"}
+
+
+def test_several_sources_are_one_class(tmp_path):
+    """Submissions of the same name in two of them stay two."""
+    one, other = put(tmp_path / "one", "ada/a.py", "bob/b.py"), put(tmp_path / "other", "ada/a.py")
+    assert len(set(names(found(tmp_path, one, other)))) == 3
+
+
+def test_downloads_of_one_name_are_not_mixed_up(tmp_path):
+    """Each is unpacked into a place of its own."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    one = zipped(tmp_path / "a" / "hw.zip", {"ada/a.py": PY, "bob/b.py": PY})
+    other = zipped(tmp_path / "b" / "hw.zip", {"ada/a.py": b"other", "cleo/b.py": PY})
+    intake = found(tmp_path, one, other)
+    assert len(intake.entries) == 4
+    assert {(e.path / "a.py").read_bytes() for e in intake.entries if e.label == "ada"} == {PY, b"other"}
+
+
+@pytest.mark.parametrize("ending", ["", "_"])
+def test_moodle_with_folders(tmp_path, ending):
+    """A student's file and text belong together; the number is the participant's."""
+    archive = zipped(
+        tmp_path / "course-hw-12.zip",
+        {
+            f"Ada Lovelace_657693_assignsubmission_file{ending}/velocity_publisher.py": PY,
+            f"Ada Lovelace_657693_assignsubmission_onlinetext{ending}/onlinetext.html": b"<p>hi",
+            f"Bob O'Neil_657694_assignsubmission_file{ending}/hw.zip": packed({"velocity_publisher.py": PY}),
+        },
+    )
+    intake = found(tmp_path, archive)
+    assert intake.layouts[0][1] == "moodle"
+    assert [dict(e.identity) for e in intake.entries] == [
+        {"name": "Ada Lovelace", "id": "657693"},
+        {"name": "Bob O'Neil", "id": "657694"},
+    ]
+    assert names(intake) == ["ada-lovelace-657693", "bob-o-neil-657694"]
+    assert contents(intake.entries[0]) == ["onlinetext.html", "velocity_publisher.py"]
+
+
+def test_moodle_without_folders(tmp_path):
+    """Files of one student get their own names back."""
+    prefix = "Ada Lovelace_657693_assignsubmission_file_"
+    files = {
+        f"{prefix}fan_controller.py": PY,
+        f"{prefix}temperature_sensor.py": PY,
+        "Bob_1_assignsubmission_file_x.py": PY,
+    }
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert [contents(entry) for entry in intake.entries] == [["fan_controller.py", "temperature_sensor.py"], ["x.py"]]
+
+
+def test_canvas(tmp_path):
+    """Files get their own names back, also those that were handed in again, and lateness is noted."""
+    files = {
+        "lovelaceada_1001_77001_velocity_publisher-2.py": PY,
+        "lovelaceada_1001_77002_odom_subscriber.py": PY,
+        "rossbob_LATE_1002_77003_hw.zip": packed({"velocity_publisher.py": PY}),
+    }
+    intake = found(tmp_path, zipped(tmp_path / "submissions.zip", files))
+    assert intake.layouts[0][1] == "canvas"
+    ada, bob = intake.entries
+    assert (dict(ada.identity), ada.late) == ({"name": "lovelaceada", "id": "1001"}, False)
+    assert contents(ada) == ["odom_subscriber.py", "velocity_publisher.py"]
+    assert (dict(bob.identity), bob.late, contents(bob)) == ({"name": "rossbob", "id": "1002"}, True, ["hw.zip"])
+
+
+def test_clones_of_github_classroom(tmp_path):
+    """The folder says what comes before the user's name, which may hold hyphens."""
+    clones = put(tmp_path / "hw-1-submissions", "hw-1-ada/a.py", "hw-1-bob-ross/b.py")
+    intake = found(tmp_path, clones)
+    assert intake.layouts[0][1] == "github-classroom"
+    assert [dict(entry.identity) for entry in intake.entries] == [{"user": "ada"}, {"user": "bob-ross"}]
+
+
+def test_clones_of_classroom50(tmp_path):
+    """What all names have in common comes before the user's name; the table of scores is no submission."""
+    clones = put(tmp_path / "ros_submissions_2026", "ros-hw-ada/a.py", "ros-hw-bob-ross/b.py", "scores.csv")
+    intake = found(tmp_path, clones, layout="classroom50")
+    assert [entry.identity["user"] for entry in intake.entries] == ["ada", "bob-ross"]
+    assert len(intake.strays) == 1
+
+
+def test_a_pattern_of_ones_own(tmp_path):
+    """Names that do not match are graded all the same, and say so."""
+    class_ = put(tmp_path / "class", "1234 - Ada/a.py", "readme/x.py")
+    intake = found(tmp_path, class_, pattern=r"(?P<id>\d+) - (?P<name>.+)")
+    assert [(dict(e.identity), e.recognised) for e in intake.entries] == [
+        ({"id": "1234", "name": "Ada"}, True),
+        ({}, False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "text"),
+    [
+        ("(?P<name>", "--pattern, column 1: expected a regular expression, found (?P<name>: missing )"),
+        ("(?P<nmae>.*)", "found the group nmae"),
+        (".*", "found no named group"),
+    ],
+)
+def test_a_pattern_that_cannot_be_used(tmp_path, pattern, text):
+    """The message says what is wrong with it."""
+    with pytest.raises(ClassError) as error:
+        found(tmp_path, put(tmp_path / "class", "ada/a.py"), pattern=pattern)
+    assert text in error.value.message
+
+
+def test_a_folder_around_everything_is_opened(tmp_path):
+    """Many tools pack a folder and not what is in it."""
+    archive = zipped(tmp_path / "hw.zip", {"hw/ada/a.py": PY, "hw/bob.zip": packed({"b.py": PY})})
+    assert names(found(tmp_path, archive)) == ["ada", "bob"]
+
+
+def test_a_class_of_one_is_not_opened(tmp_path):
+    """The only folder is a student's."""
+    assert names(found(tmp_path, zipped(tmp_path / "hw.zip", {"ada/a.py": PY, "ada/pkg/b.py": PY}))) == ["ada"]
+
+
+@pytest.mark.parametrize("compression", ["", "gz", "bz2", "xz"])
+def test_a_tar_is_a_download(tmp_path, compression):
+    """Compressed or not, with and without a leading dot."""
+    path = tmp_path / "hw.tar"
+    with tarfile.open(path, f"w:{compression}") as archive:
+        for name in ("./ada/a.py", "bob/b.py"):
+            info = tarfile.TarInfo(name)
+            info.size = len(PY)
+            archive.addfile(info, io.BytesIO(PY))
+    assert names(found(tmp_path, path)) == ["ada", "bob"]
+
+
+@pytest.mark.parametrize(
+    ("bad", "text"),
+    [
+        ("ada/../../../evil.py", "a name that leads out of the archive"),
+        ("ada/x\\..\\y.py", "a name that leads out of the archive"),
+        ("ada/y\n.py", "a control character"),
+        ("ada/link", "a link"),
+        ("ada/con.py", "Windows keeps for a device"),
+    ],
+)
+def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path, bad, text):
+    """That submission is listed with the reason; nothing of it is written."""
+    archive = zipped(
+        tmp_path / "hw.zip", {"ada/a.py": PY, bad: b"/etc/passwd", "bob/b.py": PY}, links=[bad] if "link" in bad else []
+    )
+    ada, bob = found(tmp_path, archive).entries
+    assert text in ada.problem
+    assert not ada.path.exists()
+    assert (bob.problem, contents(bob)) == ("", ["b.py"])
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path):
+    """Also where the whole class lies in one folder of the download."""
+    files = {"hw/": b"", "hw/ada/../../evil.py": PY, "hw/bob/b.py": PY, "hw/cleo/c.py": PY, "hw/scores.csv": b""}
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert [(e.name, bool(e.problem)) for e in intake.entries] == [("ada", True), ("bob", False), ("cleo", False)]
+    assert len(intake.strays) == 1
+    again = found(tmp_path, tmp_path / "hw.zip")
+    assert again == intake
+
+
+def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path, monkeypatch):
+    """A part of the work would get a part of the marks."""
+    monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
+    files = {"lovelaceada_1_2_a.py": PY, "lovelaceada_1_3_b.bin": b"x" * 5000, "rossbob_2_4_a.py": PY}
+    ada, bob = found(tmp_path, zipped(tmp_path / "hw.zip", files)).entries
+    assert ("MiB a file" in ada.problem, bob.problem) == (True, "")
+
+
+def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path):
+    """It is not waited for, and the others go on."""
+    class_ = put(tmp_path / "class", "Bob_2_assignsubmission_file/b.py")
+    for kind in ("file", "onlinetext"):
+        put(class_, f"Ada_1_assignsubmission_{kind}/{kind}.py")
+    os.mkfifo(class_ / "Ada_1_assignsubmission_file" / "pipe")
+    ada, bob = found(tmp_path, class_).entries
+    assert (bool(ada.problem), bob.problem) == (True, "")
+
+
+@pytest.mark.parametrize("bad", ["/etc/evil.py", "../evil.py", "C:/evil.py"])
+def test_a_member_of_nobody_is_named(tmp_path, bad):
+    """It is not written anywhere."""
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", {bad: PY, "bob/b.py": PY, "cleo/c.py": PY}))
+    assert names(intake) == ["bob", "cleo"]
+    assert len(intake.strays) == 1
+    assert "evil.py" in intake.strays[0]
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_one_student_cannot_fill_the_disk(tmp_path, monkeypatch):
+    """What is too large is refused by itself, counted while it is unpacked."""
+    monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
+    archive = zipped(tmp_path / "hw.zip", {"ada/a.bin": b"\0" * 5000, "bob/b.py": PY})
+    ada, bob = found(tmp_path, archive).entries
+    assert "MiB a file" in ada.problem
+    assert bob.problem == ""
+
+
+def test_a_download_is_unpacked_once_and_again_when_it_changed(tmp_path):
+    """The same bytes are the same folder; another download replaces it as a whole."""
+    archive = zipped(tmp_path / "hw.zip", {"ada/a.py": PY, "bob/b.py": PY})
+    first = found(tmp_path, archive).entries[0].path
+    (first / "mark").touch()
+    assert (found(tmp_path, archive).entries[0].path / "mark").exists()
+    zipped(archive, {"ada/a.py": b"new", "bob/b.py": PY})
+    again = found(tmp_path, archive).entries[0].path
+    assert (again, contents(found(tmp_path, archive).entries[0])) == (first, ["a.py"])
+    assert (again / "a.py").read_bytes() == b"new"
+
+
+def test_refusals_are_remembered(tmp_path):
+    """Also where the download is not unpacked again."""
+    archive = zipped(tmp_path / "hw.zip", {"ada/con.py": PY, "bob/b.py": PY})
+    first = found(tmp_path, archive)
+    assert [e.problem for e in found(tmp_path, archive).entries] == [e.problem for e in first.entries]
+    assert first.entries[0].problem
+
+
+@pytest.mark.parametrize("make", [lambda p: p.mkdir(), lambda p: p.write_bytes(b"PK\x03\x04 no zip"), lambda p: None])
+def test_a_source_without_submissions_cannot_be_used(tmp_path, make):
+    """An empty folder, a damaged download, a path that is not there."""
+    source = tmp_path / "source"
+    make(source)
+    with pytest.raises(ClassError, match="source"):
+        found(tmp_path, source, layout=AUTO)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names that are no text exist on Linux only")
+def test_a_name_that_is_no_text_is_safe(tmp_path):
+    """Undecodable bytes, controls and what reorders text do not reach the name of a result."""
+    class_ = put(tmp_path / "class", "bob/b.py")
+    for raw in (b"ad\xffa", b"\xe2\x80\xaeevil", b"x\ny", b"a" * 200):
+        put(class_, Path(class_ / raw.decode("utf-8", "surrogateescape")).name + "/a.py")
+    found_names = names(found(tmp_path, class_))
+    assert len(set(found_names)) == 5
+    assert all(name.isprintable() and len(name.encode()) <= 90 and "/" not in name for name in found_names)

@@ -1,0 +1,138 @@
+"""One process for each submission: whatever becomes of it, the others and the class go on."""
+
+import json
+import sys
+import threading
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from grader.classroom.cache_key import Conditions
+from grader.classroom.local import LocalScheduler, Task
+from grader.classroom.store import Standing, State, dump
+
+CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
+DONE = json.loads(dump(Standing(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
+
+#: What stands in for the grader: does as the label of its task says.
+PROGRAM = f"""
+import json, os, sys, time
+task = json.loads(sys.stdin.readline())["task"]
+print(json.dumps({{"step": "grading"}}), flush=True)
+done = json.dumps({{"done": {DONE!r}}})
+if task["label"] == "crashes":
+    os.abort()
+if task["label"] == "exits":
+    sys.exit(7)
+if task["label"] == "hangs":
+    time.sleep(600)
+if task["label"] == "talks nonsense":
+    print("\\x00 not JSON")
+    print("[1, 2]")
+    print("[" * 100000)
+    print(json.dumps({{"done": {{"state": "graded"}}}}))
+    sys.exit(0)
+if task["label"] == "lingers":
+    print(done, flush=True)
+    os.close(1)
+    sys.exit(0)
+print("noise")
+print(done)
+"""
+
+
+def task(tmp_path, label, deadline_s=600.0):
+    return Task(label, label, tmp_path, tmp_path / label, (), (), None, CONDITIONS, 1, False, deadline_s)
+
+
+def scheduler(jobs=2):
+    return LocalScheduler(jobs, (sys.executable, "-c", PROGRAM))
+
+
+def graded(tasks, jobs=2, hear=lambda name, step: None):
+    return {a.task.name: a.standing for a in scheduler(jobs).run(tasks, hear)}
+
+
+def test_one_disaster_touches_nobody_else(tmp_path):
+    """A crash, an exit, nonsense: each is a failure of ours, and the others have their results."""
+    labels = ("fine", "crashes", "exits", "talks nonsense", "lingers", "fine too")
+    found = graded([task(tmp_path, label) for label in labels])
+    assert {label: s.state.value for label, s in found.items()} == {
+        "fine": "graded",
+        "crashes": "failed",
+        "exits": "failed",
+        "talks nonsense": "failed",
+        "lingers": "graded",
+        "fine too": "graded",
+    }
+    assert found["exits"].problem == "the grader ended without a result (exit code 7)"
+
+
+def test_what_does_not_end_is_given_up(tmp_path):
+    """After its deadline; nothing is left of it."""
+    found = graded([task(tmp_path, "hangs", deadline_s=0.2)])
+    assert found["hangs"].problem.startswith("the grader was not done after")
+    assert found["hangs"].state is State.FAILED
+
+
+def test_whoever_listens_hears_what_is_running(tmp_path):
+    """By name and step."""
+    heard = []
+    graded([task(tmp_path, "fine")], hear=lambda name, step: heard.append((name, step)))
+    assert heard == [("fine", "starting"), ("fine", "grading")]
+
+
+def test_giving_up_leaves_no_process(tmp_path):
+    """Closing the iterator, as Ctrl-C does, ends everything that is under way."""
+    started = threading.Event()
+    here = scheduler()
+    running = here.run(
+        [task(tmp_path, "fine"), task(tmp_path, "hangs"), task(tmp_path, "hangs")],
+        lambda name, step: started.set() if (name, step) == ("hangs", "grading") else None,
+    )
+    with closing(running):
+        next(running)
+        assert started.wait(60)
+        pids = [process.pid for process in here._running]
+    assert pids
+    assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
+
+
+def test_a_program_that_cannot_be_started_is_a_failure(tmp_path):
+    """Of ours, not of the student's."""
+    here = LocalScheduler(1, ("/nothing/there",))
+    attempt = next(here.run([task(tmp_path, "fine")], lambda name, step: None))
+    assert attempt.standing.problem == "the grader cannot be started: No such file or directory"
+
+
+@pytest.mark.parametrize("odd", ["b a", "ö", "-x"])
+def test_tasks_reach_the_process_as_they_are(tmp_path, odd):
+    """Paths with spaces, umlauts and hyphens."""
+    program = (
+        "import json,sys; t = json.loads(sys.stdin.readline())['task']; print(json.dumps({'step': t['submission']}))"
+    )
+    heard = []
+    here = LocalScheduler(1, (sys.executable, "-c", program))
+    one = Task("x", odd, tmp_path / odd, tmp_path / "into", (), (), None, CONDITIONS, 1, False, 600.0)
+    list(here.run([one], lambda name, step: heard.append(step)))
+    assert heard[-1] == str(tmp_path / odd)
+
+
+@pytest.mark.parametrize(
+    ("tier", "shares", "most"), [("landlock", True, 1), ("none", True, 3), ("bubblewrap", False, 3)]
+)
+def test_submissions_that_could_reach_each_other_go_one_at_a_time(tmp_path, monkeypatch, tier, shares, most):
+    """Where the sandbox leaves them one network; without walls it is the user's wish."""
+    isolation = SimpleNamespace(name=tier, shares_network=shares)
+    choice = SimpleNamespace(isolation=isolation, containment=())
+    monkeypatch.setattr("grader.classroom.local.find_ros", lambda: None)
+    monkeypatch.setattr("grader.classroom.local.choose_isolation", lambda wanted, ros: choice)
+    here = scheduler(jobs=3)
+    warnings = here.prepare(tier)
+    together = []
+    tasks = [task(tmp_path, f"fine {n}") for n in range(6)]
+    assert len(list(here.run(tasks, lambda name, step: together.append(len(here._running))))) == 6
+    assert [len(warnings), here._jobs] == [int(most == 1), most]
+    assert max(together) <= most

@@ -1,0 +1,135 @@
+"""Whose submission it is: rosters of every platform, and everybody for whom that is not clear."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.classroom.intake import Entry, safe_name
+from grader.classroom.roster import match, read_roster
+from grader.core.errors import ClassError
+
+CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
+    Points Possible,,,,,100
+"Lovelace, Ada",1001,S1,ada,A,
+"Ross, Bob",1002,S2,bob,A,
+"Student, Test",9999,,x,A,
+"""
+MOODLE = """Identifier;Full name;Email address;Status;Grade
+Participant 657693;Ada Lovelace;ada@x.edu;Submitted;
+Participant 657694;Bob Ross;bob@x.edu;Submitted;
+"""
+CLASSROOM50 = """username,first_name,last_name,email,section,github_id
+ada,Ada,Lovelace,ada@x.edu,A,1
+bob-ross,Bob,Ross,bob@x.edu,A,2
+ross,Rossella,Verdi,rv@x.edu,A,3
+"""
+GITHUB = '"identifier","github_username","github_id","name"\n"ada@x.edu","ada","1",""\n"bob@x.edu","","",""\n'
+
+
+def roster(tmp_path, text, encoding="utf-8"):
+    (tmp_path / "roster.csv").write_bytes(text.encode(encoding))
+    return read_roster(tmp_path / "roster.csv")
+
+
+def entry(label, **identity):
+    return Entry(safe_name(label), label, Path(label), identity)
+
+
+def who(matching):
+    return {name: person.name for name, person in matching.people.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [(CANVAS, "utf-8"), (CANVAS, "utf-8-sig"), (MOODLE, "utf-16"), (CLASSROOM50.replace(",", "\t"), "utf-8")],
+)
+def test_rosters_are_read_as_platforms_write_them(tmp_path, text, encoding):
+    """Whatever is between the cells and in front of the text; made-up students and rows of points are nobody."""
+    people = roster(tmp_path, text, encoding)
+    assert [person.name for person in people][:2] == ["Ada Lovelace", "Bob Ross"]
+    assert len(people) == (3 if "Verdi" in text else 2)
+
+
+def test_github_classroom_knows_people_by_what_the_course_calls_them(tmp_path):
+    """Who has not accepted yet has no user name."""
+    people = roster(tmp_path, GITHUB)
+    assert [(p.name, p.user) for p in people] == [("ada@x.edu", "ada"), ("bob@x.edu", "")]
+
+
+def test_canvas_entries_go_by_number(tmp_path):
+    """And by the name without spaces where there is no number of Canvas."""
+    people = roster(tmp_path, CANVAS)
+    found = match([entry("x", name="lovelaceada", id="1001"), entry("y", name="rossbob", id="0")], people)
+    assert who(found) == {"x": "Ada Lovelace", "y": "Bob Ross"}
+
+
+def test_moodle_entries_go_by_participant(tmp_path):
+    """The download has the number alone, the worksheet a word before it."""
+    found = match([entry("x", name="Somebody", id="657694")], roster(tmp_path, MOODLE))
+    assert who(found) == {"x": "Bob Ross"}
+    assert [person.name for person in found.missing] == ["Ada Lovelace"]
+
+
+def test_clones_go_by_user(tmp_path):
+    """Also where the layout does not know the prefix: the longest user name at the end counts."""
+    people = roster(tmp_path, CLASSROOM50)
+    found = match([entry("ros-hw-ada", user="ada"), entry("ros-hw-bob-ross")], people)
+    assert who(found) == {"ros-hw-ada": "Ada Lovelace", "ros-hw-bob-ross": "Bob Ross"}
+
+
+@pytest.mark.parametrize("label", ["ada@x.edu", "ADA", "Ada Lovelace", "lovelace ada", "Adá Lovelace"])
+def test_folders_go_by_whatever_they_are_called(tmp_path, label):
+    """An address, a user name or a name."""
+    assert who(match([entry(label)], roster(tmp_path, CLASSROOM50))) == {safe_name(label): "Ada Lovelace"}
+
+
+def test_nobody_is_chosen_where_several_could_be_meant(tmp_path):
+    """The entry is listed, and nobody counts as missing because of it."""
+    people = roster(tmp_path, "name,email\nAda Lovelace,a@x\nAda Lovelace,b@x\nBob,c@x\n")
+    found = match([entry("Ada Lovelace"), entry("zoe")], people)
+    assert (found.ambiguous, found.unmatched) == (("ada-lovelace",), ("zoe",))
+    assert [person.name for person in found.missing] == ["Bob"]
+
+
+def test_two_submissions_of_one_person_are_listed(tmp_path):
+    """Both are graded; neither is chosen."""
+    found = match([entry("ada"), entry("ada@x.edu")], roster(tmp_path, CLASSROOM50))
+    assert found.duplicates == (("ada", "ada@x.edu"),)
+
+
+def test_without_a_roster_everybody_is_who_the_submission_says():
+    """A folder and an archive of one name are of one student."""
+    found = match(
+        [Entry("ada-1", "ada", Path("ada")), Entry("ada-2", "Ada", Path("ada.zip")), entry("b", name="Bo")], None
+    )
+    assert found.duplicates == (("ada-1", "ada-2"),)
+    assert found.people["b"].name == "Bo"
+    assert found.unmatched == ()
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (b"", "expected a header and rows"),
+        (b"foo,bar\n1,2\n", "roster.csv:1: expected a column name"),
+        (b"name\n\xff\xff\xff", "expected UTF-8"),
+        (b'name\n"' + b"x" * 200_000 + b'"\n', "expected CSV"),
+    ],
+)
+def test_a_roster_that_cannot_be_used(tmp_path, data, text):
+    """The message says what was expected."""
+    (tmp_path / "roster.csv").write_bytes(data)
+    with pytest.raises(ClassError) as error:
+        read_roster(tmp_path / "roster.csv")
+    assert text in error.value.message
+
+
+@pytest.mark.parametrize("text", ["", ".", "..", "/", "con", "a/b", "\x00", "\u202e", "-rf", "x" * 500, "李雷"])
+def test_a_safe_name_is_one_part_of_a_path(text):
+    """Whatever it is made from."""
+    name = safe_name(text)
+    assert name
+    assert not set(name) & set("/\\\0\n")
+    assert name[0] not in ".-"
+    assert len(name.encode()) <= 90
+    assert safe_name(text) == name

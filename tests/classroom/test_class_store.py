@@ -1,0 +1,131 @@
+"""The folder for results: whole or not at all, whenever a run is stopped."""
+
+import contextlib
+import os
+
+import pytest
+
+from grader.classroom.store import Standing, State, Store, dump, load, open_store
+from grader.core.errors import HarnessError
+
+
+def standing(state=State.GRADED, score=1.0, key="k"):
+    return Standing(state, key, "sha256:1", "ada", score=score, max_score=10.0)
+
+
+def commit(store, new, name="ada", text="report"):
+    """Commit a result with one file."""
+    fresh = store.fresh(name)
+    fresh.mkdir()
+    (fresh / "report.json").write_text(text, encoding="utf-8")
+    return store.commit(name, fresh, new)
+
+
+def leftovers(store):
+    return [path.name for path in (store.folder / "students").iterdir() if path.name.startswith(".")]
+
+
+def test_a_new_result_takes_the_place_of_the_old_one(tmp_path):
+    """Nothing of the old one stays."""
+    with open_store(tmp_path) as store:
+        assert commit(store, standing(score=1.0), text="old")
+        assert commit(store, standing(score=2.0), text="new")
+        assert store.kept("ada").result.score == 2.0
+        assert (store.place("ada") / "report.json").read_text(encoding="utf-8") == "new"
+        assert leftovers(store) == []
+
+
+@pytest.mark.parametrize("step", range(1, 12))
+def test_whenever_a_replacement_stops_one_of_both_results_is_there(tmp_path, monkeypatch, step):
+    """The machine stops at the n-th change of the disk; the next run finds the old result or the new one, whole."""
+    with open_store(tmp_path) as store:
+        commit(store, standing(score=1.0), text="old")
+        calls = [0]
+
+        def stopping(function):
+            def wrapped(*arguments, **named):
+                calls[0] += 1
+                if calls[0] == step:
+                    raise KeyboardInterrupt
+                return function(*arguments, **named)
+
+            return wrapped
+
+        with monkeypatch.context() as patched:
+            for owner, name in ((os, "rename"), (os, "replace"), (os, "fsync"), (os, "rmdir"), (os, "unlink")):
+                patched.setattr(owner, name, stopping(getattr(owner, name)))
+            with contextlib.suppress(KeyboardInterrupt):
+                commit(store, standing(score=2.0), text="new")
+    with open_store(tmp_path) as store:
+        found = (store.kept("ada").result.score, (store.place("ada") / "report.json").read_text(encoding="utf-8"))
+        assert found in [(1.0, "old"), (2.0, "new")]
+        assert leftovers(store) == []
+
+
+def test_an_unfinished_result_is_none(tmp_path):
+    """What a killed run left behind is removed, and the submission has no result."""
+    with open_store(tmp_path) as store:
+        fresh = store.fresh("ada")
+        fresh.mkdir()
+        (fresh / "report.json").write_text("half", encoding="utf-8")
+    with open_store(tmp_path) as store:
+        assert (store.names(), leftovers(store)) == ([], [])
+        assert store.kept("ada").result is None
+
+
+def test_a_stopped_run_tidies_up(tmp_path):
+    """What was being written is gone at once, not only when the command is given again."""
+
+    def stopped():
+        with open_store(tmp_path) as store:
+            store.fresh("ada").mkdir()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert leftovers(Store(tmp_path)) == []
+
+
+def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path):
+    """The result stays, what was tried last is known."""
+    with open_store(tmp_path) as store:
+        commit(store, standing(score=5.0))
+        assert not commit(store, standing(State.FAILED))
+        kept = store.kept("ada")
+        assert (kept.result.score, kept.attempt.state, kept.last.state) == (5.0, State.FAILED, State.FAILED)
+        assert commit(store, standing(score=6.0))
+        assert store.kept("ada").attempt is None
+
+
+def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path, monkeypatch):
+    """A full disk is the machine's fault, and says that the same command goes on."""
+    with open_store(tmp_path) as store:
+        commit(store, standing(score=5.0), text="old")
+
+        def full(*arguments):
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "fsync", full)
+            with pytest.raises(HarnessError, match="No space left on device") as error:
+                commit(store, standing(score=6.0), text="new")
+        assert "the same command goes on" in error.value.hint
+        assert store.kept("ada").result.score == 5.0
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"[]", b'{"schema": "grader/batch-result/v1"}', b"\xff", b"[" * 5000])
+def test_a_damaged_standing_is_none(data):
+    """The submission is then graded again."""
+    assert load(data) is None
+
+
+def test_a_standing_survives_names_that_are_no_text():
+    """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
+    odd = Standing(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
+    assert load(dump(odd)).state is State.REFUSED
+
+
+def test_a_standing_of_another_version_is_none():
+    """It is not guessed at."""
+    assert load(dump(standing())) == standing()
+    assert load(dump(standing()).replace(b"batch-result/v1", b"batch-result/v2")) is None

@@ -1,0 +1,92 @@
+"""A class of which everybody has a variant: whose it is, the roster says, and nobody is graded by another's."""
+
+from dataclasses import replace
+
+import pytest
+from class_samples import GRADING, FakeScheduler, course, grade, hand_in
+
+from grader.app.variants import by_key
+from grader.classroom import worker
+from grader.classroom.cache_key import Conditions
+from grader.classroom.local import Task
+from grader.classroom.store import State
+from grader.core.errors import ClassError, HarnessError, VariantError
+from grader.core.exercise import Drawn
+from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.loader import read_rubric
+
+ROSTER = (
+    "name,username,email,id number\nAda,ada,ada@x.edu,17\nBob,bob,bob@x.edu,\nEve,eve,eve@x.edu,18\nEve 2,eve,,19\n"
+)
+
+
+@pytest.fixture
+def class_(tmp_path):
+    """Return what grades a class by a rubric with a variant; the scheduler beside it remembers the tasks."""
+    hand_in(tmp_path / "in", ada=10, bob=4, eve=5)
+    (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    (tmp_path / "course.key").write_text("a course key of enough bytes\n", encoding="utf-8")
+    text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
+    text = text.replace("\nscenarios:", "\nvariants:\n  rate: {between: [5 Hz, 500 Hz], step: 1 Hz}\nscenarios:", 1)
+    (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
+
+    def run(*, key="course.key", roster="roster.csv"):
+        scheduler = FakeScheduler()
+        grading = replace(GRADING, rubrics=(tmp_path / "r.yaml",), variant_key=tmp_path / key if key else None)
+        wanted = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / roster if roster else None)
+        return grade(replace(wanted, grading=grading), scheduler), scheduler
+
+    return run
+
+
+def test_everybody_is_graded_by_their_own_values(class_, tmp_path):
+    """By the number, else the user name; the values are those of the task sheet, and in the key of the result."""
+    _, scheduler = class_()
+    found = {name: task.conditions for name, task in scheduler.tasks.items()}
+    assert {name: conditions.variants.student for name, conditions in found.items()} == {"ada": "17", "bob": "bob"}
+    sheet = read_rubric(tmp_path / "r.yaml", draw=by_key(tmp_path / "course.key", "17"))
+    assert found["ada"].variants == Drawn("17", {"velocity_publisher": dict(sheet.variant.values)})
+    assert found["ada"].rubrics == (("velocity_publisher", sheet.digest),)
+    assert found["ada"].rubrics != found["bob"].rubrics
+
+
+def test_whose_variant_is_not_clear_is_not_graded(class_):
+    """That is no mark; the row says what to mend."""
+    graded, _ = class_()
+    eve = next(row for row in graded.book.rows if row.name == "eve")
+    assert (eve.status.value, eve.adjusted.score) == ("refused", None)
+    assert "nobody on the roster goes with it for sure" in eve.problem
+
+
+def test_results_stay_until_the_values_change(class_, tmp_path):
+    """The same command grades nothing again; another course key means other values."""
+    class_()
+    assert class_()[0].graded == 0
+    (tmp_path / "course.key").write_text("another course key of enough bytes\n", encoding="utf-8")
+    assert class_()[0].graded == 2
+
+
+def test_without_key_or_roster_nothing_is_graded(class_):
+    """The message says which of the two is missing."""
+    with pytest.raises(VariantError, match="--variant-key: expected the course key"):
+        class_(key="")
+    with pytest.raises(ClassError, match="--roster: expected the people of the class"):
+        class_(roster="")
+
+
+def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path, monkeypatch):
+    """So that it can be anywhere; the line that repeats the run names student and key."""
+    heard = []
+
+    def refuse(request, progress, hear):
+        heard.append(request)
+        raise HarnessError("enough")
+
+    monkeypatch.setattr(worker, "grade", refuse)
+    own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
+    conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
+    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
+    standing = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
+    (request,) = heard
+    assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)
+    assert standing.state is State.FAILED

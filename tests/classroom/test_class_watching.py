@@ -1,0 +1,54 @@
+"""What is shown while a class is graded: count, rate, time left, what is running; never control characters."""
+
+import pytest
+
+from grader.classroom.store import Standing, State
+from grader.classroom.watching import Pace, PlainWatcher, clock_time, outcome_words
+
+
+class Clock:
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def standing(state=State.GRADED, problem=""):
+    return Standing(state, "", "", "x", problem, score=87.5, max_score=100.0, duration_s=2.06)
+
+
+def test_each_one_is_a_line_with_rate_and_time_left():
+    """The rate is that of this run, what was done before does not count."""
+    clock, lines = Clock(), []
+    watcher = PlainWatcher(lines.append, clock)
+    watcher.begin(60, 7)
+    for name in ("ada", "bob", "cleo"):
+        watcher.step(name, "grading")
+    clock.now = 30.0
+    watcher.done("ada", standing())
+    watcher.done("bob", standing(State.FAILED, "the \x1b[31mgrader"))
+    assert lines == [
+        "to grade: 60, done before: 7",
+        "[ 1/60] ada: 87.5/100 in 2.1 s (2.0/min, 29:30 left; running: bob, cleo)",
+        "[ 2/60] bob: failed: the \\x1b[31mgrader in 2.1 s (4.0/min, 14:30 left; running: cleo)",
+    ]
+
+
+def test_many_that_run_are_counted():
+    """A line stays a line on a machine with many processors."""
+    pace = Pace(Clock())
+    pace.begin(9)
+    pace.running.update(dict.fromkeys("abcdefg", ""))
+    assert pace.words() == "0.0/min, ? left; running: a, b, c, d and 3 more"
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0, "0:00"), (59.6, "1:00"), (3599, "59:59"), (3661, "1:01:01")])
+def test_time_is_written_as_a_clock_does(seconds, text):
+    """Hours only where there are any."""
+    assert clock_time(seconds) == text
+
+
+def test_undecided_is_no_score():
+    """The points so far, and that they are not final."""
+    assert outcome_words(standing(State.UNDECIDED)) == "87.5/100, undecided"

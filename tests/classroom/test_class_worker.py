@@ -1,0 +1,92 @@
+"""What grading one submission comes to in its process: whose fault it is decides, and nothing of ours is a mark."""
+
+import dataclasses
+from fractions import Fraction
+
+import pytest
+
+from grader.classroom import worker
+from grader.classroom.cache_key import Conditions
+from grader.classroom.local import Task
+from grader.classroom.store import State
+from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
+from grader.core.exercise import Feedback, Outcome, Shows
+from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
+from grader.core.trace import ClockKind
+
+CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
+
+
+def attempt(tmp_path, monkeypatch, error):
+    """Return what an attempt comes to in which grading ends with an error."""
+
+    def grade(request, progress, hear):
+        raise error
+
+    monkeypatch.setattr(worker, "grade", grade)
+    into = tmp_path / f"into {len(list(tmp_path.iterdir()))}"
+    task = Task("x", "label", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0)
+    return worker.attempt(task, lambda step: None)
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "problem"),
+    [
+        (SubmissionError("x: expected a .py file", "add one"), State.REFUSED, "x: expected a .py file"),
+        (HarnessError("worker: gone", "again"), State.FAILED, "worker: gone"),
+        (EnvironmentFault("no ROS"), State.FAILED, "no ROS"),
+        (OSError(28, "No space left on device"), State.FAILED, "the result cannot be written: No space left on device"),
+        (ZeroDivisionError("ours"), State.FAILED, "the grader failed: ZeroDivisionError: ours"),
+        (RecursionError("deep"), State.FAILED, "the grader failed: RecursionError: deep"),
+        (MemoryError(), State.FAILED, "the grader failed: MemoryError: "),
+    ],
+)
+def test_an_error_is_told_by_who_must_act(tmp_path, monkeypatch, error, state, problem):
+    """Only what is wrong with the submission itself refuses it and has a key; all else is tried again."""
+    standing = attempt(tmp_path, monkeypatch, error)
+    assert (standing.state, standing.problem) == (state, problem)
+    assert bool(standing.key) == (state is State.REFUSED)
+    assert standing.usage["peak_bytes"] > 1 << 20
+
+
+def test_the_same_reason_to_refuse_has_the_same_key(tmp_path, monkeypatch):
+    """A submission that cannot be used is looked at again only when something changed."""
+    one = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
+    same = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
+    other = attempt(tmp_path, monkeypatch, SubmissionError("x: found two"))
+    assert one.key == same.key != other.key
+
+
+def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path, monkeypatch):
+    """Where only exercises count of which there is a file, the others do not make it look changed."""
+    rubrics = (("a", "sha256:1"), ("e", "sha256:2"))
+    every = Conditions("0", rubrics, "sha256:9", None, "auto", "auto", every=True)
+    verdict = Verdict("b", "B", Outcome.MET, Fraction(2), Fraction(2), "fine")
+    exercise = ExerciseReport("e", "1", "E", True, ClockKind.VIRTUAL, "", (verdict,))
+    environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
+    digest = "sha256:" + "0" * 64
+    given = Reproduction(rubrics=rubrics[1:])
+    report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, every, 1, False, 60.0)
+    assert worker.attempt(task, lambda step: None).key == every.key(digest)
+    changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: changed)
+    task = dataclasses.replace(task, into=tmp_path / "again")
+    assert worker.attempt(task, lambda step: None).key != every.key(digest)
+
+
+def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path, monkeypatch):
+    """The instructor's files show everything; the student's keep back what the rubric withholds."""
+    secret = Verdict("b", "B", Outcome.NOT_MET, Fraction(0), Fraction(2), "hushhush")
+    exercise = ExerciseReport(
+        "e", "1", "E", True, ClockKind.VIRTUAL, "", (secret,), feedback={"b": Feedback(Shows.OUTCOME, "9999-12-31")}
+    )
+    environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
+    report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    into = tmp_path / "into"
+    worker.attempt(Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0), lambda step: None)
+    found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}
+    assert found == {worker.REPORT, worker.PAGE}
+    assert {path.name for path in into.iterdir()} == set(worker.PARTS) - {worker.EVIDENCE}

@@ -1,0 +1,69 @@
+"""Before a cluster is used: what is missing is said at once, with what to do."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from grader.classroom.cluster import worker_pool
+from grader.classroom.cluster.dispatcher import address_of, connected
+from grader.cli.main import app
+from grader.core.errors import EnvironmentFault
+
+
+def test_without_the_library_nothing_begins(tmp_path, monkeypatch):
+    """Exit code 2 and what to install, before the class is looked at."""
+    monkeypatch.setattr(worker_pool, "find_spec", lambda name: None)
+    done = CliRunner().invoke(
+        app, ["batch", str(tmp_path / "none"), "-o", str(tmp_path / "o"), "--scheduler", "tcp://x:1"]
+    )
+    assert done.exit_code == 2
+    assert done.stderr.splitlines() == [
+        "error: --scheduler: expected the package distributed, found none",
+        "hint: pip install 'rclpy-grader[dask]'",
+    ]
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:9"])
+def test_a_scheduler_that_does_not_answer_is_waited_for_a_while(address):
+    """Then it is named."""
+    with (
+        pytest.raises(EnvironmentFault, match=f"--scheduler {address}: expected a Dask scheduler, found none") as error,
+        connected(address, None, lambda line: None, patience_s=0.2),
+    ):
+        pass
+    assert "dask scheduler" in error.value.hint
+
+
+def test_an_address_of_no_known_kind_is_refused():
+    """With the kinds that there are."""
+    with pytest.raises(EnvironmentFault, match="unknown address scheme"), connected("foo://x:1", None, print):
+        pass
+
+
+def test_encryption_needs_certificates():
+    """They are asked for before anybody is called."""
+    with (
+        pytest.raises(EnvironmentFault, match="expected certificates in Dask's configuration, found none"),
+        connected("tls://127.0.0.1:9", None, print),
+    ):
+        pass
+
+
+def test_a_scheduler_file_holds_the_address(tmp_path):
+    """As `dask scheduler --scheduler-file` writes it."""
+    path = tmp_path / "scheduler.json"
+    path.write_text(json.dumps({"address": "tcp://10.0.0.1:8786", "workers": {}}), encoding="utf-8")
+    assert address_of(str(path)) == "tcp://10.0.0.1:8786"
+    assert address_of("tls://h:1") == "tls://h:1"
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", "{}", "[" * 100_000])
+def test_another_file_is_refused(tmp_path, content):
+    """One that is not there, too: nobody waits for it to appear."""
+    path = tmp_path / "scheduler.json"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    with pytest.raises(EnvironmentFault, match=r"--scheduler .*scheduler\.json: expected"):
+        address_of(str(path))

@@ -1,0 +1,116 @@
+"""`grade batch --similarity`: what it adds to the results of a class, and what it leaves as it was."""
+
+import json
+from pathlib import Path
+
+import copies
+import pytest
+from class_samples import FakeScheduler, course, grade, hand_in, scores
+from click.testing import CliRunner
+
+from grader.cli.main import app
+from grader.similarity import library
+
+CORRECT = Path(__file__).resolve().parent.parent / "submissions" / "correct"
+
+
+@pytest.fixture
+def source(tmp_path):
+    """Return a class of three; one took from another and changed all names."""
+    text = (CORRECT / "odom_csv" / "odom_subscriber.py").read_text(encoding="utf-8")
+    other = (CORRECT / "odom_json" / "odom_subscriber.py").read_text(encoding="utf-8")
+    folder = hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
+    for name, program in {"ada": text, "bob": copies.renamed(text, 1), "cleo": other}.items():
+        (folder / name / "odom_subscriber.py").write_text(program, encoding="utf-8")
+    return folder
+
+
+def compared(source, **changes):
+    """Grade the class and compare it; return the class, and the names of those who were graded."""
+    scheduler = FakeScheduler()
+    graded = grade(course(source, source.parent / "out", **{"given": (), **changes}), scheduler)
+    return graded, scheduler.graded
+
+
+def test_it_is_added_to_results_that_are_there(source):
+    """Nobody is graded again, no score changes, and the page of the class leads to what was found."""
+    before = grade(course(source, source.parent / "out"))
+    graded, names = compared(source)
+    out = source.parent / "out"
+    assert names == []
+    assert scores(graded) == scores(before)
+    assert graded.remarks == ("similar submissions: 1 pair",)
+    assert 'href="similarity/index.html">Similar submissions (1 pair)<' in (out / "index.html").read_text()
+    assert "ada" in (out / "similarity" / "pair-001.html").read_text()
+    assert (out / "similarity.csv").read_text().count("\n") == 2
+    assert "similar submissions: 1 pair" in json.loads((out / "batch.json").read_text())["remarks"]
+    assert out / "similarity" / "index.html" in graded.files
+
+
+def test_a_later_run_without_it_keeps_the_pages(source):
+    """They are said to be of an earlier run."""
+    compared(source)
+    graded = grade(course(source, source.parent / "out"))
+    assert [link.note for link in graded.links] == ["of an earlier run"]
+
+
+def test_a_run_that_was_stopped_goes_on_and_compares(source):
+    """All are compared in the end, also those of the first part."""
+    with pytest.raises(KeyboardInterrupt):
+        grade(course(source, source.parent / "out", given=()), FakeScheduler(stop_after=1))
+    graded, names = compared(source)
+    assert names == ["bob", "cleo"]
+    assert graded.remarks == ("similar submissions: 1 pair",)
+
+
+def test_pages_of_pairs_that_are_none_any_more_go(source):
+    """A submission was handed in anew."""
+    compared(source)
+    (source / "bob" / "odom_subscriber.py").write_text("x = 1\n")
+    graded, _ = compared(source)
+    assert graded.remarks == ("similar submissions: 0 pairs",)
+    assert [path.name for path in (source.parent / "out" / "similarity").iterdir()] == ["index.html"]
+
+
+def test_a_submission_that_cannot_be_used_stops_nothing(source):
+    """It is named on the page."""
+    (source / "dan.zip").write_bytes(b"PK\3\4 no archive")
+    graded, _ = compared(source)
+    assert graded.remarks == ("similar submissions: 1 pair",)
+    assert "it cannot be read" in (source.parent / "out" / "similarity" / "index.html").read_text()
+
+
+def test_people_of_the_same_name_are_told_apart(source):
+    """By the names of their submissions; all others are called by their own."""
+    roster = source.parent / "roster.csv"
+    roster.write_text("name,folder\nAda,ada\nAda,bob\nCleo,cleo\n", encoding="utf-8")
+    compared(source, roster=roster)
+    page = (source.parent / "out" / "similarity" / "pair-001.html").read_text(encoding="utf-8")
+    assert "<title>Pair 1: Ada (ada) and Ada (bob)</title>" in page
+
+
+def test_without_the_library_nothing_begins(source, monkeypatch):
+    """Exit code 2 and what to install, before anybody is graded."""
+    monkeypatch.setattr(library, "find_spec", lambda name: None)
+    done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), "--similarity"])
+    assert done.exit_code == 2
+    assert done.stderr.splitlines() == [
+        "error: --similarity: expected the package copydetect, found none",
+        "hint: pip install 'rclpy-grader[similarity]'",
+    ]
+    assert not (source.parent / "o").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--template", "x"], "--template needs --similarity"),
+        (["--similarity", "--template", "x"], "x: expected a folder with the Python files"),
+    ],
+)
+def test_a_template_that_cannot_be_used_is_told_first(source, options, said):
+    """Before anybody is graded."""
+    done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), *options])
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not (source.parent / "o").exists()

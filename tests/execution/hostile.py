@@ -1,0 +1,111 @@
+"""Programs that do harm, recorded for real: what tests of limits and of the trusted side share."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+from grader.core.limits import Limits
+from grader.core.trace import Trace
+from grader.execution.plan import Plan
+from grader.execution.recording_session import Studio
+from grader.execution.supervisor import Job
+
+MS = 1_000_000
+
+#: The beginning of every program: a right velocity publisher, which does its harm beside its work.
+PUBLISHER = """
+import os, socket, sys, threading, time
+import rclpy
+from rclpy.node import Node
+from geometry_msgs.msg import Twist
+
+
+class Publisher(Node):
+    def __init__(self):
+        super().__init__("velocity_publisher")
+        self.publisher = self.create_publisher(Twist, "/cmd_vel", 10)
+        self.timer = self.create_timer(0.05, self.tick)
+        self.count = 0
+        self.harm()
+
+    def tick(self):
+        message = Twist()
+        message.linear.x = 0.5
+        message.angular.z = 0.1
+        self.publisher.publish(message)
+        self.count += 1
+        self.later()
+
+    def harm(self):
+        pass
+
+    def later(self):
+        pass
+
+
+def main(kind=Publisher):
+    rclpy.init()
+    rclpy.spin(kind())
+"""
+
+
+def hostile(harm: str = "", later: str = "", before: str = "") -> str:
+    """Return a right publisher that does harm when it is made, at every tick, or before everything else."""
+    return "\n".join(
+        (
+            textwrap.dedent(before),
+            PUBLISHER,
+            "class Hostile(Publisher):",
+            "    def harm(self):",
+            textwrap.indent(textwrap.dedent(harm) or "pass", " " * 8),
+            "    def later(self):",
+            textwrap.indent(textwrap.dedent(later) or "pass", " " * 8),
+            "main(Hostile)",
+        )
+    )
+
+
+def staging(studio: Studio) -> Studio:
+    """Have a studio copy what is recorded into its own folder, because workers see no other."""
+    each = studio.recorder.each
+
+    def each_staged(jobs, progress):
+        root = Path(tempfile.mkdtemp(dir=studio.folder))
+        for number, job in enumerate(jobs):
+            shutil.copytree(job.plan.root, root / str(number))
+        root.chmod(0o755)
+        yield from each(
+            [replace(j, plan=replace(j.plan, root=str(root / str(n)))) for n, j in enumerate(jobs)], progress
+        )
+
+    studio.recorder.each = each_staged
+    return studio
+
+
+def record(studio: Studio, folder: Path, *programs: str, limits: Limits | None = None, **fields: object) -> Trace:
+    """Record programs together for ten seconds, on the virtual clock unless another is named."""
+    folder.mkdir(exist_ok=True)
+    folder.chmod(0o755)
+    names = [f"{letter}.py" for letter, _ in zip("abc", programs, strict=False)]
+    for name, program in zip(names, programs, strict=True):
+        (folder / name).write_text(program, encoding="utf-8")
+        (folder / name).chmod(0o644)
+    usual = {
+        "scenario": "alone",
+        "processes": tuple((name, name) for name in names),
+        "root": str(folder),
+        "host_seed": "ab" * 32,
+        "duration_ns": 10_000 * MS,
+        "first_message_on": "",
+        "wait_at_most_ns": 60_000 * MS,
+        "numbers": (),
+        "recordings": (),
+        "clock": "virtual",
+        "limits": limits or Limits(),
+    }
+    plan = Plan(**{**usual, **fields})
+    return studio.recorder.record([Job("hostile", plan)], lambda step: None)[0]

@@ -1,0 +1,191 @@
+"""Runs small programs inside the tiers of isolation, as the recording does: a worker, and a student inside it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import grader
+from grader.core.errors import EnvironmentFault
+from grader.execution.ros_installation import RosInstallation
+from grader.execution.sandbox.bubblewrap import Bubblewrap
+from grader.execution.sandbox.environment import runtime_environment
+from grader.execution.sandbox.exposure import closed_folders, view_of, worker_view
+from grader.execution.sandbox.flat import FlatBubblewrap
+from grader.execution.sandbox.landlock import Landlock
+from grader.execution.sandbox.protocol import Command, Isolation, Limits, StudentProcess
+from grader.execution.sandbox.tiers import isolation_from_name
+
+HOST = Path(grader.__file__).resolve().parent / "student_host"
+USER = 1000
+
+# The worker of these tests: starts the student's command that the test prepared, and ends as it ends.
+RELAY = """
+import json, subprocess, sys
+command = json.loads(sys.argv[1])
+student = subprocess.run(command["argv"], env=command["environment"], pass_fds=command["pass_fds"])
+sys.exit(student.returncode)
+"""
+
+
+@dataclass(frozen=True)
+class Sandbox:
+    """A tier, with what starts its worker as another user where the tests run as root."""
+
+    isolation: Isolation
+    ros: RosInstallation
+    submission: Path
+    start_as: tuple[str, ...] = ()
+
+    def student(
+        self, code: str, *, limits: Limits | None = None, pass_fds: tuple[int, ...] = (), **variables: str
+    ) -> Command:
+        """Return the command of a student's process that runs some code."""
+        process = StudentProcess(
+            runtime=self.ros.runtime,
+            host_folder=HOST,
+            submission=self.submission,
+            arguments=("-s", "-u", "-c", code),
+            environment={"ROS_DOMAIN_ID": "71", **variables},
+            pass_fds=pass_fds,
+        )
+        return self.isolation.student_command(process, limits or Limits())
+
+    def around(self, student: Command, **variables: str) -> Command:
+        """Return the command of a worker that runs a student's command and ends as that ends."""
+        told = {"argv": student.argv, "environment": dict(student.environment), "pass_fds": student.pass_fds}
+        argv = (sys.executable, "-I", "-S", "-c", RELAY, json.dumps(told))
+        return self.worker(argv, pass_fds=student.pass_fds, **variables)
+
+    def worker(self, argv: tuple[str, ...], *, pass_fds: tuple[int, ...] = (), **variables: str) -> Command:
+        """Return the command of a worker."""
+        environment = {**runtime_environment(self.ros.runtime), **variables}
+        view = worker_view(self.ros.runtime, self.submission)
+        command = self.isolation.worker_command(argv, environment, pass_fds, view)
+        return replace(command, argv=(*self.start_as, *command.argv))
+
+    def run(self, code: str, **options: object) -> subprocess.CompletedProcess[str]:
+        """Run some code as a student and return how it ended."""
+        student = self.student(code, **options)
+        try:
+            return finish(self.around(student, GITHUB_TOKEN="canary-in-the-worker"))
+        finally:
+            close(student)
+
+
+@contextlib.contextmanager
+def start(command: Command) -> Iterator[subprocess.Popen[str]]:
+    """Start a command as the grader does, and end it whatever happens."""
+    with subprocess.Popen(
+        command.argv,
+        env=dict(command.environment),
+        pass_fds=command.pass_fds,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def finish(command: Command) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    with start(command) as process:
+        out, err = process.communicate(timeout=60)
+        process.wait()
+    return subprocess.CompletedProcess(command.argv, process.returncode, out, err)
+
+
+def close(command: Command) -> None:
+    """Free what the isolation opened for a start."""
+    for descriptor in command.opened_fds:
+        os.close(descriptor)
+
+
+def walls(name: str, ros: RosInstallation, submission: Path) -> Sandbox | str:
+    """Return the sandbox of a tier, or why this machine and user cannot have it.
+
+    `landlock` and `bubblewrap-flat` are there twice: with `-user` behind the name as an ordinary user has them.
+    """
+    as_user = os.geteuid() == 0 and (name.endswith("-user") or name == "bubblewrap")
+    try:
+        isolation = _isolation(name.removesuffix("-user"), as_user=as_user)
+    except EnvironmentFault as fault:
+        return fault.message
+    if not as_user:
+        return Sandbox(isolation, ros, submission)
+    start_as = user_start(ros)
+    return unreachable(start_as, ros) or Sandbox(isolation, ros, submission, start_as)
+
+
+def _isolation(name: str, *, as_user: bool) -> Isolation:
+    if not as_user:
+        return isolation_from_name(name)
+    if name == "landlock":
+        return Landlock(as_root=False)
+    outer = replace(Bubblewrap.here(), as_root=False)
+    return FlatBubblewrap(outer) if name == "bubblewrap-flat" else outer
+
+
+def user_start(ros: RosInstallation) -> tuple[str, ...]:
+    """Return what starts a program as an ordinary user, who sees the interpreter even where root's home holds it."""
+    # Through env, since setpriv itself still finds programs with root's eyes.
+    start = ("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "env")
+    return (*opened_start(ros), *start)
+
+
+def opened_start(ros: RosInstallation, *further: str) -> tuple[str, ...]:
+    """Return what starts a program as root with closed folders on the way to the interpreter opened.
+
+    In one process after another and not beside each other, as bubblewrap would: whoever has another user than its
+    parent does not die with it.
+    """
+    paths = view_of((*ros.runtime.read_paths, ros.runtime.executable)).bound
+    script = ""
+    for folder in reversed(closed_folders((*paths, HOST))):
+        inside = sorted({path.relative_to(folder).parts[0] for path in paths if folder in path.parents})
+        script += "mount -t tmpfs -o mode=0755 opened /mnt; "
+        script += "".join(f"mkdir /mnt/{name}; mount --rbind {folder / name} /mnt/{name}; " for name in inside)
+        script += f"mount --move /mnt {folder}; "
+    return ("unshare", "--mount", *further, "sh", "-e", "-c", f'{script} exec "$@"', "sh")
+
+
+def unreachable(start_as: tuple[str, ...], ros: RosInstallation) -> str:
+    """Return why another user cannot run the interpreter of these tests; empty if it can."""
+    if shutil.which("setpriv") is None or shutil.which("unshare") is None:
+        return "the programs of util-linux are not installed"
+    tried = subprocess.run(
+        (
+            *start_as,
+            str(ros.runtime.executable),
+            "-I",
+            "-S",
+            "-c",
+            "import sys; open(sys.argv[1])",
+            str(HOST / "launcher.py"),
+        ),
+        env={"LD_LIBRARY_PATH": ":".join(map(str, ros.runtime.library_paths))},
+        capture_output=True,
+        check=False,
+    )
+    return "" if tried.returncode == 0 else f"user {USER} cannot reach {ros.runtime.executable}"
+
+
+def make_submission() -> Path:
+    """Return a staged copy that any user may reach; the caller deletes it."""
+    folder = Path(tempfile.mkdtemp(prefix="staged-"))
+    folder.chmod(0o755)
+    (folder / "node.py").write_text("print('the node')\n", encoding="utf-8")
+    return folder

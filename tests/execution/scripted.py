@@ -1,0 +1,293 @@
+"""Student processes and an observer that act as a test says, for conductors without ROS and without processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+from grader.core.trace import Endpoint, Fault, GraphSnapshot, OutputLine
+from grader.execution.ending import ended_by
+from grader.execution.notes import Places
+from grader.execution.observer import Taken
+from grader.execution.plan import Plan, PlannedNumbers
+from grader.execution.workload import Delay
+
+#: Stands for the submission: this file is in it.
+HERE = Path(__file__).resolve().parent
+MS = 1_000_000
+EPOCH_NS = 1_767_225_600_000_000_000
+FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
+
+Program = Generator[dict[str, Any] | None, dict[str, Any] | None, Any]
+
+
+def plan(**fields: Any) -> Plan:
+    """Return a plan of one second without stimuli, but for what is given."""
+    usual = {
+        "scenario": "alone",
+        "processes": (),
+        "root": "/nowhere",
+        "host_seed": "ab" * 32,
+        "duration_ns": 1000 * MS,
+        "first_message_on": "",
+        "wait_at_most_ns": 5000 * MS,
+        "numbers": (),
+        "recordings": (),
+        "clock": "virtual",
+    }
+    return Plan(**{**usual, **fields})
+
+
+def numbers(
+    *values: tuple[float, int], topic: str = "/temperature", start_ms: int = 100, period_ms: int = 100, **other
+):
+    """Return a stimulus that publishes some numbers."""
+    usual = {"type": FLOAT, "repeats": 1}
+    return PlannedNumbers(
+        topic=topic, start_ns=start_ms * MS, period_ns=period_ms * MS, numbers=values, **{**usual, **other}
+    )
+
+
+def idle(wake_ms: float | None = None, **fields: Any) -> dict[str, Any]:
+    """Return the report of a process that has nothing to do until a time."""
+    wake_ns = None if wake_ms is None else EPOCH_NS + round(wake_ms * MS)
+    return {"kind": "idle", "wake_ns": wake_ns, **fields}
+
+
+def wait(wake_ms: float | None = None, **fields: Any) -> Program:
+    """Wait until a time or until something arrives, as hosts do when they are woken for nothing; return the answer."""
+    answer = yield idle(wake_ms, **fields)
+    while not answer.get("arrivals") and (wake_ms is None or answer["now_ns"] < EPOCH_NS + wake_ms * MS):
+        answer = yield idle(wake_ms)
+    return answer
+
+
+def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
+    """Return what a host says of an endpoint."""
+    usual = {"reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
+    return {
+        "kind": kind,
+        "name": name,
+        "type": interface,
+        **(usual if kind in ("publisher", "subscription") else {}),
+        **qos,
+    }
+
+
+class World:
+    """What the processes of a test publish and which endpoints they have; the observer looks at it."""
+
+    def __init__(self) -> None:
+        self.flying: list[Taken] = []
+        self.claims: dict[str, list[dict[str, Any]]] = {}
+
+    def publish(self, topic: str, value: float = 0.0, interface: str = FLOAT) -> None:
+        """Let a message fly; the report has to say that it was sent."""
+        self.flying.append(Taken(topic, interface, b"", {"data": value}))
+
+    def have(self, process: str, *claims: dict[str, Any]) -> list[dict[str, Any]]:
+        """Give a process its endpoints, and return them for its report."""
+        self.claims[process] = list(claims)
+        return list(claims)
+
+
+class ScriptedWorkload:
+    """Stands in for a measured process: each report says what the step before it cost."""
+
+    def __init__(self, student: ScriptedStudent, start_ns: int) -> None:
+        self._student = student
+        self.delay = Delay(start_ns)
+        self.used_ns, self.waited_ns = 1, 0
+
+    def begin(self, t_ns: int) -> None:
+        """Wake up."""
+        self.delay.wake(t_ns)
+
+    def arrived(self) -> None:
+        """Wait no longer for messages."""
+
+    def end(self, **_: object) -> None:
+        """Take what the step cost."""
+        self.delay.work(self._student.cost_ns)
+
+
+class ScriptedStudent:
+    """Stands in for a student's process: a generator that yields reports and is sent answers.
+
+    It answers by itself when it is told to wait for matches. None as a report is an end without a word.
+    """
+
+    def __init__(self, name: str, program: Callable[[ScriptedStudent, World], Program], world: World) -> None:
+        self.name = name
+        self.wake_ns: int | None = None
+        self.claims: list[dict[str, Any]] = []
+        self.arrivals: dict[str, int] = {}
+        self.told: dict[str, dict[str, list[int]]] = {}
+        self.offers: set[tuple[str, str, str]] = set()
+        self.nudged = False
+        self.ended = False
+        self.renewed = False
+        self.sees_graph = False
+        self.workload: ScriptedWorkload | None = None
+        self.unsettled = ""
+        self.notes: list[str] = []
+        self.places = Places(HERE)
+        self.start_told = None
+        self.stop_signalled = self.stopping = False
+        self.heard: list[dict[str, Any]] = []
+        self.missing: Any = []
+        self._written: list[str] = []
+        self._answer: dict[str, Any] | None = None
+        self._matching = False
+        self._program = program(self, world)
+        self._begun = False
+        self.cost_ns = 0
+
+    def write(self, text: str) -> None:
+        """Write a line; it is read with the next report."""
+        self._written.append(text)
+
+    def times_ms(self) -> list[float]:
+        """Return the times it was told, in virtual milliseconds."""
+        return [(a["now_ns"] - EPOCH_NS) / MS for a in self.heard if "now_ns" in a]
+
+    def measured(self, t_ns: int) -> ScriptedWorkload:
+        """Return what measures its steps."""
+        self.workload = self.workload or ScriptedWorkload(self, t_ns)
+        return self.workload
+
+    def claims_of(self, kind: str, name: str) -> bool:
+        """Return whether it has an endpoint of a kind and name."""
+        return any((c["kind"], c["name"]) == (kind, name) for c in self.claims)
+
+    def tell(self, answer: dict[str, Any]) -> None:
+        """Take an answer of the conductor."""
+        self._matching = "match" in answer
+        if not self._matching:
+            self._answer = answer
+        self.heard.append(answer)
+
+    def report(self) -> dict[str, Any] | None:
+        """Return the next report."""
+        if self._matching:
+            self._matching = False
+            return {"kind": "matched", "missing": self.missing}
+        answer, self._answer = self._answer, None
+        try:
+            if not self._begun:
+                self._begun = True
+                report = next(self._program)
+            else:
+                report = self._program.send(answer)
+        except StopIteration:
+            report = {"kind": "exited", "code": 0}
+        self.cost_ns = (report or {}).get("cost_ns", 0)
+        return report
+
+    def reports(self) -> list[dict[str, Any] | None]:
+        """Return what has come without waiting, for the wall clock: a report, or nothing for an empty one."""
+        self._begun = True
+        found = next(self._program, {"kind": "silent"})
+        return [] if found is not None and found.get("kind") == "silent" else [found]
+
+    def output(self, t_ns: int, *, final: bool = False) -> list[OutputLine]:
+        """Return what was written since the last time."""
+        written, self._written = self._written, []
+        return [OutputLine(t_ns, self.name, "stdout", text) for text in written]
+
+    def note(self, report: dict[str, Any]) -> None:
+        """Take a note."""
+        self.notes.append(str(report.get("code")))
+
+    def drain(self, reads: int = 1) -> None:
+        """Read what has been written: it has been."""
+
+    def death(self, t_ns: int) -> Fault:
+        """Return the fault of an end without a word."""
+        return ended_by(self.name, t_ns, "SIGKILL")
+
+
+class ScriptedObserver:
+    """Stands in for the grader's node: sees the world at once, and notes what is published."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._watched: set[tuple[str, str, bool]] = set()
+        self.published: list[tuple[str, Any]] = []
+        self.advertised: list[tuple[str, str, bool]] = []
+        self.services: Any = None
+
+    def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
+        """Return the graph of all claims."""
+        ends = [
+            Endpoint(c["kind"], c["name"], c["type"], f"/{name[:-3]}", number, "reliable", "volatile")
+            for number, (name, claims) in enumerate(self._world.claims.items())
+            for c in claims
+            if c["kind"] in ("publisher", "subscription")
+        ]
+        return GraphSnapshot(t_ns, tuple(f"/{name[:-3]}" for name in self._world.claims), tuple(ends))
+
+    def participants(self) -> int:
+        """Return how many processes have endpoints."""
+        return len(self._world.claims)
+
+    def notes(self) -> list[str]:
+        """Return what is to be said of messages: nothing."""
+        return []
+
+    def watch(self, graph: GraphSnapshot) -> list[str]:
+        """Watch every publisher."""
+        self._watched |= {(e.topic, e.type, True) for e in graph.endpoints if e.kind == "publisher"}
+        return []
+
+    def students_nodes(self) -> list[str]:
+        """Return the nodes that are claimed."""
+        return [c["name"] for claims in self._world.claims.values() for c in claims if c["kind"] == "node"]
+
+    def ends_of(self, kind: str, service: str) -> int:
+        """Return how many servers or clients of a service are claimed."""
+        claims = [c for claims in self._world.claims.values() for c in claims]
+        return sum((c["kind"], c["name"]) == (kind, service) for c in claims)
+
+    def publishes(self, topic: str) -> bool:
+        """Return whether a stimulus is published on a topic."""
+        return any(name == topic for name, _, _ in self.advertised)
+
+    def take_rest(self) -> list[Taken]:
+        """Return what still flies."""
+        return self.take()
+
+    def reads(self, topic: str) -> bool:
+        """Return whether a topic is watched."""
+        return any(name == topic for name, _, _ in self._watched)
+
+    def watching(self, topic: str, interface: str) -> list[bool]:
+        """Return the subscriptions on a topic."""
+        return [reliable for name, kind, reliable in self._watched if (name, kind) == (topic, interface)]
+
+    def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
+        """Return how many publishers are matched: all."""
+        claims = [c for claims in self._world.claims.values() for c in claims]
+        return sum((c["kind"], c["name"], c["type"]) == ("publisher", topic, interface) for c in claims)
+
+    def take(self, at_once: int = 1000) -> list[Taken]:
+        """Return what flies."""
+        taken, self._world.flying = self._world.flying, []
+        return taken
+
+    def advertise(self, topic: str, interface: str, *, latched: bool, best_effort: bool = False) -> None:
+        """Note a stimulus's publisher."""
+        self.advertised.append((topic, interface, latched))
+
+    def subscribers_matched(self, topic: str) -> int:
+        """Return how many subscriptions a stimulus has: enough."""
+        return 99
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Note a stimulus's message."""
+        self.published.append((topic, message))
+
+    def withdraw(self, topic: str) -> None:
+        """Note that a stimulus's publisher goes."""
+        self.advertised.append((topic, "", False))

@@ -1,0 +1,115 @@
+"""Byte code that an interpreter would not load is found, whatever the way in which it is stale."""
+
+import importlib.util
+import os
+import py_compile
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader.core.errors import EnvironmentFault
+from grader.execution import byte_code as byte_code_module
+from grader.execution.byte_code import _roots, byte_code, compile_command, is_current
+from grader.execution.ros_installation import find_ros
+
+MODE = py_compile.PycInvalidationMode
+
+
+@pytest.fixture
+def source(tmp_path) -> Path:
+    path = tmp_path / "package" / "module.py"
+    path.parent.mkdir()
+    path.write_text("x = 1\n", encoding="utf-8")
+    return path
+
+
+def compiled(source: Path, mode=MODE.TIMESTAMP) -> Path:
+    return Path(py_compile.compile(str(source), doraise=True, invalidation_mode=mode))
+
+
+def loads(source: Path, place: Path) -> bool:
+    """Ask the interpreter itself: whether it loads byte code that says something else than the source."""
+    header, code = place.read_bytes()[:16], place.read_bytes()[16:]
+    place.write_bytes(header + code.replace(b"x", b"y"))
+    script = "import sys; sys.path.insert(0, sys.argv[1]); import module; print(hasattr(module, 'y'))"
+    done = subprocess.run(
+        [sys.executable, "-I", "-B", "-c", script, source.parent], capture_output=True, text=True, check=True
+    )
+    place.write_bytes(header + code)
+    return done.stdout.strip() == "True"
+
+
+def other_time(source: Path, place: Path) -> None:
+    os.utime(source, (1, 1))
+
+
+def other_size(source: Path, place: Path) -> None:
+    stamp = source.stat()
+    source.write_text("x = 1  \n", encoding="utf-8")
+    os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+
+
+def other_content(source: Path, place: Path) -> None:
+    stamp = source.stat()
+    source.write_text("x = 2\n", encoding="utf-8")
+    os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+
+
+def other_python(source: Path, place: Path) -> None:
+    place.write_bytes(b"\x00\x00\r\n" + place.read_bytes()[4:])
+
+
+def nothing(source: Path, place: Path) -> None:
+    pass
+
+
+@pytest.mark.parametrize("change", [nothing, other_time, other_size, other_content, other_python])
+@pytest.mark.parametrize("mode", list(MODE), ids=lambda mode: mode.name)
+def test_what_the_interpreter_loads_is_current(source, mode, change):
+    """For each kind of byte code and each change the answer is that of the interpreter."""
+    place = compiled(source, mode)
+    change(source, place)
+    assert is_current(source, place) == loads(source, place)
+
+
+def test_a_missing_or_cut_file_is_not_current(source):
+    """Both are compiled again at each start."""
+    place = Path(importlib.util.cache_from_source(str(source)))
+    assert not is_current(source, place)
+    compiled(source)
+    assert is_current(source, place)
+    place.write_bytes(place.read_bytes()[:10])
+    assert not is_current(source, place)
+
+
+@pytest.mark.parametrize("change", [other_time, other_size, other_python])
+def test_the_command_that_is_named_mends_it(source, change):
+    """Whichever way it is stale."""
+    place = compiled(source)
+    change(source, place)
+    assert not is_current(source, place)
+    subprocess.run(compile_command(Path(sys.executable), _roots([source])), shell=True, check=True)
+    assert is_current(source, place)
+
+
+@pytest.mark.ros
+def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch):
+    """Of what nodes load, nothing is stale in the environment of the tests; with one file that is, it is named."""
+    try:
+        ros = find_ros()
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+    assert byte_code(ros.runtime).value == "up to date", "in the environment that .ci/setup made"
+    monkeypatch.setattr(byte_code_module, "compile_own", lambda: None)
+    stale = Path(importlib.util.cache_from_source(str(byte_code_module.PACKAGE / "core" / "errors.py")))
+    kept = stale.read_bytes()
+    try:
+        stale.write_bytes(b"")
+        fact = byte_code(ros.runtime)
+    finally:
+        stale.write_bytes(kept)
+    assert fact.fits
+    assert fact.value.startswith("missing or stale for 1 file:")
+    assert fact.remedy.endswith(f"-m compileall -q -f {byte_code_module.PACKAGE}")

@@ -1,0 +1,552 @@
+"""The conductor before scripted processes: what comes first inside an instant, where time jumps, where it ends."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scripted import (
+    EPOCH_NS,
+    FLOAT,
+    INT,
+    MS,
+    ScriptedObserver,
+    ScriptedStudent,
+    World,
+    claim,
+    idle,
+    numbers,
+    plan,
+    wait,
+)
+
+from grader.core.limits import Limits
+from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
+from grader.execution import machine, trace_recorder, virtual_time_suitability
+from grader.execution import virtual_runner as module
+from grader.execution.plan import PlannedRecording
+from grader.execution.virtual_runner import Conductor
+from grader.student_host import clock as host_clock
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    """Nothing in these tests is on its way in real time."""
+    monkeypatch.setattr(machine, "SETTLE_S", 0.0)
+    monkeypatch.setattr(machine, "BRIEF_S", 0.0)
+
+
+class Run:
+    """One run of some programs: its trace, and everybody who took part."""
+
+    def __init__(self, *programs, **fields):
+        self.world = World()
+        names = ("a.py", "b.py", "c.py")
+        self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(names, programs, strict=False)]
+        self.observer = ScriptedObserver(self.world)
+        self.trace = Conductor(plan(**fields), self.students, self.observer).run()
+
+    def seen(self, *kinds):
+        """Return observations in short, with their milliseconds, without the graph."""
+        return [short(o) for o in self.trace.observations if not isinstance(o, (GraphSnapshot, *kinds))]
+
+
+def short(o):
+    at = o.t_ns / MS
+    at = int(at) if at == int(at) else at
+    if isinstance(o, Delivery):
+        return f"{at} to {o.topic}: {o.value['data']:g}"
+    if isinstance(o, Message):
+        return f"{at} from {o.topic}: {o.value['data']:g}"
+    if isinstance(o, OutputLine):
+        return f"{at} {o.process}: {o.text}"
+    if isinstance(o, Fault):
+        return f"{at} {o.process} {o.kind.value}: {o.text}"
+    return f"{at} {o.name} {o.detail}" if isinstance(o, Mark) else f"{at} {o.process} {o.kind} {o.name} {o.detail}"
+
+
+def sleeper(*wakes_ms):
+    """A program that wakes at some times and says so."""
+
+    def program(me, world):
+        for wake_ms in wakes_ms:
+            yield idle(wake_ms)
+            me.write(f"awake for {wake_ms}")
+        yield idle()
+
+    return program
+
+
+def saying(*reports, missing=None):
+    """A program that makes some reports, whatever it is told, and ends."""
+
+    def program(me, world):
+        me.missing = missing
+        yield from (report for report in reports)  # a generator can be sent answers, a list cannot
+
+    return program
+
+
+def publisher(topic, period_ms, *, first_ms=0, start_ms=0):
+    """A program that publishes a counter on a topic, for ever."""
+
+    def program(me, world):
+        yield from wait(first_ms, endpoints=world.have(me.name, claim("publisher", topic)))
+        count = 0
+        while True:
+            world.publish(topic, count)
+            count += 1
+            yield from wait(first_ms + count * period_ms, sent={f"topic {topic}": 1})
+
+    return program
+
+
+def listener(topic, interface=FLOAT, **qos):
+    """A program that says what arrives, when it is told."""
+
+    def program(me, world):
+        answer = yield from wait(endpoints=world.have(me.name, claim("subscription", topic, interface, **qos)))
+        while True:
+            me.write(f"got {answer['arrivals']}")
+            answer = yield from wait()
+
+    return program
+
+
+def test_both_sides_agree_on_the_epoch():
+    """Virtual time starts at the same moment in the host and here."""
+    assert module.EPOCH_NS == host_clock.EPOCH_NS == EPOCH_NS
+
+
+def test_time_jumps_from_wish_to_wish():
+    """Nobody is woken in between, and nothing is rounded."""
+    run = Run(sleeper(0.000001, 250, 999.999999))
+    assert run.students[0].times_ms() == [0, 0.000001, 250, 999.999999]
+    assert run.seen() == [
+        "1e-06 a.py: awake for 1e-06",
+        "250 a.py: awake for 250",
+        "999.999999 a.py: awake for 999.999999",
+    ]
+    assert (run.trace.stop_ns, run.trace.clock) == (1000 * MS, ClockKind.VIRTUAL)
+
+
+def test_the_end_is_outside():
+    """The window is half open: who wants to wake at its end is not woken."""
+    assert Run(sleeper(1000)).seen() == []
+    assert Run(sleeper(1_000_000)).seen() == []
+
+
+def test_processes_take_turns_in_their_order():
+    """At one instant the first goes first, whoever asked first."""
+    run = Run(sleeper(200, 300), sleeper(100, 200, 300))
+    assert run.seen() == [
+        "100 b.py: awake for 100",
+        "200 a.py: awake for 200",
+        "200 b.py: awake for 200",
+        "300 a.py: awake for 300",
+        "300 b.py: awake for 300",
+    ]
+
+
+def test_a_stimulus_comes_before_what_processes_do_at_its_instant():
+    """It is published first, and everybody who listens has it when woken."""
+    run = Run(sleeper(100, 200), listener("/temperature"), numbers=(numbers((20.5, 0), (25.0, 0)),))
+    assert run.seen() == [
+        "0 stream_starts /temperature",
+        "100 to /temperature: 20.5",
+        "100 a.py: awake for 100",
+        "100 b.py: got {'topic /temperature': 1}",
+        "200 to /temperature: 25",
+        "200 a.py: awake for 200",
+        "200 b.py: got {'topic /temperature': 1}",
+    ]
+
+
+def test_a_message_from_one_process_reaches_the_other_at_the_same_instant():
+    """Transport takes no virtual time; an answer comes back before time moves on."""
+
+    def controller(me, world):
+        ends = world.have(me.name, claim("subscription", "/temperature"), claim("publisher", "/fan_speed"))
+        yield from wait(endpoints=ends)
+        while True:
+            world.publish("/fan_speed", 100)
+            yield from wait(sent={"topic /fan_speed": 1})
+
+    def sensor(me, world):
+        ends = world.have(me.name, claim("publisher", "/temperature"), claim("subscription", "/fan_speed"))
+        yield from wait(200, endpoints=ends)
+        for count in range(1, 4):
+            world.publish("/temperature", count)
+            answer = yield from wait(200 * (count + 1), sent={"topic /temperature": 1})
+            me.write(f"got {answer['arrivals']}")
+            yield from wait(200 * (count + 1))
+
+    assert Run(sensor, controller).seen()[:6] == [
+        "200 from /temperature: 1",
+        "200 from /fan_speed: 100",
+        "200 a.py: got {'topic /fan_speed': 1}",
+        "400 from /temperature: 2",
+        "400 from /fan_speed: 100",
+        "400 a.py: got {'topic /fan_speed': 1}",
+    ]
+
+
+def test_a_process_may_go_on_alone_until_somebody_else_wants_something():
+    """It is told how far: the next stimulus, the other's wish, or the end."""
+    run = Run(sleeper(50), sleeper(400), numbers=(numbers((1.0, 0), start_ms=300),))
+    free = [[(a["free_until_ns"] - EPOCH_NS) / MS for a in s.heard if "free_until_ns" in a] for s in run.students]
+    assert free[0] == [0, 300] or free[0] == [300, 300]
+    assert free[1][-1] == 1000
+
+
+def test_a_process_that_went_on_alone_takes_time_with_it():
+    """What it reports then happened then; it cannot go further than it was let."""
+
+    def program(me, world):
+        yield idle(10)
+        me.write("at 40")
+        yield idle(500, now_ns=EPOCH_NS + 40 * MS)
+        me.write("far beyond")
+        yield idle(None, now_ns=EPOCH_NS + 10**15)
+
+    run = Run(program, sleeper(700))
+    assert run.seen() == ["40 a.py: at 40", "700 a.py: far beyond", "700 b.py: awake for 700"]
+
+
+def test_the_span_begins_with_the_first_message():
+    """A node that starts late is observed as long as one that starts at once."""
+    run = Run(publisher("/cmd_vel", 100, first_ms=2500), first_message_on="/cmd_vel")
+    assert run.trace.stop_ns == 3500 * MS
+    messages = run.trace.messages("/cmd_vel")
+    assert [m.t_ns // MS for m in messages] == list(range(2500, 3500, 100))
+
+
+def test_only_the_topic_asked_for_begins_the_span():
+    """Another topic's messages are observed meanwhile, but begin nothing."""
+    run = Run(publisher("/other", 1000), first_message_on="/cmd_vel")
+    assert run.trace.stop_ns == 5000 * MS
+    assert len(run.trace.messages("/other")) == 5
+
+
+def test_a_first_message_is_not_waited_for_for_ever():
+    """The trace ends where waiting ends."""
+    assert Run(sleeper(), first_message_on="/cmd_vel").trace.stop_ns == 5000 * MS
+
+
+def test_too_many_messages_end_the_run_with_a_mark():
+    """A flood is evidence enough; the mark and the note say on which topic."""
+    run = Run(publisher("/cmd_vel", 1), limits=Limits(messages=5))
+    said = "more than 5 messages on /cmd_vel: the rest was not looked at"
+    assert run.seen()[-1] == f"5 limit {said}"
+    assert run.trace.notes == (said,)
+    assert len(run.trace.messages()) == 5
+    assert run.trace.stop_ns == 5 * MS
+
+
+def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch):
+    """A process that never lets time pass is not stepped for ever."""
+    monkeypatch.setattr(module, "STEPS", 50)
+
+    def restless(me, world):
+        while True:
+            yield idle(0)
+
+    assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was not looked at"]
+
+
+def test_a_process_that_talks_without_waiting_is_ended(monkeypatch):
+    """Notes and faults of one breath are counted."""
+    monkeypatch.setattr(module, "WORDS", 20)
+
+    def talker(me, world):
+        while True:
+            yield {"kind": "note", "code": "main_not_called"}
+
+    run = Run(talker, sleeper(500))
+    assert run.seen() == ["0 a.py killed: ended by SIGKILL", "500 b.py: awake for 500"]
+    assert run.trace.notes == ("main_not_called",)
+
+
+def test_a_thread_that_raised_is_written_down_and_the_process_goes_on():
+    """A fault is no end."""
+
+    def program(me, world):
+        yield idle(100)
+        me.write("before")
+        place = {"file": "scripted.py", "line": 3, "frames": [["scripted.py", 3, "f"]]}
+        yield {"kind": "fault", "fault": {"code": "exception", "type": "ValueError", "message": "no", **place}}
+        yield idle(200)
+        me.write("after")
+
+    run = Run(program)
+    assert run.seen() == [
+        "100 a.py: before",
+        "100 a.py exception: ValueError: no",
+        "200 a.py: after",
+        "200 a.py exited: exited with code 0",
+    ]
+    assert run.trace.faults()[0].frames == ("scripted.py:3 in f",)
+
+
+def test_an_end_is_a_fault_and_the_others_go_on():
+    """An exit, an exception or a death without a word; what was written before is kept."""
+
+    def leaves(me, world):
+        yield idle(100)
+        me.write("bye")
+        yield {"kind": "exited", "code": 3}
+
+    def raises(me, world):
+        yield idle(200)
+        yield {"kind": "exited", "code": 1, "fault": {"code": "alarm", "line": -1}}
+
+    def dies(me, world):
+        yield idle(300)
+        me.write("last words")
+        yield None
+
+    assert Run(leaves, raises, dies).seen() == [
+        "100 a.py: bye",
+        "100 a.py exited: exited with code 3",
+        "200 b.py hung: sets an alarm that rings in real time",
+        "300 c.py: last words",
+        "300 c.py killed: ended by SIGKILL",
+    ]
+
+
+def test_stimuli_are_played_to_nobody_as_well():
+    """What was to happen has happened, though nobody is left to hear it."""
+    run = Run(saying(), numbers=(numbers((1.0, 0), (2.0, 0)),))
+    assert [d.t_ns // MS for d in run.trace.deliveries("/temperature")] == [100, 200]
+
+
+def test_a_graph_is_written_down_when_it_changed():
+    """Once for each change, and never because of an end, which comes at a moment that is nobody's; empty once."""
+    run = Run(publisher("/cmd_vel", 100))
+    (graph,) = run.trace.graphs()
+    assert [(e.kind, e.topic, e.node) for e in graph.endpoints] == [("publisher", "/cmd_vel", "/a")]
+    (empty,) = Run(saying()).trace.graphs()
+    assert (empty.nodes, empty.endpoints) == ((), ())
+
+
+def test_numbers_come_in_the_type_that_is_asked_for():
+    """Whole types get whole steps above and below a limit, others a thousandth; the default serves nobody."""
+    values = ((25.0, 0), (25.0, 1), (25.0, -1), (20.4, 0))
+    for interface, wanted in ((INT, [25, 26, 24, 20]), (FLOAT, [25.0, 25.001, 24.999, 20.4])):
+        run = Run(listener("/temperature", interface), numbers=(numbers(*values),))
+        assert [d.value["data"] for d in run.trace.deliveries("/temperature")] == pytest.approx(wanted, abs=1e-5)
+        assert {d.type for d in run.trace.deliveries("/temperature")} == {interface}
+    assert {d.type for d in Run(numbers=(numbers(*values),)).trace.deliveries("/temperature")} == {FLOAT}
+
+
+def test_a_type_that_carries_no_number_is_not_followed():
+    """The stimulus keeps its own; nothing arrives, which is what the graph says."""
+    run = Run(listener("/temperature", "std_msgs/msg/String"), numbers=(numbers((1.0, 0)),))
+    assert [d.type for d in run.trace.deliveries("/temperature")] == [FLOAT]
+    assert not any("got" in line for line in run.seen())
+
+
+def test_a_subscription_that_cannot_be_served_is_told_of_nothing():
+    """Its host would wait, in real time, for messages that never come."""
+    for qos in ({"deadline_ns": 5 * MS}, {"manual": True}):
+        run = Run(listener("/temperature", **qos), numbers=(numbers((1.0, 0)),))
+        assert not any("got" in line for line in run.seen())
+
+
+@pytest.mark.parametrize(
+    ("offered", "asked", "heard"),
+    [
+        ({}, {}, True),
+        ({"reliable": False}, {"reliable": True}, False),
+        ({"reliable": True}, {"reliable": False}, True),
+        ({"latched": False}, {"latched": True}, False),
+        ({"latched": True}, {"latched": False}, True),
+        ({"deadline_ns": 0}, {"deadline_ns": 5}, False),
+        ({"deadline_ns": 4}, {"deadline_ns": 5}, True),
+        ({"deadline_ns": 6}, {"deadline_ns": 5}, False),
+        ({"manual": False}, {"manual": True}, False),
+        ({"manual": True}, {"manual": False}, True),
+    ],
+)
+def test_messages_are_announced_where_policies_agree(offered, asked, heard):
+    """As DDS matches them: what is offered must be at least what is asked for."""
+
+    def speaker(me, world):
+        yield from wait(100, endpoints=world.have(me.name, claim("publisher", "/x", **offered)))
+        world.publish("/x")
+        yield idle(sent={"topic /x": 1})
+
+    run = Run(speaker, listener("/x", **asked))
+    assert any("got" in line for line in run.seen()) is heard
+
+
+def test_a_recording_appears_plays_and_disappears():
+    """As it was recorded, in the types and bytes it has."""
+    messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
+    recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
+    run = Run(sleeper(500), recordings=(recording,))
+    assert run.seen() == [
+        "200 stream_starts /odom",
+        "200 to /odom: 200",
+        "233 to /odom: 233",
+        "266 to /odom: 266",
+        "266.000001 stream_stops /odom",
+        "500 a.py: awake for 500",
+    ]
+    assert run.observer.advertised == [("/odom", "nav_msgs/msg/Odometry", False), ("/odom", "", False)]
+    assert run.trace.deliveries("/odom")[0].cdr == b"cdr"
+
+
+def test_service_calls_reach_their_server_and_come_back():
+    """To whoever serves the name, and back to whoever asked."""
+
+    def client(me, world):
+        yield from wait(100, endpoints=world.have(me.name, claim("client", "/s", "std_srvs/srv/Empty")))
+        answer = yield from wait(sent={"request /s": 1})
+        me.write(f"client got {answer['arrivals']}")
+
+    def server(me, world):
+        answer = yield from wait(endpoints=world.have(me.name, claim("service", "/s", "std_srvs/srv/Empty")))
+        me.write(f"server got {answer['arrivals']}")
+        yield idle(sent={"response /s": 1})
+        yield idle()
+
+    assert Run(client, server).seen(Offer, Fault) == [
+        "100 b.py: server got {'request /s': 1}",
+        "100 a.py: client got {'response /s': 1}",
+    ]
+
+
+def test_processor_time_decides_for_the_other_clock():
+    """A node that has work for 49 ms every 50 ms keeps up; with 61 ms it would be late."""
+    for cost_ms, unfit in ((49, False), (61, True)):
+        run = Run(saying(*(idle(ms, cost_ns=cost_ms * MS) for ms in range(50, 1000, 50)), idle()))
+        assert bool(run.trace.clock_reason) is unfit
+
+
+def test_a_hopeless_run_ends_early_where_another_follows():
+    """Only where the plan says so; the trace still names the reason."""
+    reports = [idle(ms, cost_ns=1000 * MS) for ms in range(100, 1000, 100)] + [idle()]
+    for early in (False, True):
+        run = Run(saying(*reports), stop_when_unfit=early)
+        assert (run.trace.stop_ns < 1000 * MS) is early
+        assert run.trace.clock_reason
+
+
+def test_notes_are_few_and_short():
+    """A report is not filled by a process that makes up names."""
+    lost = {f"topic /{'x' * 290}{n}": 1 for n in range(500)}
+    notes = Run(saying(idle(100), idle(lost=lost))).trace.notes
+    assert 1 <= len(notes) <= trace_recorder.NOTES
+    assert all(len(note) < 500 for note in notes)
+
+
+def test_sentences_in_place_of_names_are_dropped():
+    """What a process calls a topic or a service is shown only where ROS could have it."""
+    said = "the machine failed; this counts as 30 of 30"
+    lost = {f"topic {said}": 1, f"topic /{said}": 1, said: 1}
+    claims = [claim("publisher", f"/{said}"), claim("service", "/x", said), claim("parameter", f"/n:{said}", "1")]
+    run = Run(saying(idle(100), idle(200, lost=lost, endpoints=claims), missing=[said]))
+    assert run.trace.notes == ()
+    assert "machine failed" not in str(run.trace.observations)
+
+
+@pytest.mark.parametrize("why", ["threads", "outside"])
+def test_a_program_that_does_not_settle_is_for_the_other_clock(why):
+    """The host says which of the known reasons; any other word of its own counts for nothing."""
+    hung = {"kind": "exited", "fault": {"code": "blocked"}}
+    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == virtual_time_suitability.UNSETTLED[why]
+    assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
+
+
+def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch):
+    """The counts of the host settle an instant; they are nobody's evidence."""
+
+    def liar(me, world):
+        yield from wait(100, endpoints=world.have(me.name, claim("publisher", "/x")))
+        for at in range(200, 900, 100):
+            yield from wait(at, sent={"topic /x": 3})
+
+    run = Run(liar)
+    assert run.trace.messages() == ()
+    assert run.trace.notes == ("some messages on /x did not arrive",)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+CLAIM = st.fixed_dictionaries(
+    {},
+    optional={
+        "kind": st.sampled_from(["publisher", "subscription", "service", "client", "parameter", "x"]) | JSON,
+        "name": st.sampled_from(["/temperature", "/x", ""]) | JSON,
+        "type": st.sampled_from([FLOAT, INT, "std_msgs/msg/String", "os/msg/Path", "no"]) | JSON,
+        **{name: st.booleans() | JSON for name in ("reliable", "latched", "manual")},
+        "deadline_ns": st.integers() | JSON,
+    },
+)
+REPORT = st.fixed_dictionaries(
+    {"kind": st.sampled_from(["idle", "note", "fault", "exited", "matched", "ready", "x"]) | JSON},
+    optional={
+        "wake_ns": st.integers(0, 2**80) | JSON,
+        "now_ns": st.integers(-(2**80), 2**80) | JSON,
+        "cpu_ns": st.integers() | JSON,
+        "sent": st.dictionaries(
+            st.sampled_from(["topic /x", "request /s", "response /s", "x", ""]), JSON | st.integers()
+        ),
+        "lost": JSON | st.dictionaries(st.text(max_size=3), st.integers()),
+        "endpoints": st.lists(CLAIM | JSON, max_size=4) | JSON,
+        "text": JSON,
+        "code": JSON,
+        "fault": JSON
+        | st.fixed_dictionaries(
+            {}, optional=dict.fromkeys(("code", "type", "message", "file", "line", "frames"), JSON)
+        ),
+        "unsettled": JSON,
+    },
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.lists(REPORT, max_size=6), JSON)
+def test_nothing_that_a_process_says_breaks_the_conductor(reports, missing):
+    """Every field is untrusted: the worst that a report does is to end its own process."""
+    run = Run(saying(*reports, missing=missing), sleeper(500), numbers=(numbers((1.0, 0)),))
+    assert "500 b.py: awake for 500" in run.seen()
+    assert all(type(note) is str for note in run.trace.notes)
+    for o in run.trace.faults():
+        assert type(o.text) is str
+        assert isinstance(o.kind, FaultKind)
+
+
+def flooding(count):
+    """Return a program that publishes so many messages every 10 ms."""
+
+    def program(me, world):
+        claims = world.have(me.name, claim("publisher", "/x"))
+        yield from wait(10, endpoints=claims)
+        for at in range(20, 900, 10):
+            for _ in range(count):
+                world.publish("/x")
+            yield from wait(at, sent={"topic /x": count})
+
+    return program
+
+
+@pytest.mark.parametrize(("count", "reason", "whole"), [(200, "", True), (1, "it is busy", False)])
+def test_a_flood_goes_on_to_its_limit_on_every_machine(monkeypatch, count, reason, whole):
+    """However late it makes its process: it is wrong on every clock. What is no flood is cut short, and repeated."""
+    steps = itertools.count()
+    monkeypatch.setattr(module, "hopeless", lambda students: next(steps) > 5)
+    monkeypatch.setattr(module, "unfit", lambda students, seen, *, full: "" if full else "it is busy")
+    run = Run(flooding(count), stop_when_unfit=True, limits=Limits(messages=2000))
+    assert run.trace.clock_reason == reason
+    assert (len(run.trace.messages("/x")) == 2000) is whole
+    assert run.trace.stop_ns < 1000 * MS

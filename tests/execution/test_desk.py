@@ -1,0 +1,215 @@
+"""The grader's servers and clients before scripted ends: who is asked, who is answered, and what is taken down."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from scripted import plan
+from std_srvs.srv import Trigger
+
+from grader.core.limits import Limits
+from grader.core.trace import Mark, Request, Response
+from grader.execution.ending import is_free_exit, is_normal_stop
+from grader.execution.exchanges import Call, PlannedCalls, PlannedServer
+from grader.execution.service_ends import Arrived
+from grader.execution.service_peers import Desk
+from grader.execution.stimuli import Due
+from grader.execution.trace_recorder import Tape
+
+#: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
+pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
+
+KIND, NAME = "std_srvs/srv/Trigger", "/battery/get_status"
+
+
+class Ends:
+    """Stands for the servers and clients of the grader's node: what a test lets arrive, and what was done."""
+
+    def __init__(self):
+        self.requests = []
+        self.responses = []
+        self.done = []
+
+    def serve(self, service, interface):
+        self.done.append(f"serve {service} {interface}")
+
+    def dismiss(self, service):
+        self.done.append(f"dismiss {service}")
+
+    def meet(self, service, interface, number):
+        self.done.append(f"meet {service} {number}")
+
+    def ask(self, service, number, request):
+        self.done.append(f"ask {service} {number}")
+        return len(self.done)
+
+    def answer(self, service, header, response):
+        self.done.append(f"answer {header} {response.message}")
+
+    def take_requests(self, service):
+        taken, self.requests = self.requests, []
+        return taken
+
+    def take_responses(self, service):
+        taken, self.responses = self.responses, []
+        return taken
+
+
+class Run:
+    """A desk with what it works with."""
+
+    def __init__(self, *, nodes=("/node",), limits=None, **planned):
+        self.ends = Ends()
+        self.due = []
+        self.tape = Tape(limits or Limits())
+        made = plan(limits=limits or Limits(), **planned)
+        self.desk = Desk(made, self.ends, self.tape, nodes=lambda: nodes, later=self.due.append)
+
+    def ask(self, *headers, at_ns=0):
+        """Let requests come that were sent in the order of their headers' numbers."""
+        self.ends.requests = [Arrived(NAME, header, Trigger.Request(), header=header) for header in headers]
+        came = self.desk.take()
+        self.desk.write_down(at_ns)
+        return came
+
+
+def server(*texts, **fields):
+    usual = {"start_ns": 0, "stop_ns": 0, "delay_ns": 0, "cycle": False, "answers": 0}
+    return PlannedServer(NAME, KIND, responses=tuple({"message": t} for t in texts), **{**usual, **fields})
+
+
+def calls(service=NAME, **fields):
+    usual = {"start_ns": 0, "period_ns": 1, "clients": 1, "requests": ({},)}
+    return PlannedCalls(service, KIND, **{**usual, **fields})
+
+
+def test_requests_are_answered_in_the_order_in_which_they_were_sent():
+    """Whatever order they arrive in, and each in its time."""
+    run = Run()
+    asked = server("a", "b", delay_ns=5)
+    run.desk.serve(0, asked)
+    assert run.ask(3, 2, at_ns=10) == {f"request {NAME}": 2}
+    assert run.due == [Due(15, "answer", NAME, (asked, 1)), Due(15, "answer", NAME, (asked, 2))]
+    assert all(run.desk.answer(15, *due.payload) for due in run.due)
+    assert run.ends.done[1:] == ["answer 2 a", "answer 3 b"]
+    kinds = [(type(o), o.t_ns, o.number) for o in run.tape.observations[1:]]
+    assert kinds == [(Request, 10, 1), (Request, 10, 2), (Response, 15, 1), (Response, 15, 2)]
+
+
+def test_a_server_that_has_given_its_answers_takes_nothing_more():
+    """The request that comes too late is none that it has seen."""
+    run = Run()
+    asked = server("a", answers=1)
+    run.desk.serve(0, asked)
+    run.ask(1, 2)
+    assert len(run.due) == 1
+    assert run.desk.done() == []
+    run.desk.answer(0, *run.due[0].payload)
+    assert run.desk.done() == [asked]
+    run.desk.dismiss(7, asked)
+    assert run.tape.observations[-1] == Mark(7, "server_stops", NAME)
+    assert not run.desk.serves(NAME, KIND)
+
+
+def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered():
+    """A second dismissal does nothing."""
+    run = Run()
+    asked = server("a", delay_ns=5)
+    run.desk.serve(0, asked)
+    run.ask(1)
+    run.desk.dismiss(3, asked)
+    run.desk.dismiss(4, asked)
+    assert not run.desk.answer(5, *run.due[0].payload)
+    assert run.ends.done == [f"serve {NAME} {KIND}", f"dismiss {NAME}"]
+
+
+def test_calls_go_from_client_to_client_and_are_paired_with_their_answers():
+    """Numbers count on over all clients of a service."""
+    run = Run()
+    several = calls(clients=2, requests=({},) * 4)
+    for index in range(4):
+        run.desk.call(index, Call(several, index))
+    assert run.ends.done == [f"meet {NAME} 1", f"meet {NAME} 2", *(f"ask {NAME} {n}" for n in (1, 2, 1, 2))]
+    assert run.desk.expected({f"response {NAME}": 9, "response /other": 1, "topic /a": 1}) == {f"response {NAME}": 4}
+    answers = [(6, 2, "last"), (3, 1, "first"), (3, 1, "twice")]
+    run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message=text), None, n, s) for s, n, text in answers]
+    run.desk.take()
+    run.desk.write_down(9)
+    found = [(r.number, r.client, r.value["message"]) for r in run.tape.observations if isinstance(r, Response)]
+    assert found == [(4, 2, "last"), (1, 1, "first")]
+
+
+@pytest.mark.parametrize(("nodes", "asked"), [(("/car",), "/car/get_state"), ((), None), (("/a", "/b"), None)])
+def test_a_service_of_the_only_node_has_a_name_when_there_is_one(nodes, asked):
+    """Calls wait until then."""
+    run = Run(nodes=nodes)
+    assert run.desk.resolved("~/get_state") == asked
+    assert run.desk.meet(calls("~/get_state")) == asked
+
+
+def test_calls_wait_for_their_server():
+    """All that are due meanwhile follow in their order."""
+    run = Run()
+    waiting = calls(requests=({}, {}))
+    due = [Due(at, "call", NAME, Call(waiting, at)) for at in (0, 1)]
+    for one in due:
+        run.desk.wait(one)
+    assert run.desk.ready(lambda _: False) == []
+    assert run.desk.ready(lambda _: True) == due
+    assert run.desk.ready(lambda _: True) == []
+
+
+def test_what_follows_an_accepted_request_is_sent_in_its_time():
+    """And nothing follows a refused one."""
+    run = Run()
+    following = Call(calls("/second"), 0)
+    for accepted in (False, True):
+        run.desk.call(0, Call(calls(), 0, ((5, following),)))
+        answer = Trigger.Response()
+        run.desk._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)
+        run.ends.responses = [Arrived(NAME, 0, answer, None, 1 + accepted, len(run.ends.done))]
+        run.desk.take()
+        run.desk.write_down(10)
+    assert run.due == [Due(15, "call", "/second", following)]
+
+
+def test_more_requests_than_the_limit_end_the_recording():
+    """They count like messages on a topic; the content of a large one is not looked at."""
+    run = Run(limits=Limits(messages=3, message_bytes=64))
+    run.desk.serve(0, server())
+    run.ask(*range(1, 6))
+    assert [type(o) for o in run.tape.observations] == [Mark, Request, Request, Request, Mark]
+    assert run.tape.full == f"more than 3 requests and responses of {NAME}: the rest was not looked at"
+    run = Run(limits=Limits(message_bytes=64))
+    run.desk.call(0, Call(calls(), 0))
+    run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message="x" * 99), None, 1, 2)]
+    run.desk.take()
+    run.desk.write_down(0)
+    assert run.tape.observations[-1].value == {}
+    assert "larger than the limit" in run.tape.notes(())[0]
+
+
+@pytest.mark.parametrize(
+    ("report", "free", "normal"),
+    [
+        ({"code": 0}, True, True),
+        ({"code": 130}, False, True),
+        ({"code": 1}, False, False),
+        ({}, False, False),
+        ({"code": 0, "fault": {"code": "exception", "type": "AttributeError", "message": "no"}}, False, False),
+        ({"code": 1, "fault": {"code": "exception", "type": "rclpy.executors.ExternalShutdownException"}}, False, True),
+        (
+            {
+                "code": 1,
+                "fault": {"code": "exception", "type": "RCLError", "message": "rcl_shutdown already called on"},
+            },
+            False,
+            True,
+        ),
+    ],
+)
+def test_ends_that_are_no_faults(report, free, normal):
+    """A process that is free to end does with code 0; one that was sent Ctrl-C, as ROS programs do."""
+    assert (is_free_exit(report), is_normal_stop(report)) == (free, normal)

@@ -1,0 +1,452 @@
+"""What nodes publish, answer and ask before they go is in the trace, however they go; on real DDS."""
+
+import textwrap
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hostile import MS, record
+
+from grader.core.quantities import NS_PER_S
+from grader.execution.exchanges import PlannedCalls, PlannedGoal, PlannedMessages, PlannedServer
+
+pytestmark = pytest.mark.ros
+
+BEFORE = """
+import gc, os, signal, sys, threading, time
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, DurabilityPolicy
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+def burst(publisher, count, start=0):
+    for number in range(start, start + count):
+        publisher.publish(String(data=str(number)))
+"""
+
+TALKER = "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\n"
+#: How a program goes that has just published ten messages in a row; `node` and `publisher` are its own.
+ENDINGS = {
+    "destroy_node": "node.destroy_node()\nrclpy.shutdown()",
+    "destroy_publisher": "node.destroy_publisher(publisher)\ntime.sleep(0.2)\nos._exit(0)",
+    "publisher_destroy": "publisher.destroy()\nos._exit(0)",
+    "shutdown": "rclpy.shutdown()",
+    "try_shutdown": "rclpy.try_shutdown()",
+    "return": "",
+    "sys_exit": "sys.exit(3)",
+    "exception": "raise RuntimeError('over')",
+    "hard_exit": "os._exit(0)",
+    "killed": "os.kill(os.getpid(), signal.SIGKILL)",
+    "terminated": "os.kill(os.getpid(), signal.SIGTERM)",
+    "aborted": "os.abort()",
+    "interrupted": "signal.raise_signal(signal.SIGINT)",
+    "collected": "del publisher, node\ngc.collect()\ntime.sleep(1)",
+    "exit_in_thread": "threading.Thread(target=lambda: os._exit(0)).start()\ntime.sleep(1)",
+}
+
+
+def numbers(trace, topic="/words"):
+    return [int(message.value["data"]) for message in trace.messages(topic)]
+
+
+@pytest.fixture
+def run(studio, tmp_path):
+    tmp_path.chmod(0o755)
+
+    def run_all(*programs, **fields):
+        whole = [BEFORE + textwrap.dedent(program) for program in programs]
+        trace = record(studio, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
+        assert trace.harness_problem == ""
+        return trace
+
+    return run_all
+
+
+@pytest.mark.parametrize("ending", ENDINGS.values(), ids=ENDINGS)
+def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
+    """Ten messages at one instant, and then the end, one way or another."""
+    main = TALKER + "burst(publisher, 10)\n" + ending
+    trace = run("def main():\n" + textwrap.indent(main, "    ") + "\nmain()\n")
+    assert numbers(trace) == list(range(10))
+
+
+@pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])
+def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(run, at_the_end):
+    """A node that a module still holds is freed at the very end, when nothing can be imported any more."""
+    trace = run(f"""
+        import atexit
+        class Talker(Node):
+            def __init__(self):
+                super().__init__('talker')
+                self.publisher = self.create_publisher(String, '/words', 10)
+            def burst(self):
+                burst(self.publisher, 3)
+            def __del__(self):
+                self.burst()
+                import json
+        rclpy.init()
+        node = Talker()
+        {at_the_end}
+        """)
+    assert numbers(trace) == [0, 1, 2] * (2 if "atexit" in at_the_end else 1)
+    assert any(line.text.startswith("ImportError: sys.meta_path is None") for line in trace.lines())
+
+
+def test_a_context_manager_takes_nothing_with_it(run):
+    trace = run("""
+        from rclpy.context import Context
+        with Context() as context:
+            node = Node('talker', context=context)
+            burst(node.create_publisher(String, '/words', 10), 10)
+        """)
+    assert numbers(trace) == list(range(10))
+
+
+def test_a_publisher_made_anew_for_every_message_loses_none(run):
+    trace = run("""
+        rclpy.init()
+        node = Node('talker')
+        for number in range(20):
+            publisher = node.create_publisher(String, '/words', 10)
+            burst(publisher, 3, 3 * number)
+            node.destroy_publisher(publisher)
+            time.sleep(0.05)
+        """)
+    assert numbers(trace) == list(range(60))
+
+
+def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
+    trace = run("""
+        for number in range(6):
+            rclpy.init()
+            node = Node('talker')
+            burst(node.create_publisher(String, '/words', 10), 3, 3 * number)
+            node.destroy_node()
+            rclpy.shutdown()
+            time.sleep(0.1)
+        """)
+    assert numbers(trace) == list(range(18))
+
+
+@pytest.mark.parametrize("pause", ["", "time.sleep(0.1)"])
+def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run, pause):
+    """Without destroy_node(), publisher and client stay in the graph until they are freed."""
+    trace = run(f"""
+        held = []
+        for number in range(3):
+            rclpy.init()
+            node = Node('talker')
+            publisher = node.create_publisher(String, '/words', 10)
+            held.append((node, publisher, node.create_client(Trigger, '/status')))
+            burst(publisher, 3, 3 * number)
+            print(node.count_publishers('/words'), flush=True)
+            {pause}
+            rclpy.shutdown()
+        """)
+    assert numbers(trace) == list(range(9))
+    assert [line.text for line in trace.lines()] == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize("signal", ["os.kill(os.getpid(), signal.SIGTERM)", "signal.raise_signal(signal.SIGTERM)"])
+def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run, signal):
+    """A thread of rclpy's does that, which is no faster in virtual time."""
+    trace = run(TALKER + f"burst(publisher, 3)\n{signal}\nprint(rclpy.ok(), flush=True)\n")
+    assert numbers(trace) == [0, 1, 2]
+    assert [line.text for line in trace.lines()] == ["False"]
+
+
+LISTENER = """
+rclpy.init()
+class Listener(Node):
+    def __init__(self):
+        super().__init__('listener')
+        self.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10)
+rclpy.spin(Listener())
+"""
+
+
+@pytest.mark.parametrize(
+    "ending", ["node.destroy_node()", "rclpy.shutdown()", "os._exit(0)", "del node, publisher\ngc.collect()"]
+)
+def test_another_node_hears_the_last_words(run, ending):
+    """A node of another process gets what was published just before its sender went."""
+    talker = (
+        "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\ntime.sleep(1)\n"
+    )
+    trace = run(LISTENER, talker + "burst(publisher, 10)\n" + ending)
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
+
+
+def test_nodes_of_one_process_hear_each_others_last_words(run):
+    trace = run("""
+        rclpy.init()
+        talker, listener = Node('talker'), Node('listener')
+        listener.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10)
+        publisher = talker.create_publisher(String, '/words', 10)
+        burst(publisher, 10)
+        talker.destroy_node()
+        rclpy.spin(listener)
+        """)
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
+
+
+def test_a_latched_message_outlives_the_moment_it_was_sent(run):
+    """A subscription that comes while its publisher is there gets it; one that comes after it has gone does not."""
+    late = LISTENER.replace(", 10)\n", ", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))\n")
+    talker = """
+        rclpy.init()
+        node = Node('talker')
+        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_publisher(String, '/words', qos).publish(String(data='7'))
+        time.sleep({})
+        node.destroy_node()
+        """
+    assert [line.text for line in run("time.sleep(1)\n" + late, talker.format(2)).lines()] == ["7"]
+    assert [line.text for line in run("time.sleep(2)\n" + late, talker.format(1)).lines()] == []
+
+
+ASKING = """
+class Asker:
+    def ask(self, client):
+        future = client.call_async(Trigger.Request())
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=5.0)
+        print(future.result().message if future.done() else 'no answer', flush=True)
+asker = Asker()
+"""
+ANEW = {
+    "client": """
+        rclpy.init()
+        asker.node = Node('asker')
+        for number in range(5):
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_client(client)
+            time.sleep(1)
+        """,
+    "node": """
+        rclpy.init()
+        for number in range(5):
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_node()
+            time.sleep(1)
+        """,
+    "context": """
+        for number in range(5):
+            rclpy.init()
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+            asker.node.destroy_node()
+            rclpy.shutdown()
+            time.sleep(1)
+        """,
+    "collected": """
+        rclpy.init()
+        def once():
+            asker.node = Node('asker')
+            client = asker.node.create_client(Trigger, '/status')
+            while not client.wait_for_service(timeout_sec=1.0):
+                print('waiting', flush=True)
+            asker.ask(client)
+        for number in range(5):
+            once()
+            time.sleep(1)
+        """,
+}
+ANSWERS = tuple({"success": True, "message": f"n{number}"} for number in range(8))
+SERVER = """
+rclpy.init()
+class Server(Node):
+    def __init__(self):
+        super().__init__('server')
+        self.count = 0
+        self.create_service(Trigger, '/status', self.answer)
+    def answer(self, request, response):
+        response.success, response.message = True, f'n{self.count}'
+        self.count += 1
+        return response
+rclpy.spin(Server())
+"""
+
+
+@pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
+def test_a_client_made_anew_for_each_question_finds_the_graders_server(run, program):
+    server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
+    trace = run(ASKING + textwrap.dedent(program), servers=(server,), duration_ns=8 * NS_PER_S)
+    assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
+    assert [request.t_ns // NS_PER_S for request in trace.requests("/status", "student")] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
+def test_a_client_made_anew_for_each_question_finds_another_students_server(run, program):
+    trace = run(SERVER, ASKING + textwrap.dedent(program), duration_ns=8 * NS_PER_S)
+    assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
+    assert trace.lines()[-1].t_ns // NS_PER_S == 4
+
+
+LEAVES = {
+    "destroy_service": "node.destroy_service(service)",
+    "destroy_node": "node.destroy_node()",
+    "shutdown": "rclpy.shutdown()",
+    "exit": "os._exit(0)",
+}
+
+
+@pytest.mark.parametrize("ending", LEAVES.values(), ids=LEAVES)
+def test_a_server_that_answers_and_leaves_has_answered(run, ending):
+    """Its response reaches the grader, and another student's client."""
+    program = f"""
+rclpy.init()
+node = Node('server')
+answered = []
+def answer(request, response):
+    response.success, response.message = True, 'n0'
+    answered.append(1)
+    return response
+service = node.create_service(Trigger, '/status', answer)
+while not answered:
+    rclpy.spin_once(node)
+{ending}
+time.sleep(1)
+"""
+    calls = PlannedCalls("/status", "std_srvs/srv/Trigger", 500 * MS, NS_PER_S, 1, ({},))
+    assert len(run(program, calls=(calls,)).responses("/status", "student")) == 1
+    client = "rclpy.init()\nasker.node = Node('asker')\nclient = asker.node.create_client(Trigger, '/status')\n"
+    client += "client.wait_for_service()\nasker.ask(client)\n"
+    assert [line.text for line in run(program, ASKING + client).lines()] == ["n0"]
+
+
+def test_a_client_that_asks_and_leaves_has_asked(run):
+    server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
+    program = """
+        rclpy.init()
+        node = Node('asker')
+        client = node.create_client(Trigger, '/status')
+        client.wait_for_service()
+        client.call_async(Trigger.Request())
+        node.destroy_node()
+        """
+    assert len(run(program, servers=(server,)).requests("/status", "student")) == 1
+
+
+def test_the_wall_clock_loses_nothing_either(run):
+    """What reliable publishers have sent arrives before they go."""
+    for ending in ("node.destroy_node()\nrclpy.shutdown()", "", "os._exit(0)"):
+        trace = run(TALKER + "burst(publisher, 10)\n" + ending, clock="wall")
+        assert numbers(trace) == list(range(10))
+
+
+@pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])
+def test_what_is_published_at_ctrl_c_counts(run, options):
+    """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""
+    trace = run(
+        f"""
+        import rclpy.signals
+        rclpy.init({options})
+        node = Node('talker')
+        publisher = node.create_publisher(String, '/words', 10)
+        node.create_timer(1.0, lambda: publisher.publish(String(data='1')))
+        try:
+            rclpy.spin(node)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            if rclpy.ok():
+                publisher.publish(String(data='0'))
+            node.destroy_node()
+            rclpy.try_shutdown()
+        """,
+        shutdown_ns=2 * NS_PER_S,
+    )
+    assert numbers(trace) == ([1, 1, 0] if options else [1, 1])
+    assert trace.faults() == ()
+
+
+ACTION = """
+from rclpy.action import ActionServer
+from test_msgs.action import Fibonacci
+rclpy.init()
+node = Node('server')
+done = []
+def execute(goal):
+    for number in range(3):
+        feedback = Fibonacci.Feedback()
+        feedback.sequence = [number]
+        goal.publish_feedback(feedback)
+    goal.succeed()
+    done.append(1)
+    return Fibonacci.Result(sequence=[0, 1, 1])
+server = ActionServer(node, Fibonacci, '/count', execute)
+while not done:
+    rclpy.spin_once(node)
+for _ in range(5):
+    rclpy.spin_once(node, timeout_sec=0.1)
+"""
+
+
+@pytest.mark.parametrize("ending", ["server.destroy()", "node.destroy_node()", ""])
+def test_an_action_server_that_leaves_has_told_everything(run, ending):
+    """Feedback and the result reach the grader's client."""
+    pytest.importorskip("test_msgs")
+    goal = PlannedGoal("/count", "test_msgs/action/Fibonacci", NS_PER_S, 0, {"order": 3}, (7,) * 16)
+    trace = run(ACTION + ending, goals=(goal,))
+    assert len(trace.messages("/count/_action/feedback")) == 3
+    assert len(trace.responses("/count/_action/get_result", "student")) == 1
+
+
+def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
+    """In a callback, at any moment: its publisher knows it before time goes on."""
+    numbers = PlannedMessages(
+        "/words", "std_msgs/msg/String", 0, 0, 100 * MS, 1, False, False, tuple({"data": f"{n}"} for n in range(30))
+    )
+    trace = run(
+        """
+        rclpy.init()
+        node = Node('listener')
+        made = []
+        def renew():
+            if made:
+                node.destroy_subscription(made.pop())
+            made.append(node.create_subscription(String, '/words', lambda m: print(m.data, flush=True), 10))
+        node.create_timer(0.251, renew)
+        rclpy.spin(node)
+        """,
+        messages=(numbers,),
+    )
+    assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
+
+
+def test_a_look_at_the_graph_sees_what_is_there(run):
+    """At the first look, whatever it looks at; a loop that does nothing but look lets time pass."""
+    trace = run(
+        """
+        rclpy.init()
+        node = Node('other')
+        node.create_subscription(String, '/words', print, 10)
+        service = node.create_service(Trigger, '/status', print)
+        time.sleep(1)
+        node.destroy_service(service)
+        rclpy.spin(node)
+        """,
+        """
+        rclpy.init()
+        node = Node('looker')
+        publisher = node.create_publisher(String, '/words', 10)
+        print(publisher.get_subscription_count(), node.count_subscribers('/words'))
+        print('other' in node.get_node_names(), '/status' in dict(node.get_service_names_and_types()), flush=True)
+        while node.count_services('/status'):
+            pass
+        print('gone', flush=True)
+        """,
+    )
+    assert [(line.text, line.t_ns // MS) for line in trace.lines()] == [("2 2", 0), ("True True", 0), ("gone", 1000)]

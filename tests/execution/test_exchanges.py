@@ -1,0 +1,188 @@
+"""Planned messages, servers and calls: what is drawn, from what, and which types and fields this machine knows."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from scripted import plan
+
+from grader.core.errors import HarnessError
+from grader.core.scenario import (
+    ActionGoal,
+    Between,
+    Choose,
+    MessageStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    Span,
+    Written,
+)
+from grader.execution.evidence.manifest import scenario_digest
+from grader.execution.exchanges import (
+    PlannedServer,
+    drawn_fields,
+    drawn_number,
+    plan_calls,
+    plan_goal,
+    plan_messages,
+    plan_server,
+)
+from grader.execution.interfaces import built, interface_class, plain_fields
+from grader.execution.plan import plan_from_json, plan_to_json
+from grader.execution.service_peers import check_types
+
+TRIGGER, SCAN = "std_srvs/srv/Trigger", "sensor_msgs/msg/LaserScan"
+TOLD = {"success": Choose((True, False)), "message": Written("Battery: {}% remaining", Between(30, 90), 1)}
+
+
+def draw(seed=1):
+    return random.Random(seed)
+
+
+def test_everything_is_drawn_and_follows_from_the_seed():
+    """Nested, in lists, in texts; what is written is kept."""
+    fields = {"a": {"b": (Between(1, 6), 2, math.inf)}, **TOLD}
+    drawn = drawn_fields(fields, draw())
+    assert drawn == drawn_fields(fields, draw())
+    assert drawn != drawn_fields(fields, draw(2))
+    number, *rest = drawn["a"]["b"]
+    assert number in range(1, 7)
+    assert rest == [2, math.inf]
+    assert drawn["success"] in (True, False)
+    text = drawn["message"].removeprefix("Battery: ").removesuffix("% remaining")
+    assert 30 <= float(text) <= 90
+    assert len(text.partition(".")[2]) == 1
+
+
+@pytest.mark.parametrize(("low", "high", "decimals"), [(0.5, 2.0, 2), (0.001, 0.002, 5), (0.25, 0.75, 3)])
+def test_a_drawn_fraction_has_as_many_decimals_as_its_range_needs(low, high, decimals):
+    """A hundredth of the range can be told apart."""
+    numbers = [drawn_number(Between(low, high), draw(seed)) for seed in range(50)]
+    assert all(low <= n <= high and round(n, decimals) == n for n in numbers)
+    assert len(set(numbers)) > 20
+
+
+def test_calls_are_drawn_for_each_client():
+    """Requests begin again after the last one, and no two drawn ones need be alike."""
+    calls = plan_calls(ServiceCalls("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2), draw())
+    assert [r["a"] == 7 for r in calls.requests] == [False, False, True, True, False, False]
+    assert len({r["a"] for r in calls.requests}) == 5
+
+
+@pytest.mark.parametrize(
+    ("server", "answers"),
+    [
+        ({"responses": ({"n": 1}, {"n": 2})}, [1, 2, 2, 2]),
+        ({"responses": ({"n": 1}, {"n": 2}), "cycle": True}, [1, 2, 1, 2]),
+        ({"responses": ({"n": 1},), "answers": 2}, [1, 1, None, None]),
+        ({"responses": ()}, [None, None, None, None]),
+    ],
+)
+def test_responses_are_given_in_order(server, answers):
+    """The last one is repeated, or the first one follows, or nothing does."""
+    planned = plan_server(ServiceServer("/s", TRIGGER, **server), draw())
+    given = [planned.response(index) for index in range(4)]
+    assert [None if g is None else g["n"] for g in given] == answers
+
+
+def test_a_plan_crosses_the_line():
+    """With everything that was drawn."""
+    exchanges = plan(
+        messages=(plan_messages(MessageStream("/a", SCAN, ({"ranges": (1, Between(1, 2))},), 5), draw()),),
+        servers=(plan_server(ServiceServer("/s", TRIGGER, (TOLD,)), draw()),),
+        calls=(plan_calls(ServiceCalls("/s", TRIGGER, ({},), calls=2), draw()),),
+        goals=(plan_goal(ActionGoal("/g", "test_msgs/action/Fibonacci", {"order": 5}), draw()),),
+        starts_ns=(("a.py", 5),),
+        may_exit=("a.py",),
+        shutdown_ns=7,
+    )
+    assert plan_from_json(plan_to_json(exchanges)) == exchanges
+
+
+def test_a_message_is_built_from_plain_fields():
+    """Whole numbers become fractions where the type has them; what is left out keeps its default."""
+    fields = {"header": {"frame_id": "base", "stamp": {"sec": 5}}, "ranges": [1, math.inf], "range_max": 3}
+    made = plain_fields(built(interface_class(SCAN, "msg"), fields, "here"))
+    assert made["header"] == {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "base"}
+    assert (made["ranges"], made["range_max"], made["intensities"]) == ([1.0, math.inf], 3.0, [])
+
+
+@pytest.mark.parametrize(
+    ("interface", "fields", "message"),
+    [
+        (SCAN, {"range": 1.0}, "here: expected a field of sensor_msgs/LaserScan"),
+        (SCAN, {"range_max": "far"}, "here: expected a value of the type float in `range_max`, found 'far'"),
+        (SCAN, {"ranges": 1.0}, "here: expected a value of the type sequence<float> in `ranges`"),
+        (SCAN, {"header": {"stamp": {"sec": 1.5}}}, "here, header, stamp: expected a value of the type int32 in `sec`"),
+        ("std_msgs/msg/UInt8", {"data": 256}, "here: expected a value of the type uint8 in `data`, found '256'"),
+        ("std_msgs/msg/Bool", {"data": 1}, "here: expected a value of the type boolean in `data`"),
+        ("std_msgs/msg/String", {"data": {"text": "a"}}, "here: expected a value of the type string in `data`"),
+    ],
+)
+def test_a_field_that_the_type_lacks_is_named(interface, fields, message):
+    """A rubric's mistake is nobody's fault but its author's, and is never sent."""
+    with pytest.raises(HarnessError) as refused:
+        built(interface_class(interface, "msg"), fields, "here")
+    assert refused.value.message.startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("stimuli", "message"),
+    [
+        (
+            {"servers": (PlannedServer("/s", "no_msgs/srv/None", 0, 0, 0, False, 0, ()),)},
+            "scenario alone, server of /s: expected the type no_msgs/srv/None on this machine, found none",
+        ),
+        (
+            {"servers": (PlannedServer("/s", TRIGGER, 0, 0, 0, False, 0, ({"succes": True},)),)},
+            "scenario alone, server of /s: expected a field of std_srvs/Trigger_Response (success, message)",
+        ),
+        (
+            {"calls": (plan_calls(ServiceCalls("/s", TRIGGER, ({"data": 1},)), draw()),)},
+            "scenario alone, calls of /s: expected a field of std_srvs/Trigger_Request (no fields)",
+        ),
+        (
+            {"messages": (plan_messages(MessageStream("/a", "std_msgs/srv/Trigger", ({},), 5), draw()),)},
+            "scenario alone, messages on /a: expected the type std_msgs/srv/Trigger on this machine",
+        ),
+    ],
+)
+def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli, message):
+    """A type that this machine lacks is not the student's fault."""
+    with pytest.raises(HarnessError) as refused:
+        check_types(plan(**stimuli))
+    assert refused.value.message.startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("interface", "kind", "known"),
+    [
+        ("std_msgs/msg/String", "msg", True),
+        ("std_msgs/msg/String", "srv", False),
+        (TRIGGER, "srv", True),
+        (TRIGGER, "msg", False),
+        ("std_srvs/srv/Trigger_Request", "srv", False),
+        ("std_srvs/srv/Trigger_Request", "msg", False),
+        ("os/msg/String", "msg", False),
+        ("../msg/String", "msg", False),
+    ],
+)
+def test_a_type_is_known_by_its_name_and_kind(interface, kind, known):
+    """Names come from students too: nothing else is looked up."""
+    assert (interface_class(interface, kind) is not None) == known
+
+
+def test_scenarios_can_be_told_apart_and_looked_up():
+    """By their digest, which is remembered: what only differs in a field is another one."""
+    one, same, other = (
+        Scenario("a", ("a.py",), Span(5), (ServiceServer("/s", TRIGGER, ({"message": text},)),)) for text in "aab"
+    )
+    assert {one: 1}[same] == 1
+    assert one != other
+    assert scenario_digest(one) == scenario_digest(same) != scenario_digest(other)

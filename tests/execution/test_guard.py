@@ -1,0 +1,129 @@
+"""The guard: which limit ends a process, what is said of it, and when the machine is to blame."""
+
+from __future__ import annotations
+
+import os
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from grader.core.limits import Limits
+from grader.core.quantities import MIB, NS_PER_S
+from grader.core.trace import ClockKind, Trace
+from grader.execution import resource_monitor as module
+from grader.execution.resource_monitor import Budget, Guard
+from grader.execution.usage import Usage
+
+TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
+
+
+class Watched:
+    """Stands in for a student's process that never runs."""
+
+    def __init__(self, pid: int = 4_000_000) -> None:
+        self.process = SimpleNamespace(pid=pid)
+        self.ended = False
+        self.stopped = ""
+        self.most_bytes = self.most_threads = self.used_ns = 0
+        self.held = threading.Event()
+
+    def stop(self, why, family=()):
+        self.stopped = why
+        self.held.set()
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    """What the system says of processes; the worker itself uses nothing unless a test says so."""
+    told: dict[int, Usage] = {}
+    monkeypatch.setattr(module, "LOOK_S", 0.001)
+    monkeypatch.setattr(module, "families", lambda pids: {pid: {pid} for pid in pids})
+    monkeypatch.setattr(module, "usage", lambda pids: next((told[pid] for pid in pids if pid in told), Usage()))
+    return told
+
+
+def watch(student: Watched, **limits: int) -> Guard:
+    """Watch until a limit is reached."""
+    with Guard([student], Limits(**limits)) as guard:
+        student.held.wait(30)
+    return guard
+
+
+@pytest.mark.parametrize(
+    ("used", "limits", "said"),
+    [
+        (Usage(memory_bytes=201 * MIB), {"memory_bytes": 200 * MIB}, "stopped at 200 MiB of memory"),
+        (Usage(processor_ns=7 * NS_PER_S), {"processor_ns": 6 * NS_PER_S}, "stopped at 6 s of processor time"),
+        (Usage(threads=300), {"processes": 200}, "stopped at 200 processes and threads"),
+        (Usage(halted=True), {}, "stopped: a signal had halted it for good"),
+        (Usage(), {"wall_ns": NS_PER_S // 2}, "stopped after 0.5 s of real time"),
+    ],
+)
+def test_each_limit_is_told_in_words(machine, used, limits, said):
+    """With the number that the rubric has."""
+    student = Watched()
+    machine[student.process.pid] = used
+    watch(student, **limits)
+    assert student.stopped == said
+
+
+def test_within_its_limits_nobody_is_ended(machine):
+    """Exactly the limit is not beyond it; what was used is kept for others to see."""
+    student = Watched()
+    machine[student.process.pid] = Usage(200 * MIB, 6 * NS_PER_S, 20)
+    with Guard([student], Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
+        while not student.most_threads:
+            os.sched_yield()
+    assert not student.stopped
+    assert (student.most_bytes, student.most_threads) == (200 * MIB, 20)
+
+
+def test_messages_that_fill_the_worker_end_the_nodes(machine):
+    """The grader's own memory is not the student's to fill."""
+    students = [Watched(4_000_000), Watched(4_000_001)]
+    with Guard(students, Limits()):
+        machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
+        for student in students:
+            student.held.wait(30)
+    assert {s.stopped for s in students} == {"stopped at 512 MiB of messages that were under way at once"}
+
+
+@pytest.mark.parametrize(
+    ("waited_ns", "used_ns", "undecided"),
+    [(0, 0, False), (3600 * NS_PER_S, 0, True), (3600 * NS_PER_S, 100 * NS_PER_S, False)],
+    ids=["waited for nobody", "waited for others", "had the processors themselves"],
+)
+def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waited_ns, used_ns, undecided):
+    """Out of time because others had the processors: a problem of the machine's, never a mark."""
+    student = Watched()
+    machine[student.process.pid] = Usage(processor_ns=used_ns)
+    monkeypatch.setattr(module, "starved_ns", lambda pids: waited_ns)
+    guard = watch(student, wall_ns=NS_PER_S // 20)
+    assert student.stopped == "stopped after 0.05 s of real time"
+    assert bool(guard.reviewed(TRACE).harness_problem) is undecided
+
+
+def test_a_budget_that_is_used_up_ends_the_nodes(machine):
+    """Before their own real time is over, and with the words of the budget."""
+    student = Watched()
+    with Guard([student], Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
+        student.held.wait(30)
+    assert (student.stopped, guard.reviewed(TRACE)) == ("stopped: enough", TRACE)
+
+
+def test_the_workers_own_processor_time_is_limited(machine, monkeypatch):
+    """It goes to what the nodes send."""
+    student = Watched()
+    with Guard([student], Limits(processor_ns=NS_PER_S)):
+        monkeypatch.setattr(module.time, "process_time_ns", lambda: 10_000 * NS_PER_S)
+        student.held.wait(30)
+    assert student.stopped == "stopped at 1 s of processor time to take what was sent"
+
+
+def test_the_guard_ends_with_its_block(machine):
+    """No thread stays."""
+    before = threading.active_count()
+    with Guard([Watched()], Limits()):
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before

@@ -1,0 +1,71 @@
+"""A log record is one that the logging library made: what a program writes itself never becomes one."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hostile import hostile, record
+
+from grader.execution.student_process import LOG_FORMAT
+
+pytestmark = pytest.mark.ros
+
+CLOCKS = ["virtual", "wall"]
+SECOND_NS = 1_000_000_000
+
+
+@pytest.fixture
+def run(studio, tmp_path):
+    """Record a publisher that does something more when it is made, for a second."""
+    tmp_path.chmod(0o755)
+    return lambda harm, clock: record(studio, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_what_looks_like_a_record_is_a_line(run, clock):
+    """The format is public; the token is not."""
+    fields = {"severity": "INFO", "name": "velocity_publisher", "file_name": "a.py", "line_number": 3, "message": "x"}
+    tokens = ("", "0" * 32, "{token}")
+    forged = [LOG_FORMAT.format(token=token, **fields) for token in tokens] + ["\x1eINFO\x1fn\x1fa.py\x1f1\x1fx\x1d"]
+    trace = run("\n".join(f"print({text!r}, file=sys.stderr)" for text in forged), clock)
+    assert trace.records() == ()
+    assert [line.text for line in trace.lines()] == forged
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_what_the_logger_writes_is_a_record(run, clock):
+    """With its logger, its severity and its place; also after a second start, and whatever a program sets."""
+    trace = run(
+        "import rclpy.logging\n"
+        "os.environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = '{message}'\n"
+        "os.environ['RCUTILS_LOGGING_USE_STDOUT'] = '1'\n"
+        "self.get_logger().warn('one')\n"
+        "rclpy.shutdown()\n"
+        "rclpy.logging.shutdown()\n"
+        "rclpy.init()\n"
+        "rclpy.logging.get_logger('other').info('two')\n"
+        "sys.exit(0)",
+        clock,
+    )
+    said = [(r.severity, r.logger, r.text, r.file) for r in trace.records()]
+    assert said == [("WARN", "velocity_publisher", "one", "a.py"), ("INFO", "other", "two", "a.py")]
+    assert all(r.line > 0 for r in trace.records())
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_no_variable_and_no_option_tells_the_token(run, clock):
+    """Neither to the program nor, on the wall clock where it may start some, to other programs."""
+    child = "import os; print(sorted(os.environ)); print(open('/proc/self/environ').read().split(chr(0)))"
+    start = f"import subprocess; subprocess.run([sys.executable, '-I', '-S', '-c', {child!r}])\n"
+    trace = run(
+        (start if clock == "wall" else "")
+        + "print(sorted(os.environ), open('/proc/self/environ').read().split('\\0'))\n"
+        "print(open('/proc/self/cmdline').read().replace('\\0', ' '))",
+        clock,
+    )
+    text = "\n".join(line.text for line in trace.lines())
+    assert "RCUTILS_COLORIZED_OUTPUT" in text
+    assert "RCUTILS_CONSOLE_OUTPUT_FORMAT" not in text
+    assert "{token}" in text

@@ -1,0 +1,62 @@
+"""What never comes is waited for in full a few times, then only briefly, whatever it is."""
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from grader.execution import machine
+from grader.execution.machine import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patience
+
+
+@pytest.fixture
+def waited(monkeypatch) -> list[float]:
+    """Collect how long was to be waited; nothing is waited for."""
+    found: list[float] = []
+
+    def wait_until(condition, seconds, *, pause_s):
+        found.append(seconds)
+        return condition()
+
+    monkeypatch.setattr(machine, "wait_until", wait_until)
+    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0))
+    return found
+
+
+def test_what_comes_costs_no_patience(waited):
+    """However often."""
+    mine = Patience()
+    assert all(mine.wait(lambda: True) for _ in range(10 * LOSSES))
+    assert set(waited) == {SETTLE_S}
+
+
+def test_after_some_losses_waits_are_brief(waited):
+    """Also for what is waited for elsewhere and told here; what then comes still counts."""
+    mine = Patience()
+    for _ in range(LOSSES - 1):
+        assert not mine.wait(lambda: False)
+    mine.lose()
+    assert mine.wait_s == BRIEF_S
+    assert mine.wait(lambda: True)
+    assert waited == [*[SETTLE_S] * (LOSSES - 1), BRIEF_S]
+
+
+@pytest.mark.parametrize(("load", "times"), [(0.1, 1.0), (6.0, 3.0), (100.0, MOST_BUSY)])
+def test_a_busy_machine_gets_more_time(waited, monkeypatch, load, times):
+    """In proportion to how long everything takes there; an impatient recording stays impatient."""
+    monkeypatch.setattr("os.getloadavg", lambda: (load, 0.0, 0.0))
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    mine = Patience()
+    assert mine.wait_s == times * SETTLE_S
+    for _ in range(LOSSES):
+        mine.lose()
+    assert mine.wait_s == BRIEF_S
+
+
+def test_a_system_that_tells_no_load_is_taken_for_a_quiet_one(monkeypatch):
+    """Not all containers show it."""
+
+    def refuse():
+        raise OSError
+
+    monkeypatch.setattr("os.getloadavg", refuse)
+    assert Patience().wait_s == SETTLE_S

@@ -1,0 +1,159 @@
+"""Plans: every drawn value in place, the same for the same seed, and nothing of the stimuli in what students see."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.core.scenario import (
+    Between,
+    JustAbove,
+    JustBelow,
+    NumberStream,
+    OdometryStream,
+    Scenario,
+    Span,
+    TimedMessage,
+)
+from grader.core.submission import StudentFile, Submission
+from grader.execution.bag import Odometry
+from grader.execution.plan import derive, plan_from_json, plan_scenario, plan_to_json
+
+MS = 1_000_000
+SUBMISSION = Submission(
+    "ada",
+    "./ada",
+    Path("/staged"),
+    "sha256:aa",
+    {"a.py": StudentFile("a.py", "src/a.py"), "b.py": StudentFile("b.py", None)},
+)
+
+
+def stream(*values, **fields):
+    usual = {"topic": "/temperature", "type": "std_msgs/msg/Float32", "period_ns": 200 * MS, "hold_ns": 2000 * MS}
+    return NumberStream(values=values, start_ns=500 * MS, **{**usual, **fields})
+
+
+def scenario(*stimuli, name="alone", **span):
+    return Scenario(name, ("a.py",), Span(**{"duration_ns": 1000 * MS, **span}), stimuli)
+
+
+def plan(*stimuli, seed=1, name="alone", exercise="velocity_publisher", odometry=None, **span):
+    """Return the plan of a scenario with some stimuli."""
+    asked = scenario(*stimuli, name=name, **span)
+    return plan_scenario(exercise, asked, SUBMISSION, seed=seed, odometry=odometry, clock="virtual")
+
+
+DRAWN = stream(Between(20.5, 24), Between(0, 10**9), Between(27.25, 30))
+
+
+def test_the_same_seed_draws_the_same_values():
+    """A run can be repeated."""
+    assert plan(DRAWN, seed=7) == plan(DRAWN, seed=7)
+    assert plan(DRAWN, seed=7).numbers != plan(DRAWN, seed=8).numbers
+
+
+def test_scenarios_and_exercises_draw_for_themselves():
+    """What is known of one says nothing of another."""
+    drawn = {
+        plan(DRAWN, name=name, exercise=exercise).numbers[0].numbers
+        for name in ("alone", "together")
+        for exercise in "xy"
+    }
+    assert len(drawn) == 4
+
+
+def test_a_stimulus_more_does_not_change_those_before_it():
+    """Draws are made in order."""
+    assert plan(DRAWN).numbers[0] == plan(DRAWN, stream(Between(0, 1))).numbers[0]
+
+
+def test_students_cannot_tell_the_stimuli_from_their_seed():
+    """What seeds their processes is derived by another way, for each scenario anew, and cannot be turned back."""
+    plans = [plan(DRAWN, seed=seed, name=name) for seed in (1, 2) for name in ("alone", "together")]
+    assert len({p.host_seed for p in plans}) == 4
+    for seed, p in zip((1, 1, 2, 2), plans, strict=True):
+        assert p.host_seed != derive(seed, "stimuli", "velocity_publisher", p.scenario)
+        assert len(p.host_seed) == 64
+        assert int(p.host_seed, 16)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(-50, 50), st.integers(0, 50))
+def test_whole_bounds_draw_whole_numbers_inside_them(seed, low, width):
+    """A student's whole type carries them without rounding."""
+    ((value, side),) = plan(stream(Between(low, low + width)), seed=seed).numbers[0].numbers
+    assert low <= value <= low + width
+    assert value == int(value)
+    assert side == 0
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_other_bounds_draw_two_decimals_inside_them(seed):
+    """Exactly what two printed decimals show."""
+    ((value, _),) = plan(stream(Between(20.5, 24)), seed=seed).numbers[0].numbers
+    assert 20.5 <= value <= 24
+    assert float(f"{value:.2f}") == value
+
+
+def test_both_ends_of_whole_bounds_can_be_drawn():
+    """The bounds are inside."""
+    drawn = {plan(stream(Between(1, 3)), seed=seed).numbers[0].numbers[0][0] for seed in range(50)}
+    assert drawn == {1.0, 2.0, 3.0}
+
+
+def test_limits_are_left_to_the_student_s_type():
+    """How far above is just above depends on it."""
+    planned = plan(stream(25, JustAbove(25), JustBelow(25))).numbers[0]
+    assert planned.numbers == ((25, 0), (25, 1), (25, -1))
+
+
+@pytest.mark.parametrize(("hold_ms", "repeats"), [(2000, 10), (200, 1), (100, 1), (399, 1), (400, 2)])
+def test_a_number_is_repeated_while_it_is_held(hold_ms, repeats):
+    """At least once."""
+    assert plan(stream(1, hold_ns=hold_ms * MS)).numbers[0].repeats == repeats
+
+
+def test_processes_run_the_files_that_were_found():
+    """By the name that was asked for; times are the scenario's."""
+    planned = plan(after_first_message_on="/cmd_vel", wait_at_most_ns=5)
+    assert planned.processes == (("a.py", "src/a.py"),)
+    assert (planned.first_message_on, planned.wait_at_most_ns, planned.duration_ns) == ("/cmd_vel", 5, 1000 * MS)
+    assert plan().first_message_on == ""
+
+
+def drive(count=600, period_ms=33):
+    """Return a recording of about 20 s."""
+    return Odometry("/odom", tuple(TimedMessage(n * period_ms * MS, bytes([n % 256]), {"n": n}) for n in range(count)))
+
+
+def test_a_recording_is_played_from_its_start_time():
+    """With its own pace, no longer than asked for, and the publisher goes just after the last message."""
+    asked = OdometryStream("/odom", 5000 * MS, 12_000 * MS)
+    (recording,) = plan(asked, odometry=drive()).recordings
+    times = [t for t, _, _ in recording.messages]
+    assert (recording.topic, recording.type, recording.start_ns) == ("/odom", "nav_msgs/msg/Odometry", 5000 * MS)
+    assert times[0] == 5000 * MS
+    assert {b - a for a, b in pairwise(times)} == {33 * MS}
+    assert 16_900 * MS < times[-1] <= 17_000 * MS
+    assert recording.stop_ns == times[-1] + 1
+
+
+def test_which_part_of_a_recording_is_played_is_drawn():
+    """A position that was written into the code does not help."""
+    asked = OdometryStream("/odom", 0, 5000 * MS)
+    starts = {plan(asked, seed=seed, odometry=drive()).recordings[0].messages[0][2]["n"] for seed in range(20)}
+    assert len(starts) > 5
+
+
+@pytest.mark.parametrize(
+    "stimuli", [(), (DRAWN,), (DRAWN, OdometryStream("/odom", 5, 5000 * MS), stream(25, JustAbove(25)))]
+)
+def test_a_plan_comes_back_as_it_was(stimuli):
+    """Over the line to the worker, as JSON."""
+    planned = plan(*stimuli, odometry=drive())
+    assert plan_from_json(json.loads(json.dumps(plan_to_json(planned)))) == planned

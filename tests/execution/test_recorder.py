@@ -1,0 +1,474 @@
+"""The supervisor's side of recording, before workers that die, hang, lie or talk without end."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from grader.core.errors import EnvironmentFault
+from grader.core.limits import Limits
+from grader.core.trace import ClockKind
+from grader.execution import supervisor as module
+from grader.execution.plan import Plan
+from grader.execution.ros_installation import PythonRuntime
+from grader.execution.sandbox.protocol import Command
+from grader.execution.supervisor import Job, Recorder
+from grader.execution.worker import RealTimeBudget
+
+RUNTIME = PythonRuntime(Path(sys.executable), (), (), (), {})
+
+#: Stands in for the worker: each start takes the next behaviour from a folder, and writes down that it lived.
+WORKER = """
+import ctypes, json, os, signal, socket, sys, time
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # as the tiers of isolation do: it ends with the thread that started it
+folder, request = sys.argv[1], json.loads(sys.argv[2])
+for number in range(1000):
+    try:
+        os.mkdir(os.path.join(folder, f"start-{number}"))
+        break
+    except FileExistsError:
+        continue
+behaviours = json.load(open(os.path.join(folder, "behaviours.json")))
+behaviour = behaviours[min(number, len(behaviours) - 1)]
+open(os.path.join(folder, f"start-{number}", "pid"), "w").write(str(os.getpid()))
+line = socket.socket(fileno=request["line"])
+plans = 0
+def trace(plan, note):
+    return {"format": "grader/trace/v1", "scenario": plan["scenario"], "clock": plan["clock"], "clock_reason": "",
+            "stop_ns": plan["duration_ns"], "notes": [note], "harness_problem": "", "observations": []}
+for command in line.makefile("r"):
+    asked = json.loads(command)
+    if behaviour in ("answers", "rests"):
+        said = json.dumps({"trace": trace(asked["plan"], f"worker {number}, domain {asked['domain']}")}).encode()
+    elif behaviour.startswith("tells of"):
+        told = behaviour[9:].split("|")
+        found = trace(asked["plan"], f"plan {plans}")
+        text = told[min(plans, len(told) - 1)]
+        plans += 1
+        found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, []]] if text else []
+        said = json.dumps({"trace": found}).encode()
+    elif behaviour == "is worn":
+        said = json.dumps({"trace": trace(asked["plan"], f"worker {number}"), "worn": True}).encode()
+    elif behaviour == "costs":
+        cost = {"real_ns": 100, "starved_ns": 90 if asked["plan"]["scenario"] == "starved" else 0}
+        said = json.dumps({"trace": trace(asked["plan"], asked["budget"]), **cost}).encode()
+    elif behaviour == "reaches its processor time":
+        os.kill(os.getpid(), signal.SIGXCPU)
+    elif behaviour == "grows":
+        grown = b"x" * (200 << 20)
+        signal.pause()
+    elif behaviour == "dies":
+        os._exit(1)
+    elif behaviour == "dies in its sentence":
+        line.sendall(b'{"trace": {"form')
+        os._exit(1)
+    elif behaviour == "hangs":
+        signal.pause()
+    elif behaviour == "talks without end":
+        while True:
+            line.sendall(b"x" * 65536)
+    elif behaviour == "says why not":
+        said = json.dumps({"problem": "Traceback\\n  File x\\nValueError: no such thing"}).encode()
+    else:
+        said = behaviour.encode()
+    line.sendall(said + b"\\n")
+    if behaviour == "rests":
+        time.sleep(0.5)
+"""
+
+
+class Stage:
+    """Isolation whose workers behave as a test says, one behaviour for each start and the last for all others."""
+
+    name = "stage"
+    submission_seen_at = ""
+    host_seen_at = ""
+
+    def __init__(self, folder: Path, behaviours: list[str]) -> None:
+        self._folder = folder
+        (folder / "behaviours.json").write_text(json.dumps(behaviours), encoding="utf-8")
+
+    def worker_command(self, argv, environment, pass_fds, view=None):
+        command = (sys.executable, "-I", "-S", "-c", WORKER, str(self._folder), argv[-1])
+        return Command(command, dict(environment), tuple(pass_fds))
+
+    def pids(self) -> list[int]:
+        """Return the processes that were started, in order."""
+        starts = sorted(self._folder.glob("start-*/pid"), key=lambda path: int(path.parent.name[6:]))
+        return [int(path.read_text()) for path in starts]
+
+
+def plan(scenario: str = "alone", clock: str = "virtual") -> Plan:
+    return Plan(scenario, (("a.py", "a.py"),), "/nowhere", "ab" * 32, 5, "", 5, (), (), clock)
+
+
+def jobs(*scenarios: str) -> list[Job]:
+    return [Job(f"exercise 1: {scenario}", plan(scenario)) for scenario in scenarios]
+
+
+@pytest.fixture
+def make(tmp_path):
+    """Return a recorder with workers that behave as told; all is ended afterwards."""
+    made = []
+
+    def make_one(*behaviours: str, workers: int = 1, domains=None) -> tuple[Recorder, Stage]:
+        stage = Stage(tmp_path, list(behaviours))
+        domains = itertools.count(10) if domains is None else domains
+        recorder = Recorder(stage, RUNTIME, domains, scratch=tmp_path, workers=workers)
+        made.append(recorder)
+        return recorder, stage
+
+    yield make_one
+    for recorder in made:
+        recorder.close()
+
+
+def note(trace):
+    """Return what the worker of a trace said of itself."""
+    assert trace.harness_problem == ""
+    return trace.notes[0]
+
+
+def nothing(step: str) -> None:
+    """Hear a step, and do nothing."""
+
+
+def test_a_worker_may_take_its_time_to_read_a_plan(make):
+    """A plan with a recording in it is more than the line holds at once."""
+    recorder, stage = make("rests")
+    large = replace(plan("large"), root="x" * 4_000_000)
+    traces = recorder.record([*jobs("small"), Job("large", large)], nothing)
+    assert [trace.harness_problem for trace in traces] == ["", ""]
+    assert len(stage.pids()) == 1
+
+
+def test_traces_come_back_in_the_order_of_the_jobs(make):
+    """However many workers there are; each scenario gets a domain of its own."""
+    recorder, _ = make("answers", workers=3)
+    names = [f"scenario {n}" for n in range(12)]
+    steps = []
+    traces = recorder.record(jobs(*names), steps.append)
+    assert [trace.scenario for trace in traces] == names
+    assert len({note(trace).split(", ")[1] for trace in traces}) == 12
+    assert sorted(steps) == sorted(f"exercise 1: {name}" for name in names)
+
+
+def test_a_warm_worker_is_used_first_and_again(make):
+    """It was started before there was anything to do, and serves one plan after another."""
+    recorder, stage = make("answers", workers=2)
+    recorder.warm_up(1)
+    for _ in range(3):
+        assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 0")
+    assert len(stage.pids()) == 1
+
+
+def test_every_warm_worker_is_used(make):
+    """None is started and forgotten."""
+    recorder, stage = make("answers", workers=3)
+    recorder.warm_up(2)
+    recorder.warm_up(5)
+    recorder.record(jobs(*"abcdefgh"), nothing)
+    wait_for(lambda: len(stage.pids()) == 3)
+
+
+def test_workers_outlive_the_call_that_started_them(make):
+    """The system ends a process with the thread that started it: that thread must live as long as the recorder."""
+    recorder, stage = make("answers", workers=2)
+    recorder.record(jobs("a", "b", "c", "d"), nothing)
+    first = stage.pids()
+    recorder.record(jobs("a", "b", "c", "d"), nothing)
+    assert stage.pids() == first
+
+
+@pytest.mark.parametrize(
+    "behaviour",
+    [
+        "dies",
+        "dies in its sentence",
+        "says why not",
+        "no json",
+        "[]",
+        "{}",
+        '{"trace": null}',
+        '{"trace": {"format": "grader/trace/v2"}}',
+        '{"trace": [1, 2]}',
+        "\ud83e",
+        "[" * 200_000,
+    ],
+)
+def test_a_worker_that_fails_is_replaced_and_the_plan_tried_again(make, behaviour):
+    """The second try is the one that counts."""
+    behaviour = behaviour.encode("utf-8", "replace").decode()
+    recorder, stage = make(behaviour, "answers")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    assert note(trace).startswith("worker 1")
+    assert not alive(stage.pids()[0])
+
+
+def test_a_second_failure_is_a_problem_of_ours(make):
+    """The trace says why, and forbids judging; the next plan gets a new worker."""
+    recorder, stage = make("says why not", "says why not", "answers")
+    failed, fine = recorder.record([Job("one", plan("one", "wall")), *jobs("two")], nothing)
+    assert failed.harness_problem == "worker: ValueError: no such thing"
+    assert (failed.scenario, failed.clock, failed.observations) == ("one", ClockKind.WALL, ())
+    assert note(fine).startswith("worker 2")
+    assert len(stage.pids()) == 3
+
+
+@pytest.mark.parametrize("behaviour", ["", '{"problem": ""}', '{"problem": 7}', "dies"])
+def test_a_problem_without_words_still_has_some(make, behaviour):
+    """No line of a report is empty, or shows how Python writes a list."""
+    recorder, _ = make(behaviour)
+    problem = recorder.record(jobs("alone"), nothing)[0].harness_problem
+    assert problem.startswith("worker: ")
+    assert "[" not in problem
+    assert len(problem) > len("worker: ")
+
+
+def test_a_worker_that_hangs_is_given_up(make, monkeypatch):
+    """It is ended, whatever it does."""
+    monkeypatch.setattr(module, "MARGIN_S", 0.05)
+    recorder, stage = make("hangs")
+    hurried = replace(plan(), limits=Limits(wall_ns=0))
+    (trace,) = recorder.record([Job("exercise 1: alone", hurried)], nothing)
+    assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
+    assert not any(map(alive, stage.pids()))
+
+
+def test_an_answer_without_end_is_not_read_to_its_end(make, monkeypatch):
+    """Memory stays ours."""
+    monkeypatch.setattr(module, "ANSWER_BYTES", 1 << 20)
+    recorder, stage = make("talks without end")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    assert "without end" in trace.harness_problem
+    assert not any(map(alive, stage.pids()))
+
+
+def test_one_lost_scenario_does_not_cost_the_others(make):
+    """Each plan stands for itself."""
+    recorder, _ = make("answers", "dies", "dies", "answers", workers=2)
+    traces = recorder.record(jobs(*"abcdef"), nothing)
+    assert sum(bool(trace.harness_problem) for trace in traces) <= 1
+    assert [trace.scenario for trace in traces] == list("abcdef")
+
+
+def test_any_other_problem_is_raised_and_nothing_hangs(make):
+    """A machine without a free domain is not the worker's failure; the recorder can be closed all the same."""
+
+    def none_free():
+        raise EnvironmentFault("ROS domains: expected a free one, found all in use")
+        yield
+
+    recorder, _ = make("answers", workers=2, domains=none_free())
+    with pytest.raises(EnvironmentFault):
+        recorder.record(jobs("alone"), nothing)
+    recorder.close()
+
+
+class Failing:
+    """Domains, of which every one but the last is not to be had."""
+
+    def __init__(self, failures: int) -> None:
+        self._left = failures
+
+    def __iter__(self):
+        return self
+
+    def __next__(self) -> int:
+        self._left -= 1
+        if self._left >= 0:
+            raise EnvironmentFault("ROS domains: expected a free one, found all in use")
+        return 10
+
+
+def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make):
+    """As many plans as there were workers failed; the next one finds a worker."""
+    recorder, _ = make("answers", workers=2, domains=Failing(3))
+    for _ in range(3):
+        with pytest.raises(EnvironmentFault):
+            recorder.record(jobs("alone"), nothing)
+    assert recorder.record(jobs("alone"), nothing)[0].harness_problem == ""
+
+
+def test_closing_ends_every_worker(make):
+    """Idle ones too, and closing again does no harm."""
+    recorder, stage = make("answers", workers=3)
+    recorder.warm_up(3)
+    recorder.record(jobs("alone"), nothing)
+    wait_for(lambda: len(stage.pids()) == 3)
+    recorder.close()
+    recorder.close()
+    assert not any(map(alive, stage.pids()))
+    with pytest.raises(RuntimeError):
+        recorder.record(jobs("alone"), nothing)
+
+
+def test_closing_while_scenarios_are_under_way_ends_them(make):
+    """After Ctrl-C nobody waits for what a worker does; nothing is started any more."""
+    recorder, stage = make("hangs", workers=2)
+    ended = []
+
+    def record():
+        try:
+            recorder.record(jobs(*"abcdef"), nothing)
+        except BaseException as error:
+            ended.append(error)
+        else:
+            ended.append(None)
+
+    thread = threading.Thread(target=record)
+    thread.start()
+    wait_for(lambda: len(stage.pids()) == 2)
+    recorder.close()
+    thread.join()
+    assert len(ended) == 1
+    assert len(stage.pids()) == 2
+    assert not any(map(alive, stage.pids()))
+
+
+def test_a_recorder_closes_with_its_block(make):
+    """Also when the block raises."""
+    recorder, stage = make("answers")
+    recorder.record(jobs("alone"), nothing)
+    with pytest.raises(KeyboardInterrupt), recorder:
+        raise KeyboardInterrupt
+    assert not any(map(alive, stage.pids()))
+
+
+def test_a_worker_inherits_nothing_of_the_callers_environment(make, monkeypatch):
+    """Tokens of a build server stay outside."""
+    monkeypatch.setenv("GITHUB_TOKEN", "canary")
+    recorder, stage = make("answers")
+    recorder.record(jobs("alone"), nothing)
+    (pid,) = stage.pids()
+    assert b"canary" not in Path(f"/proc/{pid}/environ").read_bytes()
+
+
+def test_a_worker_keeps_no_descriptor_of_another(make):
+    """Lines between the supervisor and one worker are nobody else's."""
+    recorder, stage = make("answers", workers=2)
+    recorder.warm_up(2)
+    recorder.record(jobs("a", "b"), nothing)
+    wait_for(lambda: len(stage.pids()) == 2)
+    for pid in stage.pids():
+        links = [str(link.readlink()) for link in Path(f"/proc/{pid}/fd").iterdir() if link.is_symlink()]
+        assert len([link for link in links if link.startswith("socket:")]) == 1
+
+
+def alive(pid: int) -> bool:
+    """Return whether a process runs; a zombie does not."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] not in "ZX"
+
+
+def wait_for(condition, seconds: float = 60) -> None:
+    """Wait until a condition holds; fail if it never does."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it never came to that"
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize(
+    ("told", "kept", "times"),
+    [
+        ("ended by SIGABRT|", "", 2),
+        ("ended by SIGABRT|ended by SIGSEGV|", "ended by SIGSEGV", 2),
+        ("stopped at 512 MiB of memory|", "stopped at 512 MiB of memory", 1),
+        ("ended by SIGABRT (the limit is 64 processes and threads)|", "ended by SIGABRT (the limit", 1),
+        ("|ended by SIGABRT", "", 1),
+    ],
+)
+def test_a_signal_that_no_limit_explains_has_to_come_twice(make, told, kept, times):
+    """A machine that was out of threads for a moment costs nobody a point; a node that aborts does so again."""
+    recorder, _ = make(f"tells of {told}")
+    (found,) = recorder.record(jobs("alone"), lambda step: None)
+    assert "".join(fault.text for fault in found.faults()).startswith(kept)
+    assert bool(found.faults()) is bool(kept)
+    assert found.notes == (f"plan {times - 1}",)
+
+
+def test_a_worn_worker_does_no_more(make):
+    """The next scenario gets a fresh one."""
+    recorder, stage = make("is worn", "is worn", "answers")
+    found = [note(recorder.record(jobs("alone"), nothing)[0]) for _ in range(4)]
+    assert [text.partition(",")[0] for text in found] == ["worker 0", "worker 1", "worker 2", "worker 2"]
+    assert len(stage.pids()) == 3
+
+
+LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100 MiB of memory"}
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Workers may fill little, and are those of the stage."""
+    monkeypatch.setattr(module, "MODULE", b"-c")
+    monkeypatch.setattr(module, "FULL_BYTES", 100 << 20)
+
+
+@pytest.mark.parametrize("behaviour", LIMITS)
+def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(make, small, behaviour):
+    """They do it again and again: a fault of theirs, and no third try."""
+    recorder, stage = make(behaviour, behaviour, "answers")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    words = f"stopped: what the nodes sent took the grader's own process to {LIMITS[behaviour]}"
+    assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
+    assert (trace.harness_problem, trace.stop_ns, len(stage.pids())) == ("", 5, 2)
+
+
+@pytest.mark.parametrize("behaviour", LIMITS)
+def test_one_worker_at_a_limit_decides_nothing(make, small, behaviour):
+    """The plan is tried again."""
+    recorder, _ = make(behaviour, "answers")
+    assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 1")
+
+
+@pytest.mark.parametrize("first", [*LIMITS, "dies"])
+def test_different_ends_of_workers_decide_nothing(make, small, first):
+    """A limit and a failure without one, in any order."""
+    recorder, _ = make(first, "dies", "answers")
+    (trace,) = recorder.record(jobs("alone"), nothing)
+    assert trace.harness_problem.startswith("worker: expected a trace of alone, found none")
+    assert trace.faults() == ()
+
+
+def test_a_worker_that_took_all_its_time_is_not_tried_again(make, monkeypatch):
+    """A second try would take as long."""
+    monkeypatch.setattr(module, "MARGIN_S", 0.2)
+    recorder, stage = make("hangs", "answers")
+    short = replace(plan(), limits=Limits(wall_ns=1))
+    (trace,) = recorder.record([Job("alone", short)], nothing)
+    assert trace.harness_problem == "worker: expected a trace of alone, found none (it did not answer in time)"
+    assert len(stage.pids()) == 1
+
+
+def test_without_time_nothing_is_recorded(make):
+    """It is told as a fault of every process, the same in every run; no worker is even asked."""
+    recorder, stage = make("answers")
+    job = replace(jobs("alone")[0], budget=RealTimeBudget(0))
+    (trace,) = recorder.record([job], nothing)
+    words = "stopped: the recordings of this submission took more than 0 s of real time"
+    assert [(fault.process, fault.text) for fault in trace.faults()] == [("a.py", words)]
+    assert (trace.harness_problem, trace.stop_ns, stage.pids()) == ("", 5, [])
+
+
+@pytest.mark.parametrize(("scenario", "undecided"), [("starved", True), ("alone", False)])
+def test_time_that_others_took_is_nobodys_fault(make, monkeypatch, scenario, undecided):
+    """Workers say how long nodes waited for a processor; where that is much, what is not recorded is not judged."""
+    recorder, _ = make("costs")
+    budget = RealTimeBudget(3600)
+    (first,) = recorder.record([replace(jobs(scenario)[0], budget=budget)], nothing)
+    assert note(first) == "stopped: the recordings of this submission took more than 3600 s of real time"
+    monkeypatch.setattr(RealTimeBudget, "left_ns", 0)
+    (trace,) = recorder.record([replace(jobs("next")[0], budget=budget)], nothing)
+    assert (bool(trace.harness_problem), bool(trace.faults())) == (undecided, not undecided)

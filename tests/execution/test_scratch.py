@@ -1,0 +1,51 @@
+"""How many names there are in scratch folders, tried in the sandboxes that have their own."""
+
+import os
+import shutil
+
+import pytest
+from sandboxes import close, make_submission, start, walls
+
+from grader.core.errors import EnvironmentFault
+from grader.execution.ros_installation import find_ros
+from grader.execution.usage import families, scratch_names
+
+CODE = """
+import os, time
+for number in range(700):
+    os.mknod(f"{folder}/{{number}}")
+print("ready", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def submission():
+    folder = make_submission()
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize("folder", ["/tmp", "/tmp/work", "/dev/shm"])
+@pytest.mark.parametrize("tier", ["bubblewrap-root", "bubblewrap"])
+def test_names_are_counted_wherever_a_student_may_make_them(tier, folder, submission):
+    """From outside, in the file systems that the student's processes see."""
+    try:
+        sandbox = walls(tier, find_ros(), submission)
+    except EnvironmentFault as fault:
+        pytest.skip(fault.message)
+    if isinstance(sandbox, str):
+        pytest.skip(sandbox)
+    student = sandbox.student(CODE.format(folder=folder))
+    with start(sandbox.around(student)) as process:
+        assert process.stdout.readline() == "ready\n"
+        found = scratch_names(families([process.pid])[process.pid])
+        process.kill()
+    close(student)
+    assert 700 <= found < 800
+
+
+def test_names_in_the_machines_own_folders_are_nobodys():
+    """A process outside of a sandbox has none, and neither has one that is gone."""
+    assert scratch_names([os.getpid(), 2**22 + 1]) == 0
+    assert scratch_names([]) == 0

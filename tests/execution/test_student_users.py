@@ -1,0 +1,34 @@
+"""Users that student processes become: no two of one machine are the same."""
+
+import subprocess
+import sys
+
+from grader.execution.sandbox import exposure
+
+TAKES_ALL_BUT_ONE = """
+import fcntl, os, sys
+file = os.open(sys.argv[1], os.O_CREAT | os.O_RDWR)
+for user in range(61234, 65234):
+    if user != 61777:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, user)
+print("taken", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_no_two_graders_take_one_user(tmp_path, monkeypatch):
+    """A fork bomb of one student would take the threads of another's node, whose loss would look like its own fault."""
+    monkeypatch.setattr(exposure, "TRIES", 10**6)
+    argv = [sys.executable, "-I", "-c", TAKES_ALL_BUT_ONE, str(tmp_path / "users")]
+    with subprocess.Popen(argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"taken\n"
+        users = exposure.StudentUsers(tmp_path / "users")
+        assert users.next() == 61777
+        other.communicate()
+    assert len({61777, *(users.next() for _ in range(1000))}) == 1001
+
+
+def test_without_a_place_for_locks_users_are_still_handed_out(tmp_path):
+    """A read-only machine grades too; two students of one grader then still differ."""
+    users = exposure.StudentUsers(tmp_path / "missing" / "users")
+    assert len({users.next() for _ in range(1000)}) == 1000

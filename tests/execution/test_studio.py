@@ -1,0 +1,101 @@
+"""The studio: which traces are final when, and what is recorded again on the wall clock."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.core.trace import ClockKind, Trace
+from grader.execution.plan import Plan
+from grader.execution.recording_session import AUTO, VIRTUAL, WALL, Studio
+from grader.execution.supervisor import Job
+
+
+class Recorder:
+    """Records nothing; says of the scenarios named that virtual time does them no justice."""
+
+    def __init__(self, *unfit, broken=()):
+        self.unfit, self.broken, self.recorded = unfit, broken, []
+
+    def each(self, jobs, progress):
+        for job in jobs:
+            scenario, clock = job.plan.scenario, ClockKind(job.plan.clock)
+            self.recorded.append((scenario, clock.value))
+            reason = "it is busy" if scenario in self.unfit and clock is ClockKind.VIRTUAL else ""
+            problem = "lost" if scenario in self.broken else ""
+            yield Trace(scenario, clock, 1, (), clock_reason=reason, harness_problem=problem)
+
+    def record(self, jobs, progress):
+        return list(self.each(jobs, progress))
+
+
+def job(scenario):
+    plan = Plan(scenario, (), "/", "00", 1, "", 1, (), (), VIRTUAL)
+    return Job(scenario, plan)
+
+
+def recorded(recorder, clock, *scenarios):
+    """Return what was heard, in order, and the traces at the end."""
+    heard = []
+    studio = Studio(*(None,) * (len(Studio.__slots__) - 2), recorder, Path("nowhere"))
+    jobs = {name: job(name) for name in scenarios}
+    traces = studio.record(jobs, clock, lambda step: None, lambda key, trace: heard.append((key, trace)))
+    return heard, traces
+
+
+def test_what_is_final_is_heard_at_once_and_what_is_not_at_the_end():
+    """A recording that will be replaced is heard once, as the one that replaces it."""
+    heard, traces = recorded(Recorder("a"), AUTO, "a", "b", "c")
+    assert [key for key, _ in heard] == ["b", "c", "a"]
+    assert dict(heard) == traces
+    assert traces["a"].clock is ClockKind.WALL
+    assert traces["a"].clock_reason == "it is busy"
+
+
+@pytest.mark.parametrize("clock", [VIRTUAL, WALL])
+def test_a_clock_that_was_chosen_is_kept(clock):
+    """Only `auto` records anything twice."""
+    recorder = Recorder("a")
+    heard, _ = recorded(recorder, clock, "a", "b")
+    assert [key for key, _ in heard] == ["a", "b"]
+    assert len(recorder.recorded) == 2
+
+
+def test_a_fault_of_ours_is_not_tried_on_the_other_clock():
+    """The wall clock would not mend it."""
+    recorder = Recorder("a", broken=("a",))
+    recorded(recorder, AUTO, "a")
+    assert recorder.recorded == [("a", "virtual")]
+
+
+def test_the_first_look_may_end_early_only_if_there_is_a_second():
+    """A plan says so to its worker."""
+    plans = []
+
+    class Listening(Recorder):
+        def each(self, jobs, progress):
+            plans.extend(job.plan.stop_when_unfit for job in jobs)
+            return super().each(jobs, progress)
+
+    recorded(Listening(), AUTO, "a")
+    recorded(Listening(), VIRTUAL, "a")
+    assert plans == [True, False]
+
+
+def test_all_recordings_of_a_submission_share_one_budget():
+    """Also what is recorded again; the next submission has its own."""
+    budgets = []
+
+    class Listening(Recorder):
+        def each(self, jobs, progress):
+            budgets.extend(job.budget for job in jobs)
+            yield from super().each(jobs, progress)
+
+    studio = Studio(*(None,) * (len(Studio.__slots__) - 2), Listening("a"), Path("nowhere"))
+    for budget_s in (20, 30):
+        studio.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
+    first, second = budgets[:3], budgets[3:]
+    assert [len(set(map(id, part))) for part in (first, second)] == [1, 1]
+    assert [part[0].words.partition("more than ")[2] for part in (first, second)] == [
+        "20 s of real time",
+        "30 s of real time",
+    ]

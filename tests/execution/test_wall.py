@@ -1,0 +1,202 @@
+"""The conductor of the wall clock, on a clock that the tests advance: what it writes down, and when it says nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from scripted import FLOAT, INT, MS, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
+
+from grader.core.limits import Limits
+from grader.core.trace import ClockKind, FaultKind
+from grader.execution import wall_runner as module
+from grader.execution.plan import PlannedRecording
+from grader.execution.wall_runner import WallConductor
+
+SILENT = {"kind": "silent"}
+
+
+class Clock:
+    """Stands for the module `time`: each pause takes a millisecond, and holds up where a test says so."""
+
+    def __init__(self):
+        self.now_ns = 10**12
+        self.held_up = {}
+
+    def monotonic_ns(self):
+        return self.now_ns
+
+    def sleep(self, seconds):
+        elapsed_ms = (self.now_ns - 10**12) // MS
+        self.now_ns += self.held_up.pop(elapsed_ms, 1) * MS
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    made = Clock()
+    monkeypatch.setattr(module, "time", made)
+    return made
+
+
+class Run:
+    """One run of some programs: its trace, and everybody who took part."""
+
+    def __init__(self, *programs, **fields):
+        self.world = World()
+        self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(("a.py", "b.py"), programs, strict=False)]
+        self.observer = ScriptedObserver(self.world)
+        self.trace = WallConductor(plan(clock="wall", **fields), self.students, self.observer).run()
+
+
+def publisher(topic, *, every_ms, first_ms=0, interface=FLOAT):
+    """A program that publishes on a topic in the loops of the conductor, one a millisecond."""
+
+    def program(me, world):
+        world.have(me.name, claim("publisher", topic, interface))
+        ms = 0
+        while True:
+            if ms >= first_ms and (ms - first_ms) % every_ms == 0:
+                world.publish(topic, ms, interface)
+            ms += 1
+            yield SILENT
+
+    return program
+
+
+def quiet(me, world):
+    """A program that does nothing."""
+    while True:
+        yield SILENT
+
+
+def test_messages_get_the_time_at_which_they_came(clock):
+    """To the millisecond in which the conductor looks."""
+    run = Run(publisher("/cmd_vel", every_ms=50))
+    assert [m.t_ns // MS for m in run.trace.messages("/cmd_vel")] == list(range(0, 1000, 50))
+    assert (run.trace.clock, run.trace.stop_ns, run.trace.harness_problem) == (ClockKind.WALL, 1000 * MS, "")
+
+
+def test_the_span_begins_with_the_first_message(clock):
+    """A node that starts late is observed as long as one that starts at once."""
+    run = Run(publisher("/cmd_vel", every_ms=50, first_ms=700), first_message_on="/cmd_vel")
+    messages = run.trace.messages("/cmd_vel")
+    assert run.trace.stop_ns == messages[0].t_ns + 1000 * MS
+    assert len(messages) == 20
+
+
+def test_a_first_message_is_waited_for_as_long_as_virtually(clock):
+    """A timer of a long period shows its publisher's rate on either clock."""
+    run = Run(
+        publisher("/cmd_vel", every_ms=50, first_ms=5000), first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS
+    )
+    assert run.trace.stop_ns == run.trace.messages("/cmd_vel")[0].t_ns + 1000 * MS
+    assert Run(quiet, first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS).trace.stop_ns == 60_000 * MS
+
+
+def test_every_process_is_told_to_start(clock):
+    """Once, and nothing more until the stop signal."""
+    run = Run(quiet, quiet)
+    assert [len(student.heard) for student in run.students] == [1, 1]
+
+
+def test_a_machine_that_did_not_keep_up_is_no_judge(clock):
+    """The reference is the loop itself: held up for long, it says nothing about the nodes."""
+    clock.held_up = {300: 151}
+    assert Run(quiet).trace.harness_problem.startswith("the machine was too busy")
+    clock.now_ns, clock.held_up = 10**12, {300: 150}
+    assert Run(quiet).trace.harness_problem == ""
+
+
+def test_numbers_are_published_when_they_are_due(clock):
+    """In the type that the student's subscription asks for, as soon as it is seen."""
+
+    def program(me, world):
+        world.have(me.name, claim("subscription", "/temperature", INT))
+        yield from quiet(me, world)
+
+    run = Run(program, numbers=(numbers((25.0, 1), (20.0, 0)),))
+    deliveries = run.trace.deliveries("/temperature")
+    assert [d.t_ns // MS for d in deliveries] == [100, 200]
+    assert [(d.type, d.value["data"]) for d in deliveries] == [(INT, 26), (INT, 20)]
+    assert [message.data for _, message in run.observer.published] == [26, 20]
+
+
+def test_a_recording_appears_plays_and_disappears(clock):
+    """The publisher is there exactly while it plays."""
+    messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
+    recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
+    trace = Run(quiet, recordings=(recording,)).trace
+    assert [d.t_ns // MS for d in trace.deliveries("/odom")] == [200, 233, 266]
+    assert [m.t_ns // MS for m in (*trace.marks("stream_starts", "/odom"), *trace.marks("stream_stops", "/odom"))] == [
+        200,
+        267,
+    ]
+
+
+def test_too_many_messages_end_the_run_with_a_mark(clock):
+    """A flood is evidence enough."""
+    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=5)).trace
+    assert len(trace.messages()) == 5
+    (mark,) = trace.marks("limit")
+    assert mark.detail == "more than 5 messages on /cmd_vel: the rest was not looked at"
+    assert trace.stop_ns == mark.t_ns
+
+
+def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
+    """An exit with a fault, a death without a word, and what was written before."""
+
+    def leaves(me, world):
+        yield {"kind": "note", "code": "main_not_called"}
+        me.write("bye")
+        yield {"kind": "exited", "code": 1, "fault": {"code": "exception", "type": "ValueError", "message": "x"}}
+
+    def dies(me, world):
+        yield {"kind": "fault", "fault": {"code": "exception", "type": "KeyError", "message": "in a thread"}}
+        me.write("last words")
+        yield None
+
+    trace = Run(leaves, dies).trace
+    assert [(f.process, f.kind, f.text) for f in trace.faults()] == [
+        ("b.py", FaultKind.EXCEPTION, "KeyError: in a thread"),
+        ("a.py", FaultKind.EXCEPTION, "ValueError: x"),
+        ("b.py", FaultKind.KILLED, "ended by SIGKILL"),
+    ]
+    assert [line.text for line in trace.lines()] == ["bye", "last words"]
+    assert trace.notes == ("main_not_called",)
+    assert trace.stop_ns == 1000 * MS
+
+
+def test_the_graph_is_written_down_when_it_changed(clock):
+    """Looked at now and then, since looking costs much."""
+    run = Run(publisher("/cmd_vel", every_ms=50))
+    assert len(run.trace.graphs()) == 1
+    assert [e.topic for e in run.trace.graphs()[0].endpoints] == ["/cmd_vel"]
+
+
+def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock):
+    """A publisher that goes at once takes with it what is still on its way."""
+    recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, ((200 * MS, b"cdr", {}),))
+    gone = ("/odom", "", False)
+    assert Run(quiet, recordings=(recording,), duration_ns=600 * MS).observer.advertised[-1] != gone
+    assert Run(quiet, recordings=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
+
+
+def test_a_node_that_floods_is_no_excuse(clock):
+    """What holds the machine up is then the node itself: it is judged, not let off."""
+    clock.held_up = {300: 400}
+    trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500)).trace
+    assert (trace.harness_problem, len(trace.messages("/cmd_vel"))) == ("", 500)
+
+
+def test_two_recordings_on_one_topic_do_not_end_each_other(clock):
+    """The first one's publisher, which stays for its last message, goes before the second one's comes."""
+    first = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 300 * MS, ((200 * MS, b"cdr", {}),))
+    second = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 400 * MS, 900 * MS, ((800 * MS, b"cdr", {}),))
+    run = Run(quiet, recordings=(first, second))
+    assert [(topic, bool(kind)) for topic, kind, _ in run.observer.advertised] == [
+        ("/odom", True),
+        ("/odom", False),
+        ("/odom", True),
+    ]
+    assert len(run.trace.deliveries("/odom")) == 2

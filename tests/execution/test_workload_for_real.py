@@ -1,0 +1,150 @@
+"""Whatever holds a node up in reality sends it to the wall clock, and nothing else does; on real nodes."""
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from hostile import hostile, record
+
+from grader.core.quantities import NS_PER_S
+from grader.execution.virtual_time_suitability import BUSY, OUTSIDE
+
+pytestmark = pytest.mark.ros
+
+SOCKET = "self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)\nself.socket.bind(('127.0.0.1', 0))\n"
+#: What a node does at each tick of its 20 Hz timer, after what it does once; waits of 100 ms, where it has 50.
+WAITS = {
+    "socket": (SOCKET + "self.socket.settimeout(0.1)", "try: self.socket.recv(10)\nexcept OSError: pass"),
+    "select": (SOCKET, "import select\nselect.select([self.socket], [], [], 0.1)"),
+    "poll": (
+        SOCKET + "import select\nself.poll = select.poll()\nself.poll.register(self.socket, select.POLLIN)",
+        "self.poll.poll(100)",
+    ),
+    "selectors": (
+        SOCKET + "import selectors\nself.s = selectors.DefaultSelector()\nself.s.register(self.socket, 1)",
+        "self.s.select(0.1)",
+    ),
+    "usleep": ("import ctypes\nself.libc = ctypes.CDLL(None)", "self.libc.usleep(100_000)"),
+    "subprocess": ("", "import subprocess\nsubprocess.run([sys.executable, '-c', 'import time; time.sleep(.1)'])"),
+    "captured": (
+        "",
+        "import subprocess\nsubprocess.run([sys.executable, '-c', 'import time; time.sleep(.1)'], capture_output=True)",
+    ),
+    "fork": (
+        "",
+        "import multiprocessing\np = multiprocessing.Process(target=time.sleep, args=(.1,))\np.start()\np.join()",
+    ),
+    "signal": ("", "import signal\nsignal.sigtimedwait([signal.SIGUSR1], 0.1)"),
+}
+WORK = {
+    "computing": ("", "end = os.times().user + 0.07\nwhile os.times().user < end: pass"),
+    "hidden": (
+        """
+        for name, module in list(sys.modules.items()):
+            if name.endswith("virtual") and hasattr(module, "VirtualTime"):
+                module.VirtualTime.summary = lambda self, say=module.VirtualTime.summary: {**say(self), "cpu_ns": 0}
+        """,
+        "end = os.times().user + 0.07\nwhile os.times().user < end: pass",
+    ),
+    "library": ("import hashlib", "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 300_000)"),
+}
+
+
+@pytest.fixture
+def run(studio, tmp_path):
+    tmp_path.chmod(0o755)
+
+    def run_one(harm, later, **fields):
+        program = hostile(harm=harm, later=later)
+        return record(
+            studio, tmp_path / "s", program, **{"duration_ns": 3 * NS_PER_S, "stop_when_unfit": True, **fields}
+        )
+
+    return run_one
+
+
+@pytest.mark.parametrize(("once", "later"), WAITS.values(), ids=WAITS)
+def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(run, once, later):
+    assert run(once, later).clock_reason == OUTSIDE
+
+
+@pytest.mark.parametrize(("once", "later"), WORK.values(), ids=WORK)
+def test_long_computing_is_for_the_wall_clock(run, once, later):
+    assert run(once, later).clock_reason == BUSY
+
+
+def test_a_rare_block_that_delays_other_timers_is_noticed(run):
+    """200 ms once a second: three of twenty messages a second would come late."""
+    assert run("", "if self.count % 20 == 0: __import__('ctypes').CDLL(None).usleep(200_000)").clock_reason == OUTSIDE
+
+
+LOOP = """
+import threading
+def run():
+    while True:
+        self.tick()
+        time.sleep(0.05)
+self.destroy_timer(self.timer)
+threading.Thread(target=run, daemon=True).start()
+"""
+AGAIN = "self.timer.cancel()\n{}\nself.timer.reset()"
+COMPUTING = "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 20_000)"
+
+
+@pytest.mark.parametrize(("once", "later"), [(LOOP, COMPUTING), ("", AGAIN.format(COMPUTING))], ids=["loop", "again"])
+def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(run, once, later):
+    """Ten milliseconds fit between two ticks of a timer; a pause is counted from their end."""
+    assert run(once, later).clock_reason == BUSY
+
+
+def test_work_before_a_deadline_puts_off_nothing(run):
+    """A loop that sleeps until its next moment makes up for its work, on either clock."""
+    until = LOOP.replace("def run():\n", "def run():\n    due = time.monotonic()\n")
+    until = until.replace("time.sleep(0.05)", "due += 0.05\n        time.sleep(max(0.0, due - time.monotonic()))")
+    assert "due - " in until
+    assert run(until, COMPUTING).clock_reason == ""
+
+
+POLLS = """
+import threading
+def run():
+    due = time.perf_counter()
+    while True:
+        rclpy.ok()
+        if time.perf_counter() >= due:
+            due += 0.05
+            self.tick()
+self.destroy_timer(self.timer)
+threading.Thread(target=run, daemon=True).start()
+"""
+
+
+@pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(3_000_000))", BUSY)], ids=["polls", "works"])
+def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(run, later, reason):
+    """On a real clock a busy loop polls as often as there is time for, and is late by what it computes only."""
+    assert run(POLLS, later).clock_reason == reason
+
+
+def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
+    assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        "",
+        "time.sleep(0.03)",
+        "sum(range(20_000))",
+        "time.sleep(0.001)\nself.get_logger().info('x')",
+        "open(__file__).read()",
+    ],
+)
+def test_ordinary_nodes_stay_in_virtual_time(run, later):
+    trace = run("", later)
+    assert trace.clock_reason == ""
+    assert len(trace.messages("/cmd_vel")) >= 59
+
+
+def test_a_slow_start_delays_nothing(run):
+    """What a node does before it first waits is no lateness."""
+    assert run("end = os.times().user + 1.5\nwhile os.times().user < end: pass", "").clock_reason == ""

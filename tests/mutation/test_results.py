@@ -1,0 +1,161 @@
+"""What results of a self-test count as, and how they are shown."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import grader.mutation
+from grader.core.exercise import Outcome
+from grader.mutation.results import Fate, Result, Standing, Trial, one_line_change
+from grader.mutation.showing import render_results, results_to_json
+
+MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
+SCHEMA = json.loads((Path(grader.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
+
+
+def standing(rate=MET, speed=MET):
+    """Return what a program is worth under two criteria."""
+    outcomes = {"rate": rate, "speed": speed}
+    reasons = {id_: f"{id_} is {outcome.value}" for id_, outcome in outcomes.items() if outcome is not MET}
+    points = {MET: 2, PARTLY: 1, NOT_MET: 0, BLOCKED: 0, UNDECIDED: 0}
+    return Standing(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
+
+
+def trial(number, **attributes):
+    """Return a mutant."""
+    outcomes = {name: attributes.pop(name) for name in ("rate", "speed") if name in attributes}
+    return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", standing(**outcomes), **attributes)
+
+
+def result(*mutants, **attributes):
+    """Return what came of a rubric whose every criterion was turned once."""
+    always = (trial(1, rate=NOT_MET), trial(2, speed=PARTLY))
+    given = {"template": standing(NOT_MET, BLOCKED), "baseline": Fraction(0), "variants": (), **attributes}
+    return Result(
+        "r.yaml", "fan", ("rate", "speed"), given.pop("reference", standing()), mutants=(*always, *mutants), **given
+    )
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "fate"),
+    [
+        ((MET, MET), Fate.SURVIVED),
+        ((PARTLY, MET), Fate.KILLED),
+        ((BLOCKED, MET), Fate.KILLED),
+        ((UNDECIDED, NOT_MET), Fate.KILLED),
+        ((UNDECIDED, MET), Fate.UNDECIDED),
+    ],
+)
+def test_what_becomes_of_a_mutant(outcomes, fate):
+    """A trouble of the grader's neither kills it nor lets it survive."""
+    assert standing(*outcomes).fate is fate
+
+
+def test_a_rubric_without_a_known_hole_passes():
+    """Everything was noticed, or the author says why not."""
+    assert result(trial(3, because="it is the same")).passed
+
+
+@pytest.mark.parametrize(
+    "holed",
+    [
+        result(trial(3)),
+        result(reference=standing(rate=PARTLY)),
+        result(baseline=Fraction(1)),
+        result(variants=(trial(4, rate=NOT_MET),)),
+        replace(result(), mutants=(trial(1, rate=NOT_MET), trial(2, speed=BLOCKED))),
+    ],
+    ids=["survivor", "reference", "template", "variant", "never turned"],
+)
+def test_a_hole_is_a_hole(holed):
+    """A survivor, a reference or a variant that loses points, another baseline, a criterion that never turned."""
+    assert not holed.passed
+
+
+def test_undecided_mutants_are_set_apart():
+    """They are no survivors, and turn nothing."""
+    found = replace(result(), mutants=(trial(1, rate=NOT_MET), trial(2, speed=UNDECIDED)))
+    assert [t.id for t in found.undecided] == ["a.py:2:period:x"]
+    assert found.survivors == ()
+    assert found.never_turned == ("speed",)
+
+
+def test_a_part_of_the_mutants_says_nothing_about_what_never_turned():
+    """The others may turn it."""
+    assert replace(result(), mutants=(), whole=False).never_turned == ()
+
+
+def test_a_criterion_that_nothing_turns_may_be_explained():
+    """The text shows why."""
+    found = replace(result(), mutants=(trial(1, rate=NOT_MET),), unturned={"speed": "it is the last"})
+    assert found.passed
+    assert "speed is turned by no mutant because it is the last" in render_results([found], width=80, colour=False)
+
+
+def test_only_a_named_criterion_kills_as_expected():
+    """Where the author names some, one of them has to be turned."""
+    assert trial(1, rate=NOT_MET, expected=("rate", "speed")).as_expected
+    assert not trial(1, rate=NOT_MET, speed=BLOCKED, expected=("speed",)).as_expected
+    assert trial(1, rate=NOT_MET).as_expected
+    assert not trial(1, expected=("rate",)).as_expected
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "change"),
+    [
+        ("a\n  b\nc\n", "a\n  d\nc\n", "b => d"),
+        ("a\nb\n", "a\n", "b => (nothing)"),
+        ("a\n", "a\n\nb\nc\n", "(nothing) => b ¶ c"),
+        ("a\nb\n", "b\na\n", "moved: b"),
+    ],
+)
+def test_a_change_fits_on_one_line(before, after, change):
+    """Old lines, then new ones, without indentation."""
+    assert one_line_change(before, after) == change
+
+
+def everything():
+    """Return a result with something of every kind, and hostile text."""
+    hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", standing())
+    return result(
+        hostile,
+        trial(3, because="the same"),
+        trial(4, speed=NOT_MET, expected=("rate",)),
+        trial(5, rate=UNDECIDED),
+        variants=(trial(6, rate=NOT_MET), trial(7, rate=NOT_MET, because="asked for")),
+        idle=("r.selftest.yaml:3:5: `x` explains nothing",),
+    )
+
+
+def test_the_text_names_every_kind():
+    """Survivors with their change, explanations, other killers, what is undecided, and idle patterns."""
+    text = render_results([everything()], width=100, colour=False)
+    assert "fan (r.yaml): HAS HOLES" in text
+    assert "6 tried, 3 killed, 1 survived, 1 survived for a reason, 1 undecided" in text
+    for part in ("because the same", "expected rate", "a => 5", "because asked for", "`x` explains nothing"):
+        assert part in text
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+    assert not [line for line in text.splitlines() if line.startswith("::")]
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_without_a_right_reference_the_text_says_why_nothing_was_tried():
+    """And which criteria it lost."""
+    text = render_results([replace(result(reference=standing(rate=PARTLY)), mutants=())], width=80, colour=False)
+    assert "none tried" in text
+    assert "rate: rate is partly" in text
+
+
+def test_the_json_fits_its_schema():
+    """Also with hostile text and with nothing at all."""
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    for found in (everything(), replace(result(), mutants=(), template=None, baseline=None)):
+        data = json.loads(results_to_json([found]))
+        jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    assert data["passed"] is False
+    assert data["rubrics"][0]["never_turned"] == ["rate", "speed"]

@@ -1,0 +1,105 @@
+"""Output files: whole or not at all."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from grader.reporting.delivery import check_writable, write_whole
+
+
+def test_a_new_file_has_the_usual_mode(tmp_path):
+    """A report is as readable for others as any file that the user makes."""
+    before = os.umask(0o027)
+    try:
+        write_whole(tmp_path / "r.json", b"new")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "r.json").read_bytes() == b"new"
+    assert stat.S_IMODE((tmp_path / "r.json").stat().st_mode) == 0o640
+
+
+def test_an_existing_file_keeps_its_mode_and_its_readers(tmp_path):
+    """Whoever has the old report open reads the old report to its end."""
+    path = tmp_path / "r.json"
+    path.write_bytes(b"old")
+    path.chmod(0o600)
+    with path.open("rb") as reader:
+        write_whole(path, b"new")
+        assert reader.read() == b"old"
+    assert path.read_bytes() == b"new"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    """A full disk does not destroy yesterday's report."""
+    path = tmp_path / "r.json"
+    path.write_bytes(b"old")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_write_leaves_nothing_either(tmp_path, monkeypatch):
+    """Ctrl-C in the middle of writing leaves no litter."""
+
+    def interrupt(descriptor):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_whole(tmp_path / "r.json", b"new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_stays_a_link(tmp_path):
+    """The file behind a link is replaced, not the link."""
+    (tmp_path / "deep").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to("deep/r.json")
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert (tmp_path / "deep" / "r.json").read_bytes() == b"new"
+
+
+def test_a_device_is_written_to_and_not_replaced():
+    """`-o json=/dev/null` must not turn the device into a file."""
+    check_writable(Path("/dev/null"))
+    write_whole(Path("/dev/null"), b"new")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_the_check_changes_nothing(tmp_path):
+    """Asking whether a report could be written leaves no file."""
+    old = tmp_path / "old"
+    old.write_bytes(b"old")
+    check_writable(old)
+    check_writable(tmp_path / "new")
+    assert list(tmp_path.iterdir()) == [old]
+    assert old.read_bytes() == b"old"
+
+
+def test_what_cannot_be_written_is_refused(tmp_path):
+    """A folder, a missing folder and a file in the place of a folder."""
+    (tmp_path / "file").touch()
+    with pytest.raises(IsADirectoryError):
+        check_writable(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        check_writable(tmp_path / "missing" / "r.json")
+    with pytest.raises(NotADirectoryError):
+        check_writable(tmp_path / "file" / "r.json")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
+def test_a_read_only_folder_is_refused(tmp_path):
+    """It is refused before anything is graded."""
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError):
+        check_writable(tmp_path / "r.json")

@@ -1,0 +1,113 @@
+"""What a fault says: the exception in one line, the same in every run and on every machine."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+FAULTS = Path(__file__).resolve().parents[2] / "grader/student_host/faults.py"
+
+
+@pytest.fixture(scope="module")
+def faults():
+    spec = importlib.util.spec_from_file_location("faults_under_test", FAULTS)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def text_of(faults, tmp_path):
+    """Return what is said of an exception in a submission that lies in a temporary folder."""
+
+    def one_line(error):
+        told = faults.Describer(str(tmp_path)).exception(error)
+        return f"{told['type']}: {told['message']}" if told["message"] else told["type"]
+
+    return one_line
+
+
+class Widget:
+    """Has a repr that tells its address."""
+
+
+def test_addresses_of_objects_are_left_out(text_of):
+    """They differ from run to run."""
+    text = text_of(TypeError(f"got {Widget()!r} and {text_of!r}"))
+    assert "0x" not in text
+    assert "Widget object>" in text
+
+
+def test_short_hexadecimal_numbers_stay(text_of):
+    """A bus address or a colour is the student's own word."""
+    assert text_of(ValueError("no sensor at 0x40")) == "ValueError: no sensor at 0x40"
+
+
+def test_files_outside_the_submission_are_named_without_their_folder(text_of):
+    """Where Python and its packages lie is nobody's business."""
+    with pytest.raises(ImportError) as caught:
+        from json import no_such_name  # noqa: F401
+    assert text_of(caught.value) == "ImportError: cannot import name 'no_such_name' from 'json' (__init__.py)"
+
+
+def test_folders_of_python_are_left_out_whatever_the_file_is(text_of):
+    """A data file of a package, too, is named alone."""
+    assert text_of(OSError(f"cannot read {sys.prefix}/share/foo/table.csv")) == "OSError: cannot read table.csv"
+
+
+def test_files_of_the_submission_are_relative_to_it(text_of, tmp_path):
+    """As the student knows them, in folders too."""
+    text = text_of(FileNotFoundError(2, "No such file or directory", str(tmp_path / "config/speed.yaml")))
+    assert text == "FileNotFoundError: [Errno 2] No such file or directory: 'config/speed.yaml'"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "invalid topic name '/robot one/cmd_vel'",
+        "no '/robot1/odom' on '/a/b/c'",
+        "expected 5/4 or 3/2 m/s",
+        "see https://docs.example.org/a/b.html",
+        "'/media/stick/data/log.csv'",
+        "../speed.py and ./speed.py",
+    ],
+)
+def test_topics_and_the_students_own_paths_stay(text_of, text):
+    """A name on the wire looks like a path, and is none."""
+    assert text_of(RuntimeError(text)) == f"RuntimeError: {text}"
+
+
+def test_an_endless_text_is_cut(text_of):
+    """Whatever an exception holds, the line stays short, and is found at once."""
+    assert text_of(RuntimeError("-/" * 200_000)).startswith("RuntimeError: -/-/")
+    assert len(text_of(RuntimeError("/a/b.py " * 200_000))) == 500
+
+
+@pytest.mark.parametrize("message", ["", "no", "ValueError: no", "ValueError"])
+def test_the_name_of_the_class_is_no_part_of_the_message(faults, tmp_path, message):
+    """They are sent as two values."""
+    told = faults.Describer(str(tmp_path)).exception(ValueError(message))
+    assert (told["code"], told["type"], told["message"]) == ("exception", "ValueError", message)
+
+
+def test_a_str_that_raises_leaves_the_class(text_of):
+    """The student's own `__str__` may raise anything."""
+
+    class BrokenError(Exception):
+        def __str__(self):
+            raise ValueError
+
+    assert text_of(BrokenError()).startswith("test_fault_texts.")
+
+
+def test_only_a_file_that_cannot_be_compiled_has_a_syntax_error(faults, tmp_path):
+    """Anybody may raise one by hand: that is an exception of the line that raises it."""
+    good, bad = tmp_path / "good.py", tmp_path / "bad.py"
+    good.write_text("x = 1\n")
+    bad.write_text("x = (\n")
+    told = faults.Describer(str(tmp_path)).exception
+    assert told(SyntaxError("x", (str(bad), 1, 5, "x = (")))["code"] == "syntax_error"
+    for strange in (str(good), 7, "\0", str(tmp_path / "none.py")):
+        found = told(SyntaxError("never closed", (strange, 3, 1, "x")))
+        assert (found["code"], found["type"], found["message"]) == ("exception", "SyntaxError", "never closed")
