@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "tests" / "classroom"))
 import copies  # noqa: E402  beside the tests
 
 from grader.similarity.finding import (  # noqa: E402  as above
-    find_similar,  # noqa: E402  as above
+    find_similar,
     read_given,
     read_programs,
 )
