@@ -179,10 +179,10 @@ class Matching:
         own = sum(not (reliable and best_effort) for reliable in self._observer.watching(topic, interface))
         asking = [c for s in self._students if not s.ended for c in readers_of(s, topic)]
         # numbers are latched only where the first subscription asks for it
-        readers = sum(self._takes(c, topic) for c in asking if stream is not None or not c["latched"])
+        readers = sum(self.takes(c, topic) for c in asking if stream is not None or not c["latched"])
         return self._observer.subscribers_matched(topic) >= readers + own
 
-    def _takes(self, reader: dict[str, Any], topic: str) -> bool:
+    def takes(self, reader: dict[str, Any], topic: str) -> bool:
         """Return whether a subscription takes what a stimulus offers on a topic."""
         fixed = self.fixed.get(topic)
         fits = takes_ordinary(reader) if fixed is None else compatible(offered(fixed), reader)
@@ -295,7 +295,7 @@ class Matching:
                 1 for key in self._observer.watching(name, claim["type"]) if claim["reliable"] or not key
             )
         if kind == "subscription":
-            return self._takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
+            return self.takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
         if kind == "service":
             asking = ("client", name, claim["type"])
             students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)

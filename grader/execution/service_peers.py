@@ -13,7 +13,7 @@ from grader.execution.interfaces import built, plain_fields, wanted_class
 from grader.execution.observer import size_of
 from grader.execution.plan import Plan
 from grader.execution.service_ends import Arrived, ServiceEnds
-from grader.execution.stimuli import Due
+from grader.execution.stimuli import Answer, Ask, Event
 from grader.execution.trace_recorder import Tape
 
 #: Of a flood of requests and responses no more is taken before it is written down.
@@ -49,7 +49,7 @@ class Desk:
         tape: Tape,
         *,
         nodes: Callable[[], Sequence[str]],
-        later: Callable[[Due], None],
+        later: Callable[[Event], None],
     ) -> None:
         self._ends = ends
         self._tape = tape
@@ -62,7 +62,7 @@ class Desk:
         self._called: dict[str, str] = {}
         self._kept: list[PlannedCalls] = []  # clients are known by the identity of their calls, which must last
         self._open: dict[tuple[str, int, int], tuple[int, Call]] = {}
-        self._waiting: list[Due] = []
+        self._waiting: list[Ask] = []
         self._arrived: list[Arrived] = []
         self._large = False
         check_types(plan)
@@ -134,16 +134,16 @@ class Desk:
         self._open[service, number, self._ends.ask(service, number, request)] = (count, call)
         return service
 
-    def wait(self, due: Due) -> None:
+    def wait(self, due: Ask) -> None:
         """Keep a call until its server is there."""
         self._waiting.append(due)
 
-    def ready(self, is_served: Callable[[PlannedCalls], bool]) -> list[Due]:
+    def ready(self, is_served: Callable[[PlannedCalls], bool]) -> list[Ask]:
         """Return the calls whose servers are there now, which wait no longer."""
-        calls = {id(due.payload.calls): due.payload.calls for due in self._waiting}
+        calls = {id(due.call.calls): due.call.calls for due in self._waiting}
         served = {key for key, one in calls.items() if is_served(one)}
-        found = [due for due in self._waiting if id(due.payload.calls) in served]
-        self._waiting = [due for due in self._waiting if id(due.payload.calls) not in served]
+        found = [due for due in self._waiting if id(due.call.calls) in served]
+        self._waiting = [due for due in self._waiting if id(due.call.calls) not in served]
         return found
 
     def expected(self, sent: Mapping[str, int]) -> Counter[str]:
@@ -190,7 +190,7 @@ class Desk:
         self._tape.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
         if plan.response(served.taken) is not None:
             served.unanswered[number] = (request.header, served.taken)
-            self._later(Due(now_ns + plan.delay_ns, "answer", plan.service, (plan, number)))
+            self._later(Answer(now_ns + plan.delay_ns, plan, number))
         served.taken += 1
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
@@ -216,7 +216,7 @@ class Desk:
         answer = Response(now_ns, response.service, interface, number, STUDENT, response.client, value)
         self._tape.exchange(answer, size)
         for delay_ns, following in call.then if value.get("accepted") else ():
-            self._later(Due(now_ns + delay_ns, "call", following.calls.service, following))
+            self._later(Ask(now_ns + delay_ns, following))
 
     def _content(self, message: Any) -> tuple[dict[str, Any], int]:
         """Return the fields of what a student's node sent, and its size; of what is too large, none."""

@@ -1,4 +1,4 @@
-"""What the grader publishes in a scenario, and when: plain schedules that the conductor reads."""
+"""What stimuli do in a scenario, and when: the schedule of events that a runner works through."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.execution.exchanges import Call, PlannedMessages, goal_call
+from grader.execution.exchanges import Call, PlannedCalls, PlannedMessages, PlannedServer, goal_call
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording
 
@@ -14,75 +14,149 @@ from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording
 FRACTION_STEP = 0.001
 
 
-#: What makes something appear; at the start it comes before everything else.
-APPEARANCES = frozenset({"appear", "offer", "serve", "meet"})
-#: What concerns topics, and happens whether or not anybody still listens.
-BROADCASTS = frozenset({"appear", "offer", "publish", "say", "disappear"})
-
-
 @dataclass(frozen=True, slots=True)
-class Due:
-    """One thing to do at a time.
+class Event:
+    """One thing that a stimulus does.
 
     Attributes:
         t_ns: When.
-        action: On a topic `appear` (a publisher of the type that is asked for), `offer` (one of a fixed type),
-            `publish`, `say` (a message of that fixed type) or `disappear`; of a service `serve`, `dismiss` and `answer`
-            as its server, `meet` and `call` as its client.
-        topic: Name of the topic or service.
-        payload: What it needs: what to publish, the planned stimulus.
     """
 
     t_ns: int
-    action: str
+
+
+@dataclass(frozen=True, slots=True)
+class TopicEvent(Event):
+    """What concerns a topic, and happens whether or not anybody still listens."""
+
     topic: str
-    payload: Any = None
 
 
-def schedule(plan: Plan) -> list[Due]:
+@dataclass(frozen=True, slots=True)
+class Appear(TopicEvent):
+    """A publisher appears, of the type that subscriptions ask for."""
+
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Offer(TopicEvent):
+    """A publisher of a fixed type appears."""
+
+    stream: PlannedMessages
+
+
+@dataclass(frozen=True, slots=True)
+class PublishNumber(TopicEvent):
+    """A number is published, in the type of the publisher; the second value is the side of a limit it is on."""
+
+    number: tuple[float, int]
+
+
+@dataclass(frozen=True, slots=True)
+class PublishRecorded(TopicEvent):
+    """A message of a recording is published."""
+
+    cdr: bytes
+    value: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PublishFields(TopicEvent):
+    """A message of a fixed type is published."""
+
+    stream: PlannedMessages
+    fields: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Disappear(TopicEvent):
+    """A publisher disappears."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddServer(Event):
+    """A server appears."""
+
+    server: PlannedServer
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveServer(Event):
+    """A server disappears."""
+
+    server: PlannedServer
+
+
+@dataclass(frozen=True, slots=True)
+class Answer(Event):
+    """A server answers the request with a number."""
+
+    server: PlannedServer
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class AddClients(Event):
+    """The clients of some calls appear."""
+
+    calls: PlannedCalls
+
+
+@dataclass(frozen=True, slots=True)
+class Ask(Event):
+    """A client sends a request."""
+
+    call: Call
+
+
+#: What makes something appear; at the start it comes before everything else.
+APPEARANCES = (Appear, Offer, AddServer, AddClients)
+
+
+def schedule(plan: Plan) -> list[Event]:
     """Return everything that stimuli do, in order of time; number streams never disappear."""
-    due = [d for stream in plan.numbers for d in _number_events(stream)]
+    due: list[Event] = [d for stream in plan.numbers for d in _number_events(stream)]
     due += [d for recording in plan.recordings for d in _recording_events(recording)]
     due += [d for stream in plan.messages for d in _message_events(stream)]
     for server in plan.servers:
-        due.append(Due(server.start_ns, "serve", server.service, server))
-        due += [Due(server.stop_ns, "dismiss", server.service, server)] if server.stop_ns else []
+        due.append(AddServer(server.start_ns, server))
+        due += [RemoveServer(server.stop_ns, server)] if server.stop_ns else []
     for calls in plan.calls:
-        due.append(Due(calls.start_ns, "meet", calls.service, calls))
+        due.append(AddClients(calls.start_ns, calls))
         for index in range(len(calls.requests)):
             t_ns = calls.start_ns + index // calls.clients * calls.period_ns
-            due.append(Due(t_ns, "call", calls.service, Call(calls, index)))
+            due.append(Ask(t_ns, Call(calls, index)))
     for goal in plan.goals:
         call = goal_call(goal)
         parts = [call, *(following for _, following in call.then)]
-        due += [Due(goal.start_ns, "meet", part.calls.service, part.calls) for part in parts]
-        due.append(Due(goal.start_ns, "call", call.calls.service, call))
-    return sorted(due, key=lambda d: (d.t_ns, d.t_ns == 0 and d.action not in APPEARANCES))
+        due += [AddClients(goal.start_ns, part.calls) for part in parts]
+        due.append(Ask(goal.start_ns, call))
+    return sorted(due, key=lambda d: (d.t_ns, d.t_ns == 0 and not isinstance(d, APPEARANCES)))
 
 
-def _message_events(stream: PlannedMessages) -> Iterator[Due]:
-    yield Due(stream.start_ns, "offer", stream.topic, stream)
+def _message_events(stream: PlannedMessages) -> Iterator[Event]:
+    yield Offer(stream.start_ns, stream.topic, stream)
     for index in range(len(stream.values) * stream.repeats):
         t_ns = stream.start_ns + index * stream.period_ns
         if not stream.stop_ns or t_ns < stream.stop_ns:
-            yield Due(t_ns, "say", stream.topic, (stream, stream.values[index // stream.repeats]))
+            yield PublishFields(t_ns, stream.topic, stream, stream.values[index // stream.repeats])
     if stream.stop_ns:
-        yield Due(stream.stop_ns, "disappear", stream.topic)
+        yield Disappear(stream.stop_ns, stream.topic)
 
 
-def _number_events(stream: PlannedNumbers) -> Iterator[Due]:
-    yield Due(0, "appear", stream.topic, stream.type)
+def _number_events(stream: PlannedNumbers) -> Iterator[Event]:
+    yield Appear(0, stream.topic, stream.type)
     for index in range(len(stream.numbers) * stream.repeats):
-        yield Due(
-            stream.start_ns + index * stream.period_ns, "publish", stream.topic, stream.numbers[index // stream.repeats]
-        )
+        t_ns = stream.start_ns + index * stream.period_ns
+        yield PublishNumber(t_ns, stream.topic, stream.numbers[index // stream.repeats])
 
 
-def _recording_events(recording: PlannedRecording) -> Iterator[Due]:
-    yield Due(recording.start_ns, "appear", recording.topic, recording.type)
+def _recording_events(recording: PlannedRecording) -> Iterator[Event]:
+    yield Appear(recording.start_ns, recording.topic, recording.type)
     for t_ns, cdr, value in recording.messages:
-        yield Due(t_ns, "publish", recording.topic, (cdr, value))
-    yield Due(recording.stop_ns, "disappear", recording.topic)
+        yield PublishRecorded(t_ns, recording.topic, cdr, value)
+    yield Disappear(recording.stop_ns, recording.topic)
 
 
 def numeric_field(interface: str) -> tuple[str, bool] | None:

@@ -1,20 +1,106 @@
-"""What stimuli do on topics in virtual time: publishers appear, publish for whoever listens, and disappear."""
+"""The grader's publishers of one run: they appear, publish for whoever listens, and disappear; on either clock."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from grader.core.trace import Delivery, Mark
-from grader.execution.discovery import Matching, announce, compatible, offered, readers_of, takes_ordinary
+from grader.execution.discovery import Matching, announce, readers_of
+from grader.execution.exchanges import PlannedMessages
 from grader.execution.interfaces import built, message_class, plain_fields
 from grader.execution.observer import Observer
-from grader.execution.stimuli import Due, number_message, numeric_field
+from grader.execution.stimuli import (
+    Appear,
+    Disappear,
+    Offer,
+    PublishFields,
+    PublishNumber,
+    PublishRecorded,
+    TopicEvent,
+    number_message,
+    numeric_field,
+)
 from grader.execution.student_process import Student
 from grader.execution.trace_recorder import Tape
 
+ODOMETRY = "nav_msgs/msg/Odometry"
+#: How long, on the wall clock, a publisher stays after its last message, which it would take with it otherwise.
+LINGER_NS = 400_000_000
 
-class Broadcasts:
+
+class TopicPeers(ABC):
     """Publishes for the students' nodes.
+
+    Args:
+        observer: The grader's node.
+        tape: Where it is taken down.
+    """
+
+    def __init__(self, observer: Observer, tape: Tape) -> None:
+        self._observer = observer
+        self._tape = tape
+        #: The topics that stimuli publish on now, with their types.
+        self._streams: dict[str, str] = {}
+
+    def do(self, event: TopicEvent, now_ns: int) -> None:
+        """Let one event of a stimulus happen."""
+        topic = event.topic
+        if isinstance(event, PublishNumber):
+            message, value = number_message(self._streams[topic], event.number)
+            self._publish(Delivery(now_ns, topic, self._streams[topic], value), message)
+        elif isinstance(event, PublishRecorded):
+            self._publish(Delivery(now_ns, topic, self._streams[topic], event.value, event.cdr), event.cdr)
+        elif isinstance(event, PublishFields):
+            message = built(message_class(event.stream.type), event.fields, topic)
+            self._publish(Delivery(now_ns, topic, event.stream.type, plain_fields(message)), message)
+        elif isinstance(event, Disappear):
+            self._streams.pop(topic, None)
+            self._withdraw(topic, now_ns)
+            self._tape.add(Mark(now_ns, "stream_stops", topic))
+        else:
+            if isinstance(event, Offer):
+                self._offer(event.stream)
+            elif isinstance(event, Appear):
+                self._advertise(topic, event.type)
+            self._tape.add(Mark(now_ns, "stream_starts", topic))
+
+    def follow_type(self, topic: str) -> None:
+        """Change a publisher's type or durability when a student's node subscribed with another one."""
+        current, asked = self._streams[topic], [interface for interface, _ in self._asked(topic)]
+        if current == ODOMETRY or not asked or current in asked:
+            return
+        if any(numeric_field(interface) is not None for interface in asked):
+            self._observer.withdraw(topic)
+            self._advertise(topic, current)
+
+    def _offer(self, stream: PlannedMessages) -> None:
+        self._observer.advertise(stream.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
+
+    def _advertise(self, topic: str, default: str) -> None:
+        """Create a publisher of the type and durability that the students' subscriptions ask for."""
+        asked = self._asked(topic)
+        usable = [interface for interface, _ in asked if interface == default or numeric_field(interface) is not None]
+        interface = usable[0] if usable and default != ODOMETRY else default
+        latched = any(late for found, late in asked if found == interface)
+        self._observer.advertise(topic, interface, latched=latched)
+        self._streams[topic] = interface
+
+    def _publish(self, delivery: Delivery, message: Any) -> None:
+        self._tape.add(delivery)
+        self._observer.publish(delivery.topic, message)
+
+    @abstractmethod
+    def _asked(self, topic: str) -> list[tuple[str, bool]]:
+        """Return the type of every subscription of the students' nodes, and whether it asks for latched messages."""
+
+    @abstractmethod
+    def _withdraw(self, topic: str, now_ns: int) -> None:
+        """Take a publisher out of the graph."""
+
+
+class VirtualTopicPeers(TopicPeers):
+    """Publishes in virtual time: waits until publishers are matched, and tells processes what is on its way.
 
     Args:
         students: The processes.
@@ -24,77 +110,76 @@ class Broadcasts:
     """
 
     def __init__(self, students: list[Student], observer: Observer, tape: Tape, matching: Matching) -> None:
+        super().__init__(observer, tape)
         self._students = students
-        self._observer = observer
-        self._tape = tape
         self._matching = matching
+        self._streams = matching.streams
 
-    def disappear(self, due: Due, now_ns: int) -> None:
-        """Take a stimulus's publisher out of the graph."""
-        self._matching.streams.pop(due.topic, None)
-        self._matching.fixed.pop(due.topic, None)
-        self._observer.withdraw(due.topic)
-        self._matching.tell_all()
-        self._tape.add(Mark(now_ns, "stream_stops", due.topic))
+    def do(self, event: TopicEvent, now_ns: int) -> None:
+        """Let one event of a stimulus happen, for subscriptions as they are now."""
+        if isinstance(event, PublishNumber):
+            self.follow_type(event.topic)
+        super().do(event, now_ns)
 
-    def offer(self, due: Due, now_ns: int) -> None:
-        """Create the publisher of messages of a fixed type."""
-        stream = due.payload
-        self._matching.fixed[due.topic] = stream
-        self._matching.streams[due.topic] = stream.type
-        self._observer.advertise(due.topic, stream.type, latched=stream.latched, best_effort=stream.best_effort)
-        self._matching.patience.wait(lambda: self._matching.is_heard(due.topic))
-        self._matching.tell_all()
-        self._tape.add(Mark(now_ns, "stream_starts", due.topic))
+    def _offer(self, stream: PlannedMessages) -> None:
+        self._matching.fixed[stream.topic] = stream
+        self._streams[stream.topic] = stream.type
+        super()._offer(stream)
+        self._match(stream.topic)
 
-    def say(self, due: Due, now_ns: int) -> None:
-        """Publish one message of a fixed type."""
-        stream, fields = due.payload
-        message = built(message_class(stream.type), fields, due.topic)
-        self._tape.add(Delivery(now_ns, due.topic, stream.type, plain_fields(message)))
-        self._observer.publish(due.topic, message)
-        self._matching.said[due.topic] += 1
-        for student in self._students:
-            if any(compatible(offered(stream), c) for c in readers_of(student, due.topic)):
-                announce(student.arrivals, f"topic {due.topic}", 1)
+    def _advertise(self, topic: str, default: str) -> None:
+        super()._advertise(topic, default)
+        self._match(topic)
 
-    def appear(self, due: Due, now_ns: int) -> None:
-        """Create a stimulus's publisher, of the type and durability that the students' subscriptions ask for."""
-        self._start_stream(due.topic, due.payload)
-        self._tape.add(Mark(now_ns, "stream_starts", due.topic))
-
-    def _start_stream(self, topic: str, default: str) -> None:
-        asked = [c for s in self._students for c in readers_of(s, topic)]
-        carrying = [c for c in asked if default == c["type"] or numeric_field(c["type"]) is not None]
-        interface = carrying[0]["type"] if carrying and "nav_msgs" not in default else default
-        latched = any(c["latched"] for c in asked if c["type"] == interface)
-        self._observer.advertise(topic, interface, latched=latched)
-        self._matching.streams[topic] = interface
+    def _match(self, topic: str) -> None:
         self._matching.patience.wait(lambda: self._matching.is_heard(topic))
         self._matching.tell_all()
 
-    def publish(self, due: Due, now_ns: int) -> None:
-        """Publish one message of a stimulus and note for whom it is on its way."""
-        self._follow_type(due.topic)
-        interface = self._matching.streams[due.topic]
-        if interface == "nav_msgs/msg/Odometry":
-            cdr, value = due.payload
-            message: Any = cdr
-        else:
-            message, value = number_message(interface, due.payload)
-            cdr = b""
-        self._tape.add(Delivery(now_ns, due.topic, interface, value, cdr))
-        self._observer.publish(due.topic, message)
+    def _publish(self, delivery: Delivery, message: Any) -> None:
+        super()._publish(delivery, message)
+        topic = delivery.topic
+        self._matching.said[topic] += 1
         for student in self._students:
-            if any(c["type"] == interface and takes_ordinary(c) for c in readers_of(student, due.topic)):
-                announce(student.arrivals, f"topic {due.topic}", 1)
+            if any(self._matching.takes(reader, topic) for reader in readers_of(student, topic)):
+                announce(student.arrivals, f"topic {topic}", 1)
 
-    def _follow_type(self, topic: str) -> None:
-        """Change a stimulus's type or durability when a student's node subscribed with another one."""
-        current = self._matching.streams[topic]
-        asked = [c for s in self._students for c in readers_of(s, topic)]
-        if current == "nav_msgs/msg/Odometry" or not asked or any(c["type"] == current for c in asked):
-            return
-        if any(numeric_field(c["type"]) is not None for c in asked):
-            self._observer.withdraw(topic)
-            self._start_stream(topic, current)
+    def _asked(self, topic: str) -> list[tuple[str, bool]]:
+        return [(reader["type"], reader["latched"]) for s in self._students for reader in readers_of(s, topic)]
+
+    def _withdraw(self, topic: str, now_ns: int) -> None:
+        del now_ns
+        self._matching.fixed.pop(topic, None)
+        self._observer.withdraw(topic)
+        self._matching.tell_all()
+
+
+class WallTopicPeers(TopicPeers):
+    """Publishes on the wall clock, where a publisher stays for a while after its last message."""
+
+    def __init__(self, observer: Observer, tape: Tape) -> None:
+        super().__init__(observer, tape)
+        self._leaving: list[tuple[int, str]] = []
+
+    def follow_types(self) -> None:
+        """Change the type of publishers when the graph has changed."""
+        for topic in list(self._streams):
+            self.follow_type(topic)
+
+    def leave(self, now_ns: int) -> None:
+        """Let publishers go that have stayed long enough."""
+        while self._leaving and self._leaving[0][0] <= now_ns:
+            self._observer.withdraw(self._leaving.pop(0)[1])
+
+    def do(self, event: TopicEvent, now_ns: int) -> None:
+        """Let one event happen; a publisher that stayed for its last message goes before the next one comes."""
+        if isinstance(event, (Appear, Offer)) and any(left == event.topic for _, left in self._leaving):
+            self._leaving = [(at_ns, left) for at_ns, left in self._leaving if left != event.topic]
+            self._observer.withdraw(event.topic)
+        super().do(event, now_ns)
+
+    def _asked(self, topic: str) -> list[tuple[str, bool]]:
+        asked = [e for e in self._tape.graph.endpoints if e.kind == "subscription" and e.topic == topic]
+        return [(e.type, e.durability == "transient_local") for e in asked]
+
+    def _withdraw(self, topic: str, now_ns: int) -> None:
+        self._leaving.append((now_ns + LINGER_NS, topic))

@@ -6,21 +6,22 @@ is left to do at that instant. Then time jumps to the next moment at which anybo
 
 from __future__ import annotations
 
-import bisect
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from grader.core.trace import ClockKind, Fault, Mark, Offer, Trace
+from grader.core.trace import ClockKind, Fault, Mark, Offer
 from grader.execution.discovery import Matching, announce, compatible, counts, is_claim, readers_of
-from grader.execution.ending import ending, never_stopped, reported_fault
-from grader.execution.observer import Observer, Taken
+from grader.execution.ending import ending
+from grader.execution.exchanges import PlannedCalls
+from grader.execution.observer import Observer
 from grader.execution.plan import Plan
-from grader.execution.service_peers import Desk
-from grader.execution.stimuli import APPEARANCES, BROADCASTS, Due, schedule
+from grader.execution.runner import Runner
+from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
 from grader.execution.student_process import Student
-from grader.execution.topic_peers import Broadcasts
-from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS, Tape
+from grader.execution.topic_peers import VirtualTopicPeers
+from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.virtual_time_suitability import hopeless, unfit
 from grader.execution.workload import Workload
 
@@ -33,71 +34,35 @@ STEPS = 400_000
 WORDS, CLAIMS = 10_000, 1_000
 
 
-class Conductor:
-    """Runs one plan on the virtual clock.
+class Conductor(Runner):
+    """Runs one plan on the virtual clock; see `Runner`."""
 
-    Args:
-        plan: What to run.
-        students: The started processes, each waiting to be told the time.
-        observer: The grader's node.
-    """
+    clock = ClockKind.VIRTUAL
 
     def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
-        self._plan = plan
-        self._students = students
-        self._observer = observer
+        super().__init__(plan, students, observer)
         self._now_ns = 0
         self._free_until_ns = 0
-        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
-        self._due = schedule(plan)
-        self._tape = Tape(plan.limits)
-        nodes = lambda: self._tape.graph.nodes  # noqa: E731 - it changes
-        self._desk = Desk(plan, observer.services, self._tape, nodes=nodes, later=self._later)
-        self._matching = Matching(students, observer, self._tape, self._desk, self._bury)
-        topics = Broadcasts(students, observer, self._tape, self._matching)
-        self._actions: Mapping[str, Callable[[Due, int], None]] = {
-            "appear": topics.appear,
-            "offer": topics.offer,
-            "publish": topics.publish,
-            "say": topics.say,
-            "disappear": topics.disappear,
-            "serve": self._serve,
-            "dismiss": self._dismiss,
-            "answer": self._answer,
-            "meet": self._meet,
-            "call": self._call,
-        }
-        self._starts_ns = dict(plan.starts_ns)
-        self._stop_ns = 0
         self._steps = 0
+        self._matching = Matching(students, observer, self._tape, self._desk, self._bury)
+        self._topics = VirtualTopicPeers(students, observer, self._tape, self._matching)
 
-    def run(self) -> Trace:
-        """Run the plan to its end and return the trace."""
+    def _time_ns(self) -> int:
+        return self._now_ns
+
+    def _begin(self) -> None:
         self._play(phase="before")
         for student in self._students:
             student.wake_ns = self._starts_ns.get(student.name)
             if student.wake_ns is None:
                 self._step(student)
-        self._run_on()
-        if not any(s.ended for s in self._students):
-            self._matching.look(self._now_ns)  # what has ended disappears from the graph at a moment that is nobody's
-        self._tape.look_back(self._now_ns)
-        self._stop_ns = self._end_ns
-        why_not = self._why_not()
-        if self._plan.shutdown_ns and not (why_not or self._tape.full):
-            self._shut_down()
-        return Trace(
-            scenario=self._plan.scenario,
-            clock=ClockKind.VIRTUAL,
-            clock_reason=why_not,
-            stop_ns=self._stop_ns,
-            observations=tuple(self._tape.observations),
-            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
-            starts=tuple(s.start_told for s in self._students if s.start_told is not None),
-        )
 
-    def _why_not(self) -> str:
-        """Say why virtual time does these nodes no justice, if so."""
+    def _last_look(self) -> int:
+        if not any(s.ended for s in self._students):
+            self._matching.look(self._now_ns)  # when the endpoints of an ended process disappear is chance
+        return self._now_ns
+
+    def _unfit(self) -> str:
         return unfit(self._students, self._tape.observations, full=bool(self._tape.full))
 
     def _run_on(self) -> None:
@@ -109,21 +74,11 @@ class Conductor:
             self._now_ns = self._next_ns()
 
     def _shut_down(self) -> None:
-        """Send every process the stop signal, as Ctrl-C does, and let time go on until all have ended."""
-        self._now_ns, self._due = self._stop_ns, []
-        self._end_ns = self._stop_ns + self._plan.shutdown_ns
-        for student in self._students:
-            if not student.ended:
-                student.stop_signalled = True
-                self._tape.add(Mark(self._now_ns, "stop_signal", student.name))
-                self._step(student)
-        self._run_on()
-        for student in self._students:
-            if not student.ended:
-                self._tape.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
+        self._now_ns = self._stop_ns
+        super()._shut_down()
 
-    def _finished(self) -> bool:
-        return all(s.ended for s in self._students) and not any(d.action in BROADCASTS for d in self._due)
+    def _interrupt(self, student: Student) -> None:
+        self._step(student)
 
     def _next_ns(self) -> int:
         moments = [self._end_ns]
@@ -168,17 +123,13 @@ class Conductor:
         self._hear(student, workload)
         self._dismiss_done()
         self._steps += 1
-        hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._why_not()
+        hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._unfit()
         # A flood is wrong on every clock: it goes on to its limit, which is the same on every machine.
         if hopeless_now and not self._tape.floods(self._now_ns):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
-        self._end_if_full()
-
-    def _end_if_full(self) -> None:
-        if self._tape.full:
-            self._end_ns = min(self._end_ns, self._now_ns)
+        self._end_if_full(self._now_ns)
 
     def _quiet_until(self, student: Student) -> int:
         """Return the next moment at which anything but one process wants to do something."""
@@ -213,8 +164,7 @@ class Conductor:
                 continue
             self._write_output(student, final=kind == "exited")
             if kind == "fault":
-                fault, limits = report.get("fault"), self._plan.limits
-                self._tape.add(reported_fault(student.name, self._now_ns, fault, limits, student.places))
+                self._report_fault(student, report, self._now_ns)
                 continue
             workload.end(counted=bool(report.get("counted")), moved=report.get("moved"))
             self._account(student, report)
@@ -250,8 +200,8 @@ class Conductor:
             student.sees_graph = report.get("sees_graph") is True
             self._note_offers(student)
             self._matching.match(self._now_ns)
-            for due in self._desk.ready(self._matching.is_served):
-                self._later(Due(self._now_ns, due.action, due.topic, due.payload))
+            for due in self._desk.ready(self._is_served):
+                self._later(replace(due, t_ns=self._now_ns))
 
     def _note_offers(self, student: Student) -> None:
         """Write down the services, clients and parameters that a process has not told of before."""
@@ -264,13 +214,13 @@ class Conductor:
 
     def _collect(self, sent: Mapping[str, int]) -> None:
         """Wait until everything published has been taken here, and write it down."""
-        expected = Counter({topic: n for topic, n in sent.items() if self._readable(topic)})
+        expected = Counter({topic: n for topic, n in sent.items() if self._observer.reads(topic)})
         if not expected:
             return
 
         def complete() -> bool:
             for message in self._observer.take():
-                self._record(message)
+                self._record(self._now_ns, message)
                 expected[message.topic] -= 1
             return bool(self._tape.full) or all(count <= 0 for count in expected.values())
 
@@ -293,14 +243,13 @@ class Conductor:
                 self._tape.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
         self._desk.write_down(self._now_ns)
 
-    def _record(self, message: Taken) -> None:
-        first = message.topic == self._plan.first_message_on and not self._tape.seen(message.topic)
-        if first and not self._stop_ns:
-            self._end_ns = self._now_ns + self._plan.duration_ns
-        self._tape.message(self._now_ns, message)
+    def _is_served(self, calls: PlannedCalls) -> bool:
+        return self._matching.is_served(calls)
 
-    def _readable(self, topic: str) -> bool:
-        return self._observer.reads(topic)
+    def _do(self, event: Event, now_ns: int) -> None:
+        super()._do(event, now_ns)
+        if isinstance(event, (AddServer, RemoveServer)):
+            self._matching.tell_all()
 
     def _forward(self, sender: Student, sent: Mapping[str, int]) -> None:
         """Tell every process what is on its way to it."""
@@ -340,7 +289,7 @@ class Conductor:
         student.drain()
         self._write_output(student, final=True)
         for message in self._observer.take_rest():
-            self._record(message)
+            self._record(self._now_ns, message)
         if self._desk.take():
             self._desk.write_down(self._now_ns)
         self._matching.lose(student)
@@ -355,44 +304,15 @@ class Conductor:
     def _play(self, *, phase: str = "") -> None:
         """Do what stimuli do at this instant, of calls one at a time; before the start, only what appears at once."""
         while self._due and self._due[0].t_ns <= self._now_ns:
-            if phase and self._due[0].action not in APPEARANCES:
+            if phase and not isinstance(self._due[0], APPEARANCES):
                 return
             due = self._due.pop(0)
-            self._actions[due.action](due, self._now_ns)
-            if due.action == "call":
+            self._do(due, self._now_ns)
+            if isinstance(due, Ask):
                 return  # the next one follows when this one has arrived: so their order is always the same
-
-    def _later(self, due: Due) -> None:
-        """Have something done at a time, after everything else that is due then."""
-        bisect.insort(self._due, due, key=lambda d: d.t_ns)
-
-    def _meet(self, due: Due, now_ns: int) -> None:
-        del now_ns
-        self._desk.meet(due.payload)
-
-    def _serve(self, due: Due, now_ns: int) -> None:
-        self._desk.serve(now_ns, due.payload)
-        self._matching.tell_all()
-
-    def _dismiss(self, due: Due, now_ns: int) -> None:
-        self._desk.dismiss(now_ns, due.payload)
-        self._matching.tell_all()
 
     def _dismiss_done(self) -> None:
         """Let servers go that have given their last answer, when it has arrived."""
         for server in self._desk.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
-                self._dismiss(Due(self._now_ns, "dismiss", server.service, server), self._now_ns)
-
-    def _answer(self, due: Due, now_ns: int) -> None:
-        server, number = due.payload
-        if self._desk.answer(now_ns, server, number):
-            self._announce_exchange("response", server.service, 1)
-
-    def _call(self, due: Due, now_ns: int) -> None:
-        """Send a request, or keep it until its server is there."""
-        if self._matching.is_served(due.payload.calls):
-            service = self._desk.call(now_ns, due.payload)
-            self._announce_exchange("request", service, 1)
-        else:
-            self._desk.wait(due)
+                self._do(RemoveServer(self._now_ns, server), self._now_ns)

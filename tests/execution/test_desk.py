@@ -15,7 +15,7 @@ from grader.execution.ending import is_free_exit, is_normal_stop
 from grader.execution.exchanges import Call, PlannedCalls, PlannedServer
 from grader.execution.service_ends import Arrived
 from grader.execution.service_peers import Desk
-from grader.execution.stimuli import Due
+from grader.execution.stimuli import Answer, Ask
 from grader.execution.trace_recorder import Tape
 
 #: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
@@ -91,8 +91,8 @@ def test_requests_are_answered_in_the_order_in_which_they_were_sent():
     asked = server("a", "b", delay_ns=5)
     run.desk.serve(0, asked)
     assert run.ask(3, 2, at_ns=10) == {f"request {NAME}": 2}
-    assert run.due == [Due(15, "answer", NAME, (asked, 1)), Due(15, "answer", NAME, (asked, 2))]
-    assert all(run.desk.answer(15, *due.payload) for due in run.due)
+    assert run.due == [Answer(15, asked, 1), Answer(15, asked, 2)]
+    assert all(run.desk.answer(15, due.server, due.number) for due in run.due)
     assert run.ends.done[1:] == ["answer 2 a", "answer 3 b"]
     kinds = [(type(o), o.t_ns, o.number) for o in run.tape.observations[1:]]
     assert kinds == [(Request, 10, 1), (Request, 10, 2), (Response, 15, 1), (Response, 15, 2)]
@@ -106,7 +106,7 @@ def test_a_server_that_has_given_its_answers_takes_nothing_more():
     run.ask(1, 2)
     assert len(run.due) == 1
     assert run.desk.done() == []
-    run.desk.answer(0, *run.due[0].payload)
+    run.desk.answer(0, run.due[0].server, run.due[0].number)
     assert run.desk.done() == [asked]
     run.desk.dismiss(7, asked)
     assert run.tape.observations[-1] == Mark(7, "server_stops", NAME)
@@ -121,7 +121,7 @@ def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered():
     run.ask(1)
     run.desk.dismiss(3, asked)
     run.desk.dismiss(4, asked)
-    assert not run.desk.answer(5, *run.due[0].payload)
+    assert not run.desk.answer(5, run.due[0].server, run.due[0].number)
     assert run.ends.done == [f"serve {NAME} {KIND}", f"dismiss {NAME}"]
 
 
@@ -153,7 +153,7 @@ def test_calls_wait_for_their_server():
     """All that are due meanwhile follow in their order."""
     run = Run()
     waiting = calls(requests=({}, {}))
-    due = [Due(at, "call", NAME, Call(waiting, at)) for at in (0, 1)]
+    due = [Ask(at, Call(waiting, at)) for at in (0, 1)]
     for one in due:
         run.desk.wait(one)
     assert run.desk.ready(lambda _: False) == []
@@ -172,7 +172,7 @@ def test_what_follows_an_accepted_request_is_sent_in_its_time():
         run.ends.responses = [Arrived(NAME, 0, answer, None, 1 + accepted, len(run.ends.done))]
         run.desk.take()
         run.desk.write_down(10)
-    assert run.due == [Due(15, "call", "/second", following)]
+    assert run.due == [Ask(15, following)]
 
 
 def test_more_requests_than_the_limit_end_the_recording():

@@ -9,20 +9,27 @@ pytest.importorskip("rclpy")
 from scripted import FLOAT, MS, numbers, plan
 
 from grader.execution.plan import PlannedRecording
-from grader.execution.stimuli import number_message, numeric_field, schedule
+from grader.execution.stimuli import (
+    Appear,
+    Disappear,
+    PublishNumber,
+    PublishRecorded,
+    number_message,
+    numeric_field,
+    schedule,
+)
 
 
 def test_numbers_follow_each_other_in_their_period():
     """Each as often as it is held; the publisher is there from the start and stays."""
     due = schedule(plan(numbers=(numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),)))
-    assert [(d.t_ns // MS, d.action) for d in due] == [
-        (0, "appear"),
-        (500, "publish"),
-        (700, "publish"),
-        (900, "publish"),
-        (1100, "publish"),
+    assert due == [
+        Appear(0, "/temperature", FLOAT),
+        PublishNumber(500 * MS, "/temperature", (20.0, 0)),
+        PublishNumber(700 * MS, "/temperature", (20.0, 0)),
+        PublishNumber(900 * MS, "/temperature", (30.0, 0)),
+        PublishNumber(1100 * MS, "/temperature", (30.0, 0)),
     ]
-    assert [d.payload for d in due[1:]] == [(20.0, 0), (20.0, 0), (30.0, 0), (30.0, 0)]
 
 
 def test_streams_are_merged_by_time_and_keep_their_order():
@@ -30,14 +37,14 @@ def test_streams_are_merged_by_time_and_keep_their_order():
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 500 * MS, 501 * MS, ((500 * MS, b"", {}),))
     streams = (numbers((1.0, 0), topic="/a", start_ms=500), numbers((2.0, 0), topic="/b", start_ms=500))
     due = schedule(plan(numbers=streams, recordings=(recording,)))
-    assert [(d.t_ns // MS, d.action, d.topic) for d in due] == [
-        (0, "appear", "/a"),
-        (0, "appear", "/b"),
-        (500, "publish", "/a"),
-        (500, "publish", "/b"),
-        (500, "appear", "/odom"),
-        (500, "publish", "/odom"),
-        (501, "disappear", "/odom"),
+    assert due == [
+        Appear(0, "/a", FLOAT),
+        Appear(0, "/b", FLOAT),
+        PublishNumber(500 * MS, "/a", (1.0, 0)),
+        PublishNumber(500 * MS, "/b", (2.0, 0)),
+        Appear(500 * MS, "/odom", "nav_msgs/msg/Odometry"),
+        PublishRecorded(500 * MS, "/odom", b"", {}),
+        Disappear(501 * MS, "/odom"),
     ]
 
 

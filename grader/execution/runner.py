@@ -1,0 +1,168 @@
+"""Runs a plan: what is the same on the virtual clock and on the wall clock."""
+
+from __future__ import annotations
+
+import bisect
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from grader.core.trace import ClockKind, Mark, Observation, Trace
+from grader.execution.ending import never_stopped, reported_fault
+from grader.execution.exchanges import PlannedCalls
+from grader.execution.observer import Observer, Taken
+from grader.execution.plan import Plan
+from grader.execution.service_peers import Desk
+from grader.execution.stimuli import (
+    AddClients,
+    AddServer,
+    Answer,
+    Ask,
+    Event,
+    RemoveServer,
+    TopicEvent,
+    schedule,
+)
+from grader.execution.student_process import Student
+from grader.execution.topic_peers import TopicPeers
+from grader.execution.trace_recorder import Tape
+
+
+class Runner(ABC):
+    """Runs one plan.
+
+    Args:
+        plan: What to run.
+        students: The started processes, each waiting to be told the time.
+        observer: The grader's node.
+    """
+
+    clock: ClassVar[ClockKind]
+    #: Why this clock was used, where nothing else says so.
+    clock_reason: ClassVar[str] = ""
+    _topics: TopicPeers
+
+    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+        self._plan = plan
+        self._students = students
+        self._observer = observer
+        self._end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._stop_ns = 0
+        self._starts_ns = dict(plan.starts_ns)
+        self._due = schedule(plan)
+        self._tape = Tape(plan.limits)
+        self._desk = Desk(plan, observer.services, self._tape, nodes=lambda: self._tape.graph.nodes, later=self._later)
+
+    def run(self) -> Trace:
+        """Run the plan to its end and return the trace."""
+        self._begin()
+        self._run_on()
+        self._tape.look_back(self._last_look())
+        self._stop_ns = self._end_ns
+        unfit = self._unfit()
+        if self._plan.shutdown_ns and not (unfit or self._tape.full):
+            self._shut_down()
+        return Trace(
+            scenario=self._plan.scenario,
+            clock=self.clock,
+            clock_reason=unfit or self.clock_reason,
+            stop_ns=self._stop_ns,
+            observations=self._observations(),
+            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+            starts=tuple(s.start_told for s in self._students if s.start_told is not None),
+            harness_problem=self._harness_problem(),
+        )
+
+    @abstractmethod
+    def _time_ns(self) -> int:
+        """Return the time of the run, in nanoseconds from its start."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Start the processes that do not start late."""
+
+    @abstractmethod
+    def _run_on(self) -> None:
+        """Go on until the end, or until nothing more can happen."""
+
+    @abstractmethod
+    def _last_look(self) -> int:
+        """Look at the graph at the end, and return the time."""
+
+    @abstractmethod
+    def _interrupt(self, student: Student) -> None:
+        """Send a process the stop signal, as Ctrl-C does."""
+
+    @abstractmethod
+    def _is_served(self, calls: PlannedCalls) -> bool:
+        """Return whether the server that some calls need is there and matched."""
+
+    def _unfit(self) -> str:
+        """Say why this clock does the nodes no justice, if it does not."""
+        return ""
+
+    def _harness_problem(self) -> str:
+        """Say why the recording says nothing about the nodes, if so."""
+        return ""
+
+    def _observations(self) -> tuple[Observation, ...]:
+        """Return what was observed, in order."""
+        return tuple(self._tape.observations)
+
+    @abstractmethod
+    def _announce_exchange(self, kind: str, service: str, count: int) -> None:
+        """Note that requests or responses are on their way to the students' nodes."""
+
+    def _shut_down(self) -> None:
+        """Send every process the stop signal, and go on until all have ended."""
+        self._due, self._end_ns = [], self._time_ns() + self._plan.shutdown_ns
+        for student in self._students:
+            if not student.ended:
+                student.stop_signalled = True
+                self._tape.add(Mark(self._time_ns(), "stop_signal", student.name))
+                self._interrupt(student)
+        self._run_on()
+        for student in self._students:
+            if not student.ended:
+                self._tape.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
+
+    def _finished(self) -> bool:
+        return all(s.ended for s in self._students) and not any(isinstance(d, TopicEvent) for d in self._due)
+
+    def _record(self, now_ns: int, taken: Taken) -> None:
+        first = taken.topic == self._plan.first_message_on and not self._tape.seen(taken.topic)
+        if first and not self._stop_ns:
+            self._end_ns = now_ns + self._plan.duration_ns
+        self._tape.message(now_ns, taken)
+
+    def _end_if_full(self, now_ns: int) -> None:
+        if self._tape.full:
+            self._end_ns = min(self._end_ns, now_ns)
+
+    def _report_fault(self, student: Student, report: Mapping[str, Any], now_ns: int) -> None:
+        """Take down a fault that a process has reported."""
+        fault, limits = report.get("fault"), self._plan.limits
+        self._tape.add(reported_fault(student.name, now_ns, fault, limits, student.places))
+
+    def _later(self, event: Event) -> None:
+        """Have something done at a time, after everything else that is due then."""
+        bisect.insort(self._due, event, key=lambda e: e.t_ns)
+
+    def _do(self, event: Event, now_ns: int) -> None:
+        """Let one event of a stimulus happen."""
+        if isinstance(event, TopicEvent):
+            self._topics.do(event, now_ns)
+        elif isinstance(event, AddServer):
+            self._desk.serve(now_ns, event.server)
+        elif isinstance(event, RemoveServer):
+            self._desk.dismiss(now_ns, event.server)
+        elif isinstance(event, Answer):
+            if self._desk.answer(now_ns, event.server, event.number):
+                self._announce_exchange("response", event.server.service, 1)
+        elif isinstance(event, AddClients):
+            self._desk.meet(event.calls)
+        elif isinstance(event, Ask):
+            if self._is_served(event.call.calls):
+                self._announce_exchange("request", self._desk.call(now_ns, event.call), 1)
+            else:
+                self._desk.wait(event)  # until its server is there
