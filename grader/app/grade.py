@@ -17,6 +17,7 @@ from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
 from grader.core.exercise import Exercise, exercise_name
+from grader.core.releases import TRIED
 from grader.core.report import Environment, Report
 from grader.core.scenario import OdometryStream
 from grader.core.submission import Run, Submission
@@ -70,10 +71,6 @@ class EarlyReports:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
             self._hear(judge_run(self._exercises, run, pictures=False, pending=pending))
-
-
-#: ROS releases that the test suite passes on.
-TRIED_ON = ("jazzy", "kilted")
 
 
 class Progress(Protocol):
@@ -232,9 +229,9 @@ def _seed_notes(request: Request) -> tuple[str, ...]:
 
 def _release_notes(distro: str) -> tuple[str, ...]:
     """Say that nobody has tried this ROS release with the grader, if so."""
-    if distro in TRIED_ON:
+    if distro in TRIED:
         return ()
-    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED_ON)}",)
+    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
 
 
 def _isolation_notes(studio: Studio) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from grader.cli.options import (
 )
 from grader.core.checkup import TIERS, missing
 from grader.core.errors import GraderError, HarnessError, RubricError
+from grader.core.releases import TRIED
 from grader.reporting.delivery import Output, deliver, early_delivery, prepared
 from grader.reporting.escape import encoded, shown
 from grader.reporting.formats import FORMATS
@@ -193,7 +194,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
         report = grade.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
         _warn(f"sandbox {report.environment.isolation}: {found}")
-    if report.environment.ros_distro not in grade.TRIED_ON:
+    if report.environment.ros_distro not in TRIED:
         _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted, for_whom)
     seen = told(report, for_whom)

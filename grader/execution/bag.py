@@ -16,6 +16,7 @@ from typing import Any
 
 from grader.core.errors import RecordingError
 from grader.core.quantities import NS_PER_S, seconds
+from grader.core.releases import DEFAULT
 from grader.core.scenario import TimedMessage
 
 TYPE = "nav_msgs/msg/Odometry"
@@ -215,7 +216,7 @@ def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessa
     """Yield the messages, times from the first one on, two at the same time 1 ns apart."""
     from rosbags.typesys import Stores, get_typestore  # as heavy as the reader  # noqa: PLC0415
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = get_typestore(Stores[DEFAULT.messages])
     start_ns, last_ns = raw[0][0], -1
     for number, (received_ns, data) in enumerate(raw, start=1):
         where = f"message {number} of {len(raw)} on {_line(topic)}"

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from grader.core.errors import EnvironmentFault
+from grader.core.releases import DEFAULT
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ def runtime_from_json(values: Mapping[str, Any]) -> PythonRuntime:
 
 MESSAGE_PACKAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
 MIDDLEWARE = "librmw_fastrtps_cpp.so"
-DEFAULT_DISTRO = "jazzy"
+DEFAULT_DISTRO = DEFAULT.name
 INSTALLED_HERE = Path("/opt/ros")
 
 # What any program needs from the system: the C library, its loader and cache, libraries chosen through alternatives.

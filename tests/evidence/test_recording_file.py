@@ -20,7 +20,7 @@ from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, LogRecord, 
 from grader.execution.codec import trace_to_json
 from grader.execution.evidence.recording_file import recording_bytes, trace_of
 
-FACTS = {"format": "x", "seed": "7"}
+FACTS = {"environment": '{"ros_distro": "jazzy"}', "format": "x", "seed": "7"}
 
 
 def kept(trace: Trace) -> bytes:

@@ -78,7 +78,7 @@ def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[
         channels.add(message)
     writer.add_attachment(0, 0, TRACE, "application/zstd", zstandard.compress(packed))
     writer.add_metadata(FACTS, {key: _fact(value) for key, value in about.items()})
-    information = _information(messages, channels, name)
+    information = _information(messages, channels, name, json.loads(facts["environment"])["ros_distro"])
     writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(information)})
     writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue(), _yaml({"rosbag2_bagfile_information": information}).encode()
@@ -172,7 +172,7 @@ def _about(trace: Trace, facts: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _information(messages: Iterable[Shown], channels: _Channels, name: str) -> dict[str, Any]:
+def _information(messages: Iterable[Shown], channels: _Channels, name: str, distro: str) -> dict[str, Any]:
     """Return what rosbag2 wants to know about a recording."""
     times = [message.t_ns for message in messages]
     return {
@@ -185,7 +185,7 @@ def _information(messages: Iterable[Shown], channels: _Channels, name: str) -> d
         "relative_file_paths": [name],
         "files": [{"path": name, **_span(times)}],
         "custom_data": None,
-        "ros_distro": "jazzy",
+        "ros_distro": distro,
     }
 
 

@@ -13,6 +13,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from grader.core.quantities import NS_PER_S
+from grader.core.releases import DEFAULT
 from grader.core.trace import (
     Delivery,
     Fault,
@@ -47,7 +48,7 @@ class Definition:
 
 @lru_cache(maxsize=1)
 def _store() -> Any:
-    return get_typestore(Stores.ROS2_JAZZY)
+    return get_typestore(Stores[DEFAULT.messages])
 
 
 @lru_cache(maxsize=256)

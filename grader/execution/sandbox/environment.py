@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import grader
+from grader.core.releases import DEFAULT, release_of
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.protocol import StudentProcess
 
@@ -30,10 +31,6 @@ FEW_RESOURCES: Mapping[str, str] = {
 }
 
 
-#: ROS releases with Fast DDS 2, whose profiles differ from those of Fast DDS 3 in variable and element names.
-WITH_FAST_DDS_2 = ("humble", "iron", "jazzy")
-
-
 def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
     """Return the variable that names a Fast DDS profile.
 
@@ -42,7 +39,7 @@ def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
         name: `NAME.xml` there is for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
         distro: ROS release, e.g. `jazzy`.
     """
-    if distro in WITH_FAST_DDS_2:
+    if release_of(distro).fast_dds == 2:
         return {"FASTRTPS_DEFAULT_PROFILES_FILE": f"{folder}/{name}.xml"}
     return {"FASTDDS_DEFAULT_PROFILES_FILE": f"{folder}/{name}3.xml"}
 
@@ -54,7 +51,7 @@ def quick_discovery(host_folder: str | Path, runtime: PythonRuntime) -> dict[str
 
 def distro_of(environment: Mapping[str, str]) -> str:
     """Return the ROS release that an environment is for."""
-    return environment.get("ROS_DISTRO", "jazzy")
+    return environment.get("ROS_DISTRO", DEFAULT.name)
 
 
 def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
