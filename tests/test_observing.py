@@ -9,7 +9,7 @@ import pytest
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Offer, Trace
-from grader.judging.summary import summarise
+from grader.judging.judge_run import summarise
 from grader.reporting.observed import render_summary, summary_to_json
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -30,8 +30,8 @@ from grader.core.scenario import (
     TimeBetween,
     cases,
 )
-from grader.judging.asking import check_name
 from grader.judging.checks import CHECKS
+from grader.judging.run_check import check_name
 from grader.rubrics.loader import own_checks
 from grader.rubrics.manuals import Manual, manual_of
 from grader.rubrics.units import format_quantity

@@ -27,7 +27,7 @@ from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, Studio, open_studio, planned_clock
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
-from grader.judging.whole import judge_run
+from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_headers, builtin_odometry, require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown

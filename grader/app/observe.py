@@ -18,7 +18,7 @@ from grader.execution.bag import read_odometry
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import open_studio, planned_clock
 from grader.execution.supervisor import Job
-from grader.judging.summary import summarise
+from grader.judging.judge_run import summarise
 from grader.rubrics.builtin import builtin_odometry
 from grader.submissions.submission import stage_submission
 

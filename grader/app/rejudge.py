@@ -21,7 +21,7 @@ from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import Report
 from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
-from grader.judging.whole import judge_run
+from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
 from grader.reporting.delivery import Output, write_whole
 from grader.reporting.formats import FORMATS, Layout, rendered

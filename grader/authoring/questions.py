@@ -12,9 +12,8 @@ from grader.authoring.skeleton import DraftCriterion, Quantity, as_id
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.summary import TopicSummary
 from grader.core.trace import Delivery, Message, Offer, Trace
-from grader.judging.silence import student_endpoints
-from grader.judging.summary import summarise
-from grader.judging.values import carries_number, leaves
+from grader.judging.judge_run import summarise
+from grader.judging.values import carries_number, leaves, student_endpoints
 from grader.judging.wording import counted, number
 
 #: What every node has.

@@ -20,9 +20,9 @@ from grader.core.quantities import NS_PER_S, seconds
 from grader.core.scenario import Scenario
 from grader.core.trace import FaultKind, Trace
 from grader.judging.checks import CHECKS
-from grader.judging.silence import student_endpoints
-from grader.judging.values import carries_number
-from grader.judging.wording import fault_sentence, quote
+from grader.judging.findings import fault_sentence
+from grader.judging.values import carries_number, student_endpoints
+from grader.judging.wording import quote
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds, within
 from grader.core.trace import ClockKind, Delivery, Fault, LogRecord, Message, Request, Response, Trace
-from grader.judging.silence import faults_before_stop
+from grader.judging.findings import faults_before_stop
 
 #: Rates and counts agree within this share, and so many more or fewer.
 SHARE, COUNT = 0.3, 4

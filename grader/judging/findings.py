@@ -1,19 +1,33 @@
-"""Short ways to make a Finding, so that checks read as sentences."""
+"""Findings in short: what was met, what a fault brought about, and what the nodes did instead of what is missing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from grader.core.exercise import Finding, Location, Problem
-from grader.core.quantities import seconds
-from grader.core.trace import Fault
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
+from grader.judging.values import HIDDEN_TOPICS, student_endpoints
+from grader.judging.wording import counted, listed, nearest, quote, span
 
 #: Evidence key under which a finding names the fault that it rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"
-
 HALF = Fraction(1, 2)
+_URGENCY = {
+    FaultKind.SYNTAX_ERROR: 0,
+    FaultKind.EXCEPTION: 1,
+    FaultKind.HUNG: 2,
+    FaultKind.KILLED: 3,
+    FaultKind.EXITED: 4,
+}
+_SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end of main()"
+_RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
+#: An exit up to here is one of a node that never waited for anything.
+AT_ONCE_NS = NS_PER_S
 
 
 def met(reason: str, evidence: Mapping[str, Any] | None = None) -> Finding:
@@ -52,6 +66,11 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=problem)
 
 
+def waiting_for(needed: str, finding: Finding) -> Finding:
+    """Return a finding as one that waits for a criterion or check, without its place."""
+    return not_met(finding.reason, finding.evidence, hint=finding.hint, blocked_by=needed)
+
+
 def fault_location(fault: Fault) -> Location | None:
     """Return the student's own line at which a fault arose, if it is known."""
     return Location(fault.file, fault.line) if fault.file and fault.line > 0 else None
@@ -67,3 +86,216 @@ def fault_evidence(fault: Fault) -> dict[str, Any]:
         "line": fault.line,
         "t_s": seconds(fault.t_ns),
     }
+
+
+def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
+    """Return the fault that came first; of one instant the one that says most. What follows Ctrl-C is none here."""
+    # a recording that a fault cut short stops at the instant of the fault
+    found = [f for f in faults_before_stop(trace, process) if f.t_ns <= trace.stop_ns]
+    return min(found, key=lambda f: (f.t_ns, _URGENCY[f.kind]), default=None)
+
+
+def faults_before_stop(trace: Trace, process: str | None = None) -> list[Fault]:
+    """Return the faults of processes that had not been told to stop by then."""
+    told = {m.detail: m.t_ns for m in reversed(trace.marks("stop_signal"))}
+    return [f for f in trace.faults(process) if f.process not in told or f.t_ns < told[f.process]]
+
+
+def fault_hint(fault: Fault) -> str:
+    """Return what to do about a fault where that is plain; empty otherwise."""
+    if fault.exit_code != 0:
+        return ""
+    return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
+
+
+def faulted(fault: Fault, said: str, evidence: Mapping[str, Any] | None = None, *, last: bool = False) -> Finding:
+    """Return no credit for what a fault brought about.
+
+    Args:
+        fault: The fault.
+        said: What came of it, or what was found.
+        evidence: Plain JSON values behind it.
+        last: Whether the fault is told after `said` and not before it.
+    """
+    clauses = (said, fault_sentence(fault)) if last else (fault_sentence(fault), said)
+    return not_met("; ".join(clauses), evidence, hint=fault_hint(fault), fault=fault)
+
+
+def explain_fault(
+    trace: Trace,
+    said: str,
+    evidence: Mapping[str, Any] | None = None,
+    *,
+    process: str | None = None,
+    last: bool = False,
+) -> Finding | None:
+    """Return no credit for what the first fault of a process, or of any, brought about; None if there was none."""
+    fault = first_fault(trace, process)
+    return None if fault is None else faulted(fault, said, evidence, last=last)
+
+
+def fault_sentence(fault: Fault) -> str:
+    """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
+    if fault.kind is FaultKind.EXITED:
+        code = "?" if fault.exit_code is None else fault.exit_code
+        return f"{fault.process} exited after {span(fault.t_ns)} with code {code}"
+    place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
+    return f"{place}: {_own_words(fault)}"
+
+
+def _own_words(fault: Fault) -> str:
+    """Return what a fault says, an exception's message in quotation marks where it could be taken for ours."""
+    text = quote(fault.text)
+    kind, colon, message = text.partition(": ")
+    if fault.kind is not FaultKind.EXCEPTION or ";" not in text:
+        return text
+    plain = message.replace('"', "'")
+    return f'{kind}: "{plain}"' if colon else text
+
+
+@dataclass(frozen=True, slots=True)
+class _Wording:
+    """How the absence of an endpoint is told; `{name}` is the topic or service, `{type}` the type expected.
+
+    Attributes:
+        lacks: What is not there, after a fault.
+        none: What is not there at all.
+        instead: What a node does with another name.
+        typed: What a node does with the right name, before the type that it uses.
+        name_hint: What to do about another name.
+        type_hint: What to do about another type.
+    """
+
+    lacks: str
+    none: str
+    instead: str
+    typed: str
+    name_hint: str
+    type_hint: str
+
+
+def _of_service(end: str, does: str, to_do: str) -> _Wording:
+    typed, type_hint = f"has a {end} of type", f"create the {end} of {{name}} with {{type}}"
+    return _Wording(f"no {end} of {{name}}", f"no {end}", does, typed, f"{to_do} {{name}}", type_hint)
+
+
+_WORDINGS = {
+    "subscription": _Wording(
+        "no subscription to {name}",
+        "no subscription",
+        "subscribes to",
+        "subscribes with type",
+        "subscribe to {name}",
+        "subscribe to {name} with {type}",
+    ),
+    "service": _of_service("server", "offers", "offer"),
+    "client": _of_service("client", "asks", "ask"),
+}
+
+
+def explain_no_subscription(trace: Trace, topic: str, type_: str | None = None) -> Finding:
+    """Return no credit and why nothing subscribes to `topic`, with `type_` if one is asked for."""
+    found = _explain(trace, "subscription", student_endpoints(trace, "subscription"), topic, type_)
+    return found or _nothing(trace, topic, "subscription")
+
+
+def explain_no_server(trace: Trace, service: str, type_: str | None = None) -> Finding:
+    """Return no credit and why no student's node answers on `service`, with `type_` if one is asked for."""
+    return _explain_service(trace, "service", service, type_)
+
+
+def explain_no_client(trace: Trace, service: str, type_: str | None = None) -> Finding:
+    """Return no credit and why no student's node asks on `service`, with `type_` if one is asked for."""
+    return _explain_service(trace, "client", service, type_)
+
+
+def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -> Finding:
+    ends = trace.service_ends(kind)
+    found = _explain(trace, kind, ends, service, type_)
+    if found is not None:
+        return found
+    seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
+    reason = f"{service}: not in the ROS graph in {span(trace.stop_ns)}{f'; seen: {listed(seen)}' if seen else ''}"
+    return not_met(reason, {"service": service, "seen": seen[:20]})
+
+
+def _explain(
+    trace: Trace, kind: str, ends: Sequence[Endpoint] | Sequence[ServiceEnd], name: str, type_: str | None
+) -> Finding | None:
+    """Return which end of another type or name there is instead, or the fault that came first; None without either."""
+    words, key = _WORDINGS[kind], "topic" if kind == "subscription" else "service"
+    named = [(e, e.topic if isinstance(e, Endpoint) else e.service) for e in ends]
+    typed = next((e for e, n in named if n == name and e.type != type_), None)
+    if type_ is not None and typed is not None:
+        reason = f"{name}: {quote(typed.node)} {words.typed} {quote(typed.type)}, expected {type_}"
+        evidence = {key: name, "type": typed.type, "node": typed.node}
+        return not_met(reason, evidence, hint=words.type_hint.format(name=name, type=type_))
+    others = {n: e for e, n in reversed(named) if n != name}
+    other = _most_alike(name, [n for e, n in named if n != name and e.type == type_], list(others))
+    if other is None:
+        return explain_fault(trace, words.lacks.format(name=name))
+    end = others[other]
+    reason = f"{name}: {words.none}; {quote(end.node)} {words.instead} {quote(other)} [{quote(end.type)}]"
+    evidence = {key: other, "type": end.type, "node": end.node}
+    return not_met(reason, evidence, hint=f"{words.name_hint.format(name=name)} instead of {quote(other)}")
+
+
+def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> str | None:
+    """Return the name that was very likely meant: one of the same type if there is any."""
+    return nearest(name, same_type) or next(iter(same_type), None) or nearest(name, others)
+
+
+def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Finding:
+    """Return no credit and why there is no message on `topic`, of `type_` if one is asked for."""
+    messages = [m for m in trace.messages() if m.t_ns < trace.stop_ns and m.topic not in HIDDEN_TOPICS]
+    return (
+        _other_type(messages, topic, type_)
+        or _other_topic(messages, topic, type_)
+        or explain_fault(trace, f"no message on {topic}")
+        or _silent_publisher(trace, topic, type_)
+        or _nothing(trace, topic, "publisher")
+    )
+
+
+def _other_type(messages: list[Message], topic: str, type_: str | None) -> Finding | None:
+    types = Counter(m.type for m in messages if m.topic == topic and m.type != type_)
+    if type_ is None or not types:
+        return None
+    found, count = types.most_common(1)[0]
+    reason = f"{topic}: {counted(count, 'message')} of type {quote(found)}, expected {type_}"
+    return not_met(reason, {"topic": topic, "type": found, "messages": count}, hint=f"publish {type_} on {topic}")
+
+
+def _other_topic(messages: list[Message], topic: str, type_: str | None) -> Finding | None:
+    counts = Counter((m.topic, m.type) for m in messages if m.topic != topic)
+    same_type = [t for t, kind in counts if type_ is not None and kind == type_]
+    found = _most_alike(topic, same_type, [t for t, _ in counts])
+    if found is None:
+        return None
+    kind, count = next((k, n) for (t, k), n in counts.items() if t == found and (t not in same_type or k == type_))
+    reason = f"{topic}: no message; {quote(found)} has {counted(count, 'message')} of type {quote(kind)}"
+    reason += "" if type_ in (None, kind) else f", expected {type_}"
+    hint = f"publish on {topic} instead of {quote(found)}"
+    return not_met(reason, {"topic": found, "type": kind, "messages": count}, hint=hint)
+
+
+def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | None:
+    endpoints = student_endpoints(trace, "publisher")
+    near = nearest(topic, [e.topic for e in endpoints])
+    on_topic = [e for e in endpoints if e.topic == topic] or [e for e in endpoints if e.topic == near]
+    if not on_topic:
+        return None
+    found = next((e for e in on_topic if e.type == type_), on_topic[0])
+    reason = f"{quote(found.topic)}: no message in {span(trace.stop_ns)}, though {quote(found.node)} has a publisher"
+    reason += f" of type {quote(found.type)}"
+    wrong = found.topic != topic or (type_ is not None and found.type != type_)
+    reason += f"; expected {type_ + ' on ' if type_ else ''}{topic}" if wrong else ""
+    hint = "publish from a timer that runs from the start, and spin the node"
+    return not_met(reason, {"topic": found.topic, "type": found.type, "messages": 0}, hint=hint)
+
+
+def _nothing(trace: Trace, topic: str, kind: str) -> Finding:
+    others = dict.fromkeys(f"{e.topic} [{e.type}]" for e in student_endpoints(trace, kind))
+    reason = f"{topic}: no {kind} in {span(trace.stop_ns)}"
+    reason += f"; {kind}s seen: {listed(list(others))}" if others else ""
+    return not_met(reason, {"topic": topic, "seen": list(others)[:20]})

@@ -1,12 +1,18 @@
-"""What a process wrote: its log records, and the lines that it really printed."""
+"""What a process wrote: log records and printed lines, the numbers in them, and which values these show."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 from grader.core.trace import LogRecord, OutputLine, Trace
-from grader.judging.silence import AT_ONCE_NS, first_fault
+from grader.judging.findings import AT_ONCE_NS, first_fault
+from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
+from grader.judging.wording import counted, number, quote
 
 #: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
@@ -93,3 +99,305 @@ def _without_interpreter_noise(lines: Iterable[OutputLine]) -> list[OutputLine]:
             after_warning = False
             kept.append(line)
     return kept
+
+
+Output = LogRecord | OutputLine
+#: Relative difference that a conversion with a short constant explains, such as 3.14159 for pi.
+CONVERSION = 1e-4
+
+
+@lru_cache(maxsize=4096)
+def numbers_in(text: str) -> tuple[Printed, ...]:
+    """Return the numbers of a text, those with decimal commas read both ways."""
+    body = clean(text)
+    other = with_decimal_points(body)
+    return printed_numbers(body) + (printed_numbers(other) if other else ())
+
+
+@lru_cache(maxsize=4096)
+def shape_of(text: str) -> str:
+    """Return a text with its numbers masked and without white space; equal for texts that say the same."""
+    body = clean(text)
+    return template_of(body, printed_numbers(body))
+
+
+def shows_about(printed: Printed, value: float, *, coarsest: float, relative: float = CONVERSION) -> bool:
+    """Return whether a printed number shows a value, computed with a short constant and printed finely enough.
+
+    Args:
+        printed: The number.
+        value: What it should show.
+        coarsest: Largest unit of the last digit that still tells something, unless the number is exact.
+        relative: Largest relative difference that is let pass.
+    """
+    slack = relative * abs(value) + 1e-9
+    if abs(printed.value - value) <= slack:
+        return True
+    return printed.step <= coarsest * (1 + 1e-9) and any(printed.shows(value + d) for d in (-slack, 0.0, slack))
+
+
+def times(factor: float) -> str:
+    """Return a factor for text; 1 is the value itself."""
+    return "the value itself" if factor == 1 else f"{number(factor)} times the value"
+
+
+def in_window(outputs: Sequence[Output], start_ns: int, stop_ns: int) -> list[Output]:
+    """Return what was written in [start_ns, stop_ns)."""
+    return [o for o in outputs if start_ns <= o.t_ns < stop_ns]
+
+
+def number_in(text: str, pattern: str | None = None) -> float | None:
+    """Return the number that a text tells: what the pattern finds in it, or its first number."""
+    if pattern is not None:
+        match = re.search(pattern, text[:2_000])
+        if match is None:
+            return None
+        text = match[1] if match.re.groups and match[1] is not None else match[0]
+    found = numbers_in(text)
+    return found[0].value if found else None
+
+
+#: Share of its texts in which a place must be right; the others may hold something else that is written alike.
+_USUALLY = 0.45
+#: The same for a place that has shown one value only, as in a sentence of its own for "off".
+_NEARLY_ALWAYS = 0.75
+#: So few numbers may stand beside each other without being suspected.
+_FEW = 6
+#: The same where the place has followed several values.
+_FEW_FOLLOWING = 12
+#: Largest number of places that chance may be expected to make right.
+_LUCK = 0.15
+#: A printed number shows values over at most so many units of its last digit.
+_UNITS_SHOWN = 3
+_DIGITS = re.compile(r"[0-9]+")
+_REPEATED = re.compile(r"(.)\1+")
+_Key = tuple[str, int, str, frozenset[str], str]
+_Place = tuple[_Key, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Sought:
+    """A value that is to be logged in [start_ns, stop_ns), and what shows it.
+
+    Attributes:
+        start_ns: From when on its log counts.
+        stop_ns: Until when, exclusive.
+        value: The value.
+        scale: Size of what the values range over, in their unit.
+        shows: Whether a printed number shows the value.
+    """
+
+    start_ns: int
+    stop_ns: int
+    value: float
+    scale: float
+    shows: Callable[[Printed], bool]
+
+
+@dataclass(slots=True)
+class _Record:
+    """What one place of one kind of text showed."""
+
+    texts: int = 0
+    right: int = 0
+    near: bool = False
+    active: set[int] = field(default_factory=set)
+    shown: set[int] = field(default_factory=set)
+    chances: dict[float, float] = field(default_factory=dict)
+
+    @property
+    def share(self) -> float:
+        return self.right / self.texts
+
+
+def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
+    """Return the places in `sought` of the values that are logged, and not only among many other numbers.
+
+    Args:
+        outputs: What was written.
+        sought: The values, in the order of their times.
+    """
+    places = _places(outputs, sought)
+    # each number is counted from the start and from the end, and tried once
+    tried = [p for (_, index), p in places.items() if p.near and index >= 0]
+    beside = [0] * len(sought)
+    for place in tried:
+        if place.texts < 2 or place.share >= _USUALLY:
+            for here in place.active:
+                beside[here] += 1
+    several = len({s.value for s in sought}) > 1
+    found: set[int] = set()
+    for place in places.values():
+        if place.shown - found and _knows(place, len(tried), max(beside[k] for k in place.active), several=several):
+            found |= place.shown
+    return frozenset(found)
+
+
+def standing(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
+    """Return the places in `sought` of the values that stand anywhere in the texts of their time."""
+    found: set[int] = set()
+    for output, active in _active(outputs, sought):
+        numbers = [n for _, ns in _readings(output.text) for n in ns]
+        found.update(k for k in active if k not in found and any(sought[k].shows(n) for n in numbers))
+    return frozenset(found)
+
+
+def crowd(outputs: Sequence[Output], one: Sought) -> str:
+    """Return among what a value stands in the texts of its time, as a clause."""
+    texts = [o.text for o, _ in _active(outputs, [one])]
+    count = sum(len(_readings(text)[0][1]) for text in texts)
+    longest = max(texts, key=len, default="")
+    return f"among {counted(count, 'number')} written in its time, as in {quote(longest, 60)!r}"
+
+
+def _knows(place: _Record, tried: int, beside: int, *, several: bool) -> bool:
+    """Return whether a place is right too often for chance."""
+    values = len(place.chances)
+    if place.share < (_NEARLY_ALWAYS if values == 1 and several else _USUALLY):
+        return False
+    among = beside if values == 1 else tried
+    if among <= (_FEW if values == 1 else _FEW_FOLLOWING):
+        return True
+    luck = float(among)
+    for chance in place.chances.values():
+        luck *= chance
+    return luck <= _LUCK
+
+
+def _places(outputs: Sequence[Output], sought: Sequence[Sought]) -> dict[_Place, _Record]:
+    places: dict[_Place, _Record] = {}
+    for output, active in _active(outputs, sought):
+        where = (output.file, output.line) if isinstance(output, LogRecord) else ("", 0)
+        for shape, numbers in _readings(output.text):
+            for index, printed in enumerate(numbers):
+                shown = [k for k in active if sought[k].shows(printed)]
+                near = any(abs(printed.value) <= 1.1 * sought[k].scale for k in active)
+                chances = {sought[k].value: _chance(printed, sought[k]) for k in shown}
+                for place in (index, index - len(numbers)):
+                    record = places.setdefault(((*where, *shape), place), _Record())
+                    record.texts += 1
+                    record.right += bool(shown)
+                    record.near |= near
+                    record.active.update(active)
+                    record.shown.update(shown)
+                    record.chances |= chances
+    return places
+
+
+def _chance(number: Printed, one: Sought) -> float:
+    return min(1.0, _UNITS_SHOWN * number.step / one.scale) if one.scale else 1.0
+
+
+def _active(outputs: Sequence[Output], sought: Sequence[Sought]) -> Iterator[tuple[Output, list[int]]]:
+    """Yield the outputs at a time at which some value is sought, with the places of those values."""
+    starts = [s.start_ns for s in sought]
+    longest = max((s.stop_ns - s.start_ns for s in sought), default=0)
+    for output in outputs:
+        first = bisect_right(starts, output.t_ns - longest - 1)
+        active = [k for k in range(first, bisect_right(starts, output.t_ns)) if output.t_ns < sought[k].stop_ns]
+        if active:
+            yield output, active
+
+
+@lru_cache(maxsize=4096)
+def _readings(text: str) -> tuple[tuple[tuple[str, frozenset[str], str], tuple[Printed, ...]], ...]:
+    """Return the numbers of a text with its shape; a second time with decimal commas, if there may be some."""
+    body = clean(text)
+    other = with_decimal_points(body)
+    return tuple((_wording(b, ns), ns) for b in (body, other) if b is not None for ns in (printed_numbers(b),))
+
+
+def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str], str]:
+    """Return what stands before, between and after the numbers; lists of any length and bars have one shape."""
+    starts = [0, *(n.stop for n in numbers)]
+    stops = [*(n.start for n in numbers), len(text)]
+    parts = [
+        _REPEATED.sub(r"\1", _DIGITS.sub("0", "".join(text[a:b].split()))) for a, b in zip(starts, stops, strict=True)
+    ]
+    return parts[0], frozenset(parts[1:-1]), parts[-1]
+
+
+_DEGREES = 180 / math.pi
+#: Share of the messages whose numbers a factor must explain for it to be named.
+_SURE = 0.8
+#: Values smaller than this share of the largest say nothing about a factor.
+_SMALL = 0.05
+_FEWEST = 3
+#: Factors that stand where that from radians to degrees belongs.
+_FOR_DEGREES: tuple[tuple[float, str], ...] = (
+    (200 / math.pi, "gradians, of which a full turn has 400: degrees are radians times 180 / pi"),
+    (1 / _DEGREES, "the inverse conversion: degrees are radians times 180 / pi"),
+    (60.0, "the conversion with 3 for pi: use math.pi or math.degrees"),
+    (180.0, "not divided by pi: degrees are radians times 180 / pi"),
+    (1 / math.pi, "not multiplied by 180: degrees are radians times 180 / pi"),
+    (360 / math.pi, "twice as much: degrees are radians times 180 / pi"),
+    (90 / math.pi, "half as much: degrees are radians times 180 / pi"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What was logged for one message.
+
+    Attributes:
+        value: What the message holds.
+        numbers: The numbers that were written for it.
+    """
+
+    value: float
+    numbers: tuple[Printed, ...]
+
+
+def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[float]) -> tuple[str, str]:
+    """Return what stands where a converted value belongs, as a clause, and a hint; both empty if that is not plain.
+
+    Args:
+        heard: One entry for each message with a log.
+        factor: What the value should have been multiplied by.
+        others: Factors that are rightly there, whose numbers are no candidates.
+    """
+    largest = max((abs(h.value) for h in heard), default=0.0)
+    telling = [h for h in heard if h.numbers and abs(h.value) > _SMALL * largest]
+    if len(telling) < _FEWEST:
+        return "", ""
+    left = [Heard(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
+    if _share(left, lambda h, n: n.step >= 1 and n.shows(factor * h.value)) >= _SURE:
+        return "it is logged as a whole number", "keep some decimals, as in f'{angle:.3f}'"
+    lost = [h for h in left if factor * h.value < 0]
+    if len(lost) >= _FEWEST and _share(lost, lambda h, n: _shows_value(n, -factor * h.value)) >= _SURE:
+        every = _share(left, lambda h, n: _shows_value(n, -factor * h.value)) >= _SURE
+        return ("it has the other sign", "keep the sign") if every else ("its sign is lost", "keep the sign")
+    return _factor(left, factor)
+
+
+def _factor(left: Sequence[Heard], factor: float) -> tuple[str, str]:
+    first = max(left, key=lambda h: abs(h.value))
+    for candidate in (n.value / first.value for n in first.numbers if math.isfinite(n.value) and n.value != 0):
+        known = _known(candidate, factor)
+        exact = known[0] if known else candidate
+        if _scaled(left, exact) >= _SURE:
+            said = f"instead there is {number(exact)} times the value"
+            return (f"{said}, {known[1]}" if known else said), ""
+    return "", ""
+
+
+def _scaled(left: Sequence[Heard], factor: float) -> float:
+    return _share(left, lambda h, n: _shows_value(n, factor * h.value, 0.01))
+
+
+def _known(candidate: float, factor: float) -> tuple[float, str] | None:
+    if not math.isclose(factor, _DEGREES, rel_tol=1e-3):
+        return None
+    return next(((f, said) for f, said in _FOR_DEGREES if math.isclose(candidate, f, rel_tol=0.02)), None)
+
+
+def _shows_value(printed: Printed, value: float, relative: float = CONVERSION) -> bool:
+    return shows_about(printed, value, coarsest=abs(value) / 3, relative=relative)
+
+
+def _explained(printed: Printed, heard: Heard, factors: Sequence[float]) -> bool:
+    return any(_shows_value(printed, f * heard.value) for f in factors)
+
+
+def _share(heard: Sequence[Heard], fits: Callable[[Heard, Printed], bool]) -> float:
+    return sum(any(fits(h, n) for n in h.numbers) for h in heard) / len(heard)

@@ -17,11 +17,27 @@ LONGEST_SOURCE = 100_000
 MOST_NODES = 12_000
 #: Longest quotation of code inside a hint.
 CODE_LENGTH = 70
-
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 AnyNode = TypeVar("AnyNode", bound=ast.AST)
+#: Calls that take a function to be called back.
+_TAKE_CALLBACKS = frozenset(
+    {
+        "create_timer",
+        "create_subscription",
+        "create_service",
+        "create_client",
+        "add_done_callback",
+        "add_on_set_parameters_callback",
+        "add_pre_set_parameters_callback",
+        "add_post_set_parameters_callback",
+        "create_guard_condition",
+        "ActionServer",
+        "send_goal_async",
+        "registerCallback",
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +53,8 @@ class Source:
         index: The nodes by their class, in the order of the text.
         called: The calls by the last part of the name that is called, in the order of the text.
         stored: Where names and attributes are assigned, by dotted name, in the order of the text.
+        aliases: Name in the file -> the dotted name it was imported as.
+        stars: Modules of which everything was imported.
     """
 
     file: str
@@ -47,6 +65,8 @@ class Source:
     index: Mapping[type[ast.AST], list[Any]] = field(default_factory=dict)
     called: Mapping[str, list[ast.Call]] = field(default_factory=dict)
     stored: Mapping[str, list[ast.AST]] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    stars: tuple[str, ...] = ()
 
     def all(self, kind: type[AnyNode]) -> Iterator[AnyNode]:
         """Yield the nodes of a kind in the order of the text."""
@@ -125,6 +145,51 @@ class Source:
         rows[0] = rows[0][getattr(node, "col_offset", 0) :]
         return quote(b" ".join(rows).decode(errors="replace"), length)
 
+    def resolved(self, node: ast.AST | None) -> str:
+        """Return the dotted name of an expression, its first part as it was imported: `t.sleep` -> `time.sleep`."""
+        name = chain(node)
+        head, dot, rest = name.partition(".")
+        return f"{self.aliases.get(head, head)}{dot}{rest}"
+
+    def means(self, node: ast.AST | None, wanted: str) -> bool:
+        """Return whether an expression names something: by its whole dotted name, or its last part if that is all."""
+        if "." not in wanted:
+            return last_name(node) == wanted or self.resolved(node).rpartition(".")[2] == wanted
+        found = self.resolved(node)
+        module, _, name = wanted.rpartition(".")
+        return found == wanted or (found == name and module in self.stars)
+
+    def calling(self, wanted: str) -> list[ast.Call]:
+        """Return the calls of something by its dotted name, imports followed, in the order of the text."""
+        return [call for call in self.all(ast.Call) if self.means(call.func, wanted)]
+
+    def deriving(self, *wanted: str) -> list[ast.ClassDef]:
+        """Return the classes that derive from one of those named, also by way of another class of the file."""
+        found: list[ast.ClassDef] = []
+        while True:
+            names = {c.name for c in found}
+            more = [c for c in self.all(ast.ClassDef) if c not in found and self._has_base(c, wanted, names)]
+            if not more:
+                return found
+            found += more
+
+    def _has_base(self, class_: ast.ClassDef, wanted: tuple[str, ...], known: set[str]) -> bool:
+        return any(chain(base) in known or any(self.means(base, w) for w in wanted) for base in class_.bases)
+
+    def called_back(self) -> list[ast.AST]:
+        """Return the functions that run as callbacks, and what these call in the file, each once."""
+        functions = {f.name: f for f in self.functions()}
+        waiting: list[ast.AST] = [f for call in self.calls(*_TAKE_CALLBACKS) for f in _handed_over(call, functions)]
+        found: list[ast.AST] = []
+        while waiting:
+            here = waiting.pop()
+            if here in found:
+                continue
+            found.append(here)
+            called = (n.func for n in subtree(here) if isinstance(n, ast.Call))
+            waiting += [functions[name] for func in called if (name := _own_name(func)) in functions]
+        return found
+
 
 def read(file: str, text: str) -> Source:
     """Return a file ready to be asked; one that cannot be parsed, or is endless, has lines only."""
@@ -147,7 +212,7 @@ def read(file: str, text: str) -> Source:
     index: dict[type[ast.AST], list[Any]] = {}
     for node in nodes:
         index.setdefault(type(node), []).append(node)
-    return Source(file, lines, tuple(nodes), tree, parents, index, *_by_name(nodes))
+    return Source(file, lines, tuple(nodes), tree, parents, index, *_by_name(nodes), *_imported(index))
 
 
 def _by_name(nodes: Sequence[ast.AST]) -> tuple[dict[str, list[ast.Call]], dict[str, list[ast.AST]]]:
@@ -160,6 +225,24 @@ def _by_name(nodes: Sequence[ast.AST]) -> tuple[dict[str, list[ast.Call]], dict[
         elif isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Store):
             stored.setdefault(chain(node), []).append(node)
     return called, stored
+
+
+def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return what the names of the file were imported as, wherever in it, and the modules that were imported whole."""
+    aliases: dict[str, str] = {}
+    stars: list[str] = []
+    for node in index.get(ast.Import, ()):
+        for name in node.names:
+            aliases[name.asname or name.name.partition(".")[0]] = (
+                name.name if name.asname else name.name.partition(".")[0]
+            )
+    for imported in index.get(ast.ImportFrom, ()):
+        for name in imported.names:
+            if name.name == "*":
+                stars.append(imported.module or "")
+            else:
+                aliases[name.asname or name.name] = f"{imported.module or ''}.{name.name}"
+    return aliases, tuple(stars)
 
 
 def _place(node: ast.AST) -> tuple[int, int, int]:
@@ -239,3 +322,22 @@ def subtree(node: ast.AST) -> Iterator[ast.AST]:
         here = waiting.pop()
         yield here
         waiting.extend(c for c in ast.iter_child_nodes(here) if not isinstance(c, ast.ClassDef))
+
+
+def _own_name(node: ast.AST | None) -> str:
+    """Return the name of a function or method of the file, called as `f` or `self.f`; empty for anything else."""
+    name = chain(node)
+    return name.removeprefix("self.") if "." not in name.removeprefix("self.") else ""
+
+
+def _handed_over(call: ast.Call, functions: dict[str, Function]) -> Iterator[ast.AST]:
+    """Yield the functions that are given to a call without being called, directly or wrapped in another."""
+    for given in [*call.args, *(k.value for k in call.keywords)]:
+        called = {id(n.func) for n in subtree(given) if isinstance(n, ast.Call)}
+        for node in subtree(given):
+            if isinstance(node, ast.Lambda):
+                yield node
+            elif (
+                isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in called and _own_name(node) in functions
+            ):
+                yield functions[_own_name(node)]

@@ -1,4 +1,4 @@
-"""Numbers on topics: reading them out of messages and grouping what was held."""
+"""What messages hold: fields by their paths, numbers, and what a rubric says that a field may hold."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from grader.core.quantities import NS_PER_MS
-from grader.core.trace import ClockKind, Delivery, Message, Trace
+from grader.core.exercise import Pattern
+from grader.core.quantities import NS_PER_MS, SLACK, within
+from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
+from grader.judging.wording import number, quote
 
 T = TypeVar("T")
 Carrier = TypeVar("Carrier", Message, Delivery)
-
+#: Largest difference between two numbers that are the same one.
+EXACT = 1e-6
 #: How far two clock readings of one moment may lie apart.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
-
 _NUMERIC_TYPE = re.compile(r"std_msgs/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature")
 
 
@@ -155,3 +158,196 @@ def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
         elif (got := as_number(inner)) is not None:
             found[f"{prefix}{name}"] = got
     return found
+
+
+class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never ends a run
+    """A value has no field of that path."""
+
+
+def at_path(value: Mapping[str, Any], path: str) -> Any:
+    """Return what a value holds at a path; elements of lists are counted from 0.
+
+    Raises:
+        NoSuchField: There is nothing.
+    """
+    here: Any = value
+    for name in _names(path):
+        if isinstance(here, Mapping) and name in here:
+            here = here[name]
+        elif isinstance(here, (list, tuple)) and name.isdecimal() and len(name) < 9 and int(name) < len(here):
+            here = here[int(name)]
+        else:
+            raise NoSuchField(path)
+    return here
+
+
+def value_at(value: Mapping[str, Any], path: str, default: Any = None) -> Any:
+    """Return what a value holds at a path, or the default if there is nothing."""
+    try:
+        return at_path(value, path)
+    except NoSuchField:
+        return default
+
+
+def number_at(value: Mapping[str, Any], path: str) -> float | None:
+    """Return the number at a path, or None if there is none."""
+    return as_number(value_at(value, path))
+
+
+def text_at(value: Mapping[str, Any], path: str) -> str | None:
+    """Return the text at a path, or None if there is none."""
+    found = value_at(value, path)
+    return found if isinstance(found, str) else None
+
+
+#: Longest text that is held against a pattern.
+_LONGEST = 2_000
+_YES_OR_NO = MappingProxyType({"yes": True, "no": False})
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRule:
+    """What one field has to hold; of several parameters all apply.
+
+    Attributes:
+        equals: The text, number or truth value expected.
+        items: The elements of a list expected, in order.
+        tolerance: Largest difference from a number expected.
+        low: Smallest number allowed.
+        high: Largest number allowed.
+        pattern: Regular expression that the whole text has to match.
+        example: A text of that form, shown in place of the pattern.
+    """
+
+    equals: str | float | bool | None = None
+    items: tuple[str | float | bool, ...] | None = None
+    tolerance: float = 1e-6
+    low: float | None = None
+    high: float | None = None
+    pattern: Pattern | None = None
+    example: str | None = None
+
+    def allows(self, value: object) -> bool:
+        """Return whether a field may hold a value; NaN is in no range and equals nothing."""
+        equal = self.equals is None or self._equal(value, self.equals)
+        return equal and self._listed(value) and self._in_range(value) and self._of_form(value)
+
+    def _equal(self, value: object, wanted: str | float | bool) -> bool:  # noqa: FBT001 - the value of a field
+        if isinstance(value, bool) and isinstance(wanted, str):
+            return _YES_OR_NO.get(wanted.lower()) is value  # for YAML, yes is a text
+        if isinstance(wanted, (bool, str)):
+            return type(value) is type(wanted) and value == wanted
+        got = as_number(value)
+        return got is not None and within(got, wanted, self.tolerance)
+
+    def _listed(self, value: object) -> bool:
+        if self.items is None:
+            return True
+        if not isinstance(value, (list, tuple)) or len(value) != len(self.items):
+            return False
+        return all(self._equal(got, wanted) for got, wanted in zip(value, self.items, strict=True))
+
+    def _in_range(self, value: object) -> bool:
+        if self.low is None and self.high is None:
+            return True
+        got = as_number(value)
+        if got is None or math.isnan(got):
+            return False
+        low = -math.inf if self.low is None else self.low
+        high = math.inf if self.high is None else self.high
+        return low - SLACK * max(1.0, abs(low)) <= got <= high + SLACK * max(1.0, abs(high))
+
+    def _of_form(self, value: object) -> bool:
+        if self.pattern is None:
+            return True
+        return isinstance(value, str) and len(value) <= _LONGEST and re.fullmatch(self.pattern, value) is not None
+
+    @property
+    def wanted(self) -> str:
+        """What is expected, for text."""
+        parts = []
+        if self.equals is not None:
+            parts.append(shown(self.equals))
+        if self.items is not None:
+            parts.append(shown(self.items))
+        if self.low is not None and self.high is not None:
+            parts.append(f"{number(self.low)} to {number(self.high)}")
+        elif self.low is not None:
+            parts.append(f"at least {number(self.low)}")
+        elif self.high is not None:
+            parts.append(f"at most {number(self.high)}")
+        if self.pattern is not None:
+            parts.append(f"a text such as {quote(self.example)!r}" if self.example else f"a text like {self.pattern!r}")
+        return " and ".join(parts) or "any value"
+
+
+#: A rule, or short for one: the value expected.
+RuleOrValue = str | float | bool | FieldRule
+
+
+def as_rule(rule: RuleOrValue, tolerance: float = 1e-6) -> FieldRule:
+    """Return a rule for what may stand short for one."""
+    return rule if isinstance(rule, FieldRule) else FieldRule(equals=rule, tolerance=tolerance)
+
+
+def broken_rules(value: Mapping[str, Any], rules: Mapping[str, RuleOrValue], tolerance: float = 1e-6) -> list[str]:
+    """Return the paths whose rules a value breaks, in the order of the rules; the tolerance is that of short ones."""
+    return [path for path, rule in rules.items() if not _keeps(value, path, as_rule(rule, tolerance))]
+
+
+def _keeps(value: Mapping[str, Any], path: str, rule: FieldRule) -> bool:
+    try:
+        return rule.allows(at_path(value, path))
+    except NoSuchField:
+        return False
+
+
+def breach(value: Mapping[str, Any], path: str, rule: RuleOrValue) -> str:
+    """Return what stands at a path and what was expected there, as a clause."""
+    try:
+        found = f"{path} is {shown(at_path(value, path))}"
+    except NoSuchField:
+        found = f"there is no field {path}"
+    return f"{found}, expected {as_rule(rule).wanted}"
+
+
+def shown(value: object) -> str:
+    """Return a field's value for text."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"{quote(value, 80)!r}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(shown, value[:20]))}{', ...' if len(value) > 20 else ''}]"
+    got = as_number(value)
+    return number(got) if got is not None else quote(str(value), 80)
+
+
+def told(rules: Mapping[str, RuleOrValue]) -> str:
+    """Return rules for text: `success true, message a text such as ...`."""
+    return ", ".join(f"{path} {as_rule(rule).wanted}" for path, rule in rules.items())
+
+
+#: Topics that every node has.
+HIDDEN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})
+
+
+def student_endpoints(trace: Trace, kind: str | None = None, topic: str | None = None) -> tuple[Endpoint, ...]:
+    """Return the endpoints of student nodes, on one topic or all that a student makes, each once, as they appeared."""
+    kinds = (kind,) if kind else ("publisher", "subscription")
+    return tuple(e for k in kinds for e in trace.endpoints(k, topic) if on_student_topic(e))
+
+
+def on_student_topic(endpoint: Endpoint) -> bool:
+    """Return whether an endpoint is a student's own, and not one that every node has."""
+    return endpoint.participant != -1 and endpoint.topic not in HIDDEN_TOPICS
+
+
+def heard_from_ns(trace: Trace, topic: str) -> int:
+    """Return when the first subscription to a topic was there; 0 if that is not known."""
+    for graph in trace.graphs():
+        if any(e.kind == "subscription" and e.topic == topic and on_student_topic(e) for e in graph.endpoints):
+            return graph.t_ns
+    return 0

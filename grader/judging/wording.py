@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterable, Sequence
 
 from grader.core.quantities import seconds
-from grader.core.trace import Fault, FaultKind
 
 #: Longest quotation of a student's text inside a sentence.
 QUOTE_LENGTH = 120
@@ -70,25 +69,6 @@ def listed(items: Sequence[str], limit: int = 4) -> str:
     shown = [quote(i, 80) for i in items[:limit]]
     rest = len(items) - len(shown)
     return ", ".join(shown) + (f" and {rest} more" if rest else "")
-
-
-def fault_sentence(fault: Fault) -> str:
-    """Return a fault as `file:line: text`, or as `file exited after 5.0 s with code 0`."""
-    if fault.kind is FaultKind.EXITED:
-        code = "?" if fault.exit_code is None else fault.exit_code
-        return f"{fault.process} exited after {span(fault.t_ns)} with code {code}"
-    place = f"{fault.file}:{fault.line}" if fault.file and fault.line > 0 else fault.process
-    return f"{place}: {_own_words(fault)}"
-
-
-def _own_words(fault: Fault) -> str:
-    """Return what a fault says, an exception's message in quotation marks where it could be taken for ours."""
-    text = quote(fault.text)
-    kind, colon, message = text.partition(": ")
-    if fault.kind is not FaultKind.EXCEPTION or ";" not in text:
-        return text
-    plain = message.replace('"', "'")
-    return f'{kind}: "{plain}"' if colon else text
 
 
 def _last_part(name: str) -> str:

@@ -24,7 +24,7 @@ from grader.core.trace import Trace
 from grader.execution.bag import Odometry
 from grader.execution.recording_session import Studio, open_studio
 from grader.execution.supervisor import Job
-from grader.judging.judge import judge_exercise
+from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, beside, idle, read_explained
 from grader.mutation.operators.mutants import mutants_of
 from grader.mutation.operators.program import Program

@@ -11,7 +11,7 @@ from pydantic import AllowInfNan, BeforeValidator, GetCoreSchemaHandler, GetJson
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from grader.core.quantities import Unit
-from grader.judging.formula import FormulaError, curve
+from grader.judging.series import FormulaError, curve
 from grader.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
 
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.core.submission import Submission
-from grader.judging.code import Code, code_of
-from grader.judging.source import LONGEST_SOURCE, chain, read
+from grader.judging.source import LONGEST_SOURCE, Source, chain, read
 
 
 def _words(text: str) -> frozenset[str]:
@@ -93,9 +92,8 @@ def reaching(text: str) -> tuple[str, ...]:
     source = read("", text)
     if source.tree is None:
         return (LONG,) if len(text) > LONGEST_SOURCE or _can_run(text) else ()
-    code = code_of(source)
-    found = (*_imports(source.nodes), *_named(source.nodes, code), *_computed(source.nodes, code))
-    return tuple(dict.fromkeys((*found, *_timing(source.nodes, code))))
+    found = (*_imports(source.nodes), *_named(source.nodes, source), *_computed(source.nodes, source))
+    return tuple(dict.fromkeys((*found, *_timing(source.nodes, source))))
 
 
 def _can_run(text: str) -> bool:
@@ -120,13 +118,13 @@ def _imports(nodes: Sequence[ast.AST]) -> Iterator[str]:
             yield from (part for part in _TEXTS if part in name)
 
 
-def _named(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+def _named(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
     for node in nodes:
         if isinstance(node, ast.Attribute):
-            name = code.resolved(node)
+            name = source.resolved(node)
             if node.attr in _ATTRIBUTES or name in _NAMES:
                 yield node.attr if node.attr in _ATTRIBUTES else name
-            elif node.attr == "__doc__" or (_is_private(node.attr) and chain(node.value) in code.aliases):
+            elif node.attr == "__doc__" or (_is_private(node.attr) and chain(node.value) in source.aliases):
                 yield name
         elif isinstance(node, ast.Name) and node.id in (_BUILTINS | _ATTRIBUTES):
             yield node.id
@@ -144,16 +142,16 @@ def _is_private(name: str) -> bool:
     return name.startswith("_") and not name.endswith("__")
 
 
-def _computed(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+def _computed(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
     """Yield names that are looked up by a text that is worked out, and functions that are asked what they are."""
     spelt = _loops_over_texts(nodes)
     for call in (node for node in nodes if isinstance(node, ast.Call)):
         name = chain(call.func)
         if name in ("getattr", "setattr", "delattr") and not _is_spelt_out(call, spelt):
             yield f"{name} of a name that is worked out"
-        elif name in ("getattr", "setattr", "delattr", "hasattr") and _named_by_text(call, code):
-            yield f"{name} of {_named_by_text(call, code)}"
-        elif name in _ASKING and any(_of_module(argument, code) for argument in call.args):
+        elif name in ("getattr", "setattr", "delattr", "hasattr") and _named_by_text(call, source):
+            yield f"{name} of {_named_by_text(call, source)}"
+        elif name in _ASKING and any(_of_module(argument, source) for argument in call.args):
             yield f"{name} of a function"
         elif name.endswith("environ.items") or (name in ("dict", "list", "sorted", "len") and _takes_environ(call)):
             yield "os.environ"
@@ -189,70 +187,70 @@ def _is_spelt_out(call: ast.Call, spelt: frozenset[str]) -> bool:
     return chain(call.func) == "setattr" and bool(call.args) and chain(call.args[0]) == "self"
 
 
-def _named_by_text(call: ast.Call, code: Code) -> str:
+def _named_by_text(call: ast.Call, source: Source) -> str:
     """Return the name that a call looks up by its text, if it is one that is looked for; empty otherwise."""
     if len(call.args) < 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
         return ""
-    name = f"{code.resolved(call.args[0])}.{call.args[1].value}"
+    name = f"{source.resolved(call.args[0])}.{call.args[1].value}"
     return name if name in _NAMES or call.args[1].value in _ATTRIBUTES else ""
 
 
-def _of_module(node: ast.expr, code: Code) -> bool:
+def _of_module(node: ast.expr, source: Source) -> bool:
     """Return whether an expression is something in a module, or a module, and not what calling it gives."""
     name = chain(node)
     called = isinstance(node, ast.Call)
-    return not called and name.partition(".")[0] in code.aliases and name.rpartition(".")[2][:1].islower()
+    return not called and name.partition(".")[0] in source.aliases and name.rpartition(".")[2][:1].islower()
 
 
 def _takes_environ(call: ast.Call) -> bool:
     return any(chain(argument).endswith("environ") for argument in call.args)
 
 
-def _timing(nodes: Sequence[ast.AST], code: Code) -> Iterator[str]:
+def _timing(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
     """Yield two clocks in one file, and loops that count how often they look at one."""
     names = [node for node in nodes if isinstance(node, (ast.Attribute, ast.Name))]
-    clocks = {clock for node in names if (clock := _CLOCKS.get(code.resolved(node)))}
+    clocks = {clock for node in names if (clock := _CLOCKS.get(source.resolved(node)))}
     if len(clocks) > 1:
         yield "two clocks"
-    if any(_compares(node, code) for node in nodes):
+    if any(_compares(node, source) for node in nodes):
         yield "a clock that is compared"
     for loop in (node for node in nodes if isinstance(node, ast.While)):
         inside = list(ast.walk(loop))
-        looks = any(isinstance(n, (ast.Attribute, ast.Name)) and code.resolved(n) in _CLOCKS for n in inside)
+        looks = any(isinstance(n, (ast.Attribute, ast.Name)) and source.resolved(n) in _CLOCKS for n in inside)
         waits = any(isinstance(n, ast.Call) and chain(n.func).rpartition(".")[2] in _WAITING for n in inside)
         if looks and not waits and any(isinstance(n, ast.AugAssign) for n in inside):
             yield "a loop that counts"
 
 
-def _compares(node: ast.AST, code: Code) -> bool:
+def _compares(node: ast.AST, source: Source) -> bool:
     """Return whether a date is compared with anything, or a clock as nobody does who waits for time to pass."""
     if isinstance(node, (ast.Subscript, ast.Attribute)):
-        return _is_date(node.value, code) and (
+        return _is_date(node.value, source) and (
             isinstance(node, ast.Subscript) or node.attr in ("startswith", "endswith")
         )
     if not isinstance(node, ast.Compare):
         return False
     sides = [node.left, *node.comparators]
-    if any(_is_date(side, code) for side in sides):
+    if any(_is_date(side, source) for side in sides):
         return True
     numbers = [s.value for s in sides if isinstance(s, ast.Constant) and isinstance(s.value, (int, float))]
-    if any(_is_clock(side, code) for side in sides) and numbers:
+    if any(_is_clock(side, source) for side in sides) and numbers:
         return True
     exact = any(isinstance(op, (ast.Eq, ast.NotEq, ast.In, ast.NotIn)) for op in node.ops)
-    looks = any(_is_clock(inner, code) for side in sides for inner in ast.walk(side))
+    looks = any(_is_clock(inner, source) for side in sides for inner in ast.walk(side))
     return looks and (exact or any(0 < abs(n) < _TINY_S for n in numbers))
 
 
-def _is_clock(node: ast.AST, code: Code) -> bool:
-    return isinstance(node, ast.Call) and code.resolved(node.func) in _CLOCKS
+def _is_clock(node: ast.AST, source: Source) -> bool:
+    return isinstance(node, ast.Call) and source.resolved(node.func) in _CLOCKS
 
 
-def _is_date(node: ast.AST, code: Code) -> bool:
+def _is_date(node: ast.AST, source: Source) -> bool:
     if not isinstance(node, ast.Call):
         return False
     told = isinstance(node.func, ast.Attribute) and node.func.attr in _TOLD
-    texts = chain(node.func) in ("str", "repr") and any(_is_date(a, code) or _is_clock(a, code) for a in node.args)
-    return told or texts or code.resolved(node.func) in _CALENDARS
+    texts = chain(node.func) in ("str", "repr") and any(_is_date(a, source) or _is_clock(a, source) for a in node.args)
+    return told or texts or source.resolved(node.func) in _CALENDARS
 
 
 #: Calls in which a loop waits.

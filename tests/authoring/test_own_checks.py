@@ -22,7 +22,7 @@ from grader.cli import main
 from grader.core.errors import RubricError
 from grader.core.exercise import Outcome
 from grader.core.submission import StudentFile, Submission
-from grader.judging.judge import judge_exercise
+from grader.judging.judge_run import judge_exercise
 from grader.packaging import Chosen, classroom50
 from grader.rubrics.loader import own_check_files, read_rubric
 from grader.testing import TraceBuilder, judge

@@ -7,8 +7,8 @@ from tracing import FLOAT32, Recording, held_at, position_logs, scripted, veloci
 
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind
-from grader.judging.figures.pictures import illustrated
-from grader.judging.judge import judge_exercise
+from grader.judging.charts import illustrated
+from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 

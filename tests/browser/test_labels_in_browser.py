@@ -7,7 +7,6 @@ from report_samples import criterion, exercise, report
 from tracing import velocity
 
 from grader.judging.checks.rate import TopicRate
-from grader.judging.figures.rates import rate_chart
 from grader.reporting.html.render import render_html
 
 pytestmark = pytest.mark.browser
@@ -31,7 +30,7 @@ def overlap(one, other):
 def test_labels_of_bands_lie_apart(browser, tmp_path, rate_hz, width):
     """Two bands of a few pixels each still have a label each that can be read."""
     file = tmp_path / "report.html"
-    chart = rate_chart(CHECK, velocity(rate=rate_hz).trace("alone"))
+    chart = CHECK.chart(velocity(rate=rate_hz).trace("alone"))
     judged = exercise("velocity_publisher", "1", "Velocity publisher", criterion("rate", "Rate", 10), figures=(chart,))
     file.write_text(render_html(report(judged)), encoding="utf-8")
     page = browser.new_page(viewport={"width": width, "height": 900})

@@ -35,7 +35,7 @@ from grader.core.trace import (
 )
 from grader.execution.evidence.shown import encode
 from grader.execution.evidence.store import keep
-from grader.judging.whole import judge_run
+from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
 from grader.rubrics.loader import read_rubric
 

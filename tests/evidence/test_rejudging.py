@@ -13,7 +13,7 @@ from kept_runs import RUBRICS, kept_run, velocity_exercise, velocity_run, veloci
 from grader.app import rejudge
 from grader.cli import main
 from grader.execution.evidence.store import open_evidence
-from grader.judging.whole import judge_run
+from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps
 from grader.rubrics.loader import read_rubric
 

@@ -7,9 +7,9 @@ from tracing import ODOMETRY, TRIGGER, TWIST
 from grader.core.exercise import Check
 from grader.core.quantities import NS_PER_S
 from grader.judging.checks import CHECKS
-from grader.judging.checks.endpoints import GraphEdge
-from grader.judging.checks.reactions import ReactionCase
-from grader.judging.rules import FieldRule
+from grader.judging.checks.graph import GraphEdge
+from grader.judging.checks.timing import ReactionCase
+from grader.judging.values import FieldRule
 
 INSTANCES: dict[str, Check] = {
     "publishes": CHECKS["publishes"]("/cmd_vel", TWIST),

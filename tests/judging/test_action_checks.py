@@ -11,7 +11,7 @@ from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
 from grader.judging.checks.actions import ActionFeedback, ActionResult
 from grader.judging.findings import FAULT_KEY
-from grader.judging.rules import FieldRule
+from grader.judging.values import FieldRule
 
 NAME, TYPE = "/fibonacci", "test_msgs/action/Fibonacci"
 NUMBERS = [0, 1, 1, 2, 3, 5]

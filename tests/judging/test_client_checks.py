@@ -14,8 +14,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Check
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Request
-from grader.judging.checks.clients import ServiceCalls, WaitsForService
-from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
+from grader.judging.checks.clients import NoGoWithoutAnswer, ReactsToResponses, ServiceCalls, WaitsForService
 from grader.judging.findings import FAULT_KEY
 
 BATTERY = "/battery/get_status"

@@ -23,9 +23,9 @@ from diagnosis_samples import (
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Verdict
 from grader.core.trace import Start, StartWay, Trace
-from grader.judging import judge
-from grader.judging.diagnosis.case import Case, Cause
-from grader.judging.diagnosis.diagnose import CAUSES, diagnose
+from grader.judging import judge_run
+from grader.judging.diagnosis import RULES, diagnose
+from grader.judging.diagnosis.rules import Case, Rule
 from grader.submissions.sources import source_text
 
 Row = Mapping[str, Any]
@@ -108,11 +108,11 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
     def without_reasons(verdicts: tuple[Verdict, ...], *others: Any) -> tuple[Verdict, ...]:
         return diagnose(tuple(replace(v, reason="") for v in verdicts), *others)
 
-    monkeypatch.setattr(judge, "diagnose", without_reasons)
+    monkeypatch.setattr(judge_run, "diagnose", without_reasons)
     assert list(explained(row, traces).verdicts) == known
 
 
-def test_a_cause_that_fails_is_logged_and_passed_over(monkeypatch, caplog) -> None:
+def test_a_rule_that_fails_is_logged_and_passed_over(monkeypatch, caplog) -> None:
     """The others are looked for all the same; elsewhere in these tests the log makes the test fail."""
 
     def fails(case: Case) -> None:
@@ -120,20 +120,20 @@ def test_a_cause_that_fails_is_logged_and_passed_over(monkeypatch, caplog) -> No
 
     row = CRASHES[0]
     usual = lost(explained(row, crash_traces(row)))
-    monkeypatch.setattr("grader.judging.diagnosis.diagnose.CAUSES", (Cause("fails", fails), *CAUSES))
+    monkeypatch.setattr("grader.judging.diagnosis.RULES", (Rule("fails", fails, fault=None), *RULES))
     assert lost(explained(row, crash_traces(row))) == usual
-    assert caplog.messages[0] == f"the cause fails failed on the criterion {usual[0].id}"
+    assert caplog.messages[0] == f"the rule fails failed on the criterion {usual[0].id}"
 
 
-def test_every_cause_is_in_a_table() -> None:
-    """A cause that nothing shows to work is not there."""
+def test_every_rule_is_in_a_table() -> None:
+    """A rule that nothing shows to work is not there."""
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS)} | {"empty_file"}  # which no change of a program makes
-    assert {cause.id for cause in CAUSES} - shown == set()
+    assert {rule.id for rule in RULES} - shown == set()
 
 
-def test_the_ids_of_causes_are_unique() -> None:
+def test_the_ids_of_rules_are_unique() -> None:
     """Reports name them."""
-    ids = [cause.id for cause in CAUSES]
+    ids = [rule.id for rule in RULES]
     assert len(ids) == len(set(ids))
 
 
@@ -158,8 +158,8 @@ def test_a_right_program_that_does_right_is_left_alone(file: str) -> None:
     assert all(v in plain.verdicts for v in right)
 
 
-#: Causes that say what a program does wrong, whatever was recorded: a right program must never get them.
-TEXTUAL = {cause.id for cause in CAUSES} - {
+#: Rules that say what a program does wrong, whatever was recorded: a right program must never get them.
+TEXTUAL = {rule.id for rule in RULES} - {
     "log_line",  # where a log is written
     "log_period",
     "late_timer",

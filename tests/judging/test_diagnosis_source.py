@@ -16,11 +16,10 @@ from hypothesis import strategies as st
 
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Trace
-from grader.judging.diagnosis import diagnose as room
-from grader.judging.diagnosis.case import Case, Clue
-from grader.judging.diagnosis.constants import constant
-from grader.judging.diagnosis.notes import placed
-from grader.judging.diagnosis.wiring import goes_to, made
+from grader.judging import diagnosis
+from grader.judging.diagnosis import placed
+from grader.judging.diagnosis.rules import Case, Clue
+from grader.judging.diagnosis.wiring import constant, goes_to, made
 from grader.judging.source import LONGEST_SOURCE, chain, last_line, read
 from grader.submissions.sources import MAX_SOURCE_BYTES, read_sources
 
@@ -70,7 +69,7 @@ WRONG = wrong_traces()
 @contextmanager
 def strict() -> Iterator[None]:
     """Let exceptions of causes through, which diagnosis otherwise keeps from the report."""
-    looked = room.clue_for
+    looked = diagnosis.clue_for
 
     def clue_for(case: Case) -> tuple[str, Clue] | None:
         try:
@@ -78,7 +77,7 @@ def strict() -> Iterator[None]:
         except Exception as error:
             raise SystemExit(f"a cause raised {error!r}") from error
 
-    with mock.patch.object(room, "clue_for", clue_for):
+    with mock.patch.object(diagnosis, "clue_for", clue_for):
         yield
 
 

@@ -11,8 +11,8 @@ from tracing import FLOAT32, FLOAT64, Recording
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import FaultKind
-from grader.judging.checks.endings import CleanShutdown, NoFault
-from grader.judging.checks.endpoints import GraphEdge, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.graph import GraphEdge, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.programs import CleanShutdown, NoFault
 from grader.judging.findings import FAULT_KEY
 
 

@@ -11,9 +11,9 @@ from tracing import Recording
 
 from grader.core.quantities import NS_PER_S
 from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
-from grader.judging.checks.log_patterns import LogsMatching
+from grader.judging.checks.logs import LogsMatching
 from grader.judging.findings import FAULT_KEY
-from grader.judging.rules import FieldRule
+from grader.judging.values import FieldRule
 
 
 def sending(values: list[Any]) -> Recording:

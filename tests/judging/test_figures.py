@@ -20,12 +20,10 @@ from tracing import (
 from grader.core.chart import GraphFigure, Look, Tone
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Mark, Request, Response
+from grader.judging.charts import expectation, figures_of, illustrated
+from grader.judging.charts.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
 from grader.judging.checks import CHECKS
-from grader.judging.figures import pictures
-from grader.judging.figures.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
-from grader.judging.figures.expectations import expectation
-from grader.judging.figures.pictures import MAKERS, figures_of, illustrated
-from grader.judging.judge import judge_exercise
+from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
@@ -221,9 +219,7 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch):
     def broken(check, trace):
         raise ZeroDivisionError
 
-    kinds = dict(MAKERS)
-    rate = next(kind for kind in kinds if kind.__name__ == "TopicRate")
-    monkeypatch.setattr(pictures, "MAKERS", kinds | {rate: broken})
+    monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
     titles = [f.title for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert not any(t.startswith("How often") for t in titles)
     assert len(titles) == 3

@@ -9,7 +9,7 @@ import pytest
 from tracing import FLOAT64, Recording, twist
 
 from grader.core.trace import ClockKind
-from grader.judging.checks.functions import FieldFunction
+from grader.judging.checks.fields import FieldFunction
 from grader.judging.findings import FAULT_KEY
 
 CHECK = FieldFunction("/joint_commands", "sin(0.1 * n)", tolerance=1e-6)

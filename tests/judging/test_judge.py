@@ -17,7 +17,7 @@ from grader.core.scenario import Scenario, Span
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import ClockKind, FaultKind, Trace
 from grader.judging.checks import CHECKS
-from grader.judging.judge import judge_exercise
+from grader.judging.judge_run import judge_exercise
 
 FILE = "velocity_publisher.py"
 ODOM = "odom_subscriber.py"

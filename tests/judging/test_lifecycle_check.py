@@ -8,7 +8,7 @@ import pytest
 from tracing import Recording
 
 from grader.core.errors import HarnessError
-from grader.judging.checks.lifecycle import LifecycleStates
+from grader.judging.checks.actions import LifecycleStates
 from grader.judging.findings import FAULT_KEY
 
 CHANGE, GET = "lifecycle_msgs/srv/ChangeState", "lifecycle_msgs/srv/GetState"

@@ -10,7 +10,7 @@ import pytest
 from tracing import FLOAT64, Recording
 
 from grader.core.trace import ClockKind
-from grader.judging.checks.log_rhythm import LogsEvery
+from grader.judging.checks.logs import LogsEvery
 from grader.judging.findings import FAULT_KEY
 
 CHECK = LogsEvery("simple_publisher.py", "/joint_commands", 10)

@@ -11,7 +11,7 @@ from tracing import FLOAT64, Recording
 
 from grader.core.errors import HarnessError
 from grader.core.trace import ClockKind
-from grader.judging.checks.log_values import LogsValues
+from grader.judging.checks.received import LogsValues
 from grader.judging.findings import FAULT_KEY
 
 DEGREES = 180 / math.pi

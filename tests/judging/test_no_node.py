@@ -7,8 +7,7 @@ from fractions import Fraction
 from tracing import TWIST, Recording
 
 from grader.core.trace import FaultKind
-from grader.judging.checks.log_patterns import LogsMatching
-from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.logs import LogsMatching, UsesLogger
 
 CHECK = UsesLogger("node.py")
 MATCHING = LogsMatching("node.py", "speed")

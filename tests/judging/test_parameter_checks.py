@@ -9,7 +9,7 @@ import pytest
 from tracing import Recording
 
 from grader.core.errors import HarnessError
-from grader.judging.checks.parameters import ParameterDeclared, ParameterTakesEffect
+from grader.judging.checks.programs import ParameterDeclared, ParameterTakesEffect
 from grader.judging.findings import FAULT_KEY
 
 GET, SET = "rcl_interfaces/srv/GetParameters", "rcl_interfaces/srv/SetParameters"

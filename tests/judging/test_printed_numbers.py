@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.judging.positions.labels import candidate_pairs, template_of
-from grader.judging.positions.numbers import clean, printed_numbers, with_decimal_points
+from grader.judging.texts import candidate_pairs, clean, printed_numbers, template_of, with_decimal_points
 
 
 def values(text: str) -> list[float]:

@@ -11,9 +11,9 @@ from tracing import Recording
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind
-from grader.judging.checks.reactions import Reaction, ReactionCase
+from grader.judging.checks.timing import Reaction, ReactionCase
 from grader.judging.findings import FAULT_KEY
-from grader.judging.rules import FieldRule
+from grader.judging.values import FieldRule
 
 TEXT, GOAL = "std_msgs/msg/String", "geometry_msgs/msg/PoseStamped"
 PLACES = {"kitchen": (2.0, 1.5), "office": (-1.0, 3.25)}

@@ -11,7 +11,8 @@ import pytest
 from tracing import FLOAT32, Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
-from grader.judging.checks.sensor import LogsReceived, RandomInRange
+from grader.judging.checks.fields import RandomInRange
+from grader.judging.checks.received import LogsReceived
 
 RANGE = RandomInRange("/temperature", 20, 30)
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")

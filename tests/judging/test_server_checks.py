@@ -12,10 +12,9 @@ from tracing import TRIGGER, Recording
 from grader.core.errors import HarnessError
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import ClockKind
-from grader.judging.checks.service_sequence import ServiceSequence
-from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
 from grader.judging.findings import FAULT_KEY
-from grader.judging.rules import FieldRule
+from grader.judging.values import FieldRule
 
 BATTERY = "/battery/get_status"
 FORM = FieldRule(pattern=r"Battery: [0-9]+\.[0-9]% remaining", example="Battery: 84.5% remaining")

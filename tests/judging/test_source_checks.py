@@ -14,9 +14,9 @@ from grader.core.quantities import NS_PER_S
 from grader.core.scenario import Scenario, Span
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind
-from grader.judging.checks.sources import SourceAvoids, SourceUses
+from grader.judging.checks.programs import SourceAvoids, SourceUses
 from grader.judging.findings import FAULT_KEY
-from grader.judging.judge import judge_exercise
+from grader.judging.judge_run import judge_exercise
 
 NODE = "rclpy.node.Node"
 USES = SourceUses("node.py", (NODE,), ("create_timer", "rclpy.spin"))

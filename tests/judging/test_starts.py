@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from grader.core.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
-from grader.judging.judge import started
-from grader.judging.wording import fault_sentence
+from grader.judging.findings import fault_sentence
+from grader.judging.judge_run import started
 
 
 @pytest.mark.parametrize(

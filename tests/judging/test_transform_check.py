@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from tracing import Recording
 
-from grader.judging.checks.transforms import Transform
+from grader.judging.checks.topics import Transform
 from grader.judging.findings import FAULT_KEY
 
 TF = "tf2_msgs/msg/TFMessage"

@@ -7,14 +7,13 @@ import pytest
 from grader.core.errors import RubricError
 from grader.core.quantities import NS_PER_MS
 from grader.judging.checks.actions import ActionResult
-from grader.judging.checks.endpoints import GraphEdge, GraphEdges, TopicNames
-from grader.judging.checks.functions import FieldFunction
-from grader.judging.checks.log_values import LogsValues
-from grader.judging.checks.reactions import Reaction, ReactionCase
+from grader.judging.checks.fields import FieldFunction
+from grader.judging.checks.graph import GraphEdge, GraphEdges, TopicNames
+from grader.judging.checks.received import LogsValues
 from grader.judging.checks.services import ServiceResponse
-from grader.judging.checks.timing import Silence
-from grader.judging.checks.transforms import Transform
-from grader.judging.rules import FieldRule
+from grader.judging.checks.timing import Reaction, ReactionCase, Silence
+from grader.judging.checks.topics import Transform
+from grader.judging.values import FieldRule
 from grader.rubrics.loader import read_rubric
 
 RUBRIC = """schema: grader/rubric/v1

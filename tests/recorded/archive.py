@@ -17,7 +17,7 @@ from grader.execution.evidence import manifest as kept
 from grader.execution.evidence.packed import unpack
 from grader.execution.evidence.recording_file import packed_trace
 from grader.execution.evidence.store import run_from
-from grader.judging.whole import judge_run
+from grader.judging.judge_run import judge_run
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 

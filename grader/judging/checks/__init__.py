@@ -1,31 +1,26 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
 
-from grader.judging.checks.actions import ActionFeedback, ActionResult
-from grader.judging.checks.clients import ServiceCalls, WaitsForService
-from grader.judging.checks.decisions import NoGoWithoutAnswer, ReactsToResponses
-from grader.judging.checks.endings import CleanShutdown, NoFault
-from grader.judging.checks.endpoints import GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
+from grader.judging.checks.clients import NoGoWithoutAnswer, ReactsToResponses, ServiceCalls, WaitsForService
 from grader.judging.checks.fan import ThresholdResponse
-from grader.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone
-from grader.judging.checks.functions import FieldFunction
-from grader.judging.checks.graph import BidirectionalGraph
-from grader.judging.checks.lifecycle import LifecycleStates
-from grader.judging.checks.log_patterns import LogsMatching
-from grader.judging.checks.log_rhythm import LogsEvery
-from grader.judging.checks.log_values import LogsValues
-from grader.judging.checks.logs import UsesLogger
+from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
+from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
+from grader.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
-from grader.judging.checks.parameters import ParameterDeclared, ParameterTakesEffect
+from grader.judging.checks.programs import (
+    CleanShutdown,
+    NoFault,
+    ParameterDeclared,
+    ParameterTakesEffect,
+    SourceAvoids,
+    SourceUses,
+)
 from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.reactions import Reaction
-from grader.judging.checks.sensor import LogsReceived, RandomInRange
-from grader.judging.checks.service_sequence import ServiceSequence
-from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse
-from grader.judging.checks.sources import SourceAvoids, SourceUses
-from grader.judging.checks.timing import Latency, Period, Silence
+from grader.judging.checks.received import LogsReceived, LogsValues
+from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceResponse, ServiceSequence
+from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.checks.topics import FieldValues, Publishes, Subscribes
-from grader.judging.checks.transforms import Transform
+from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
 
 #: Name in a rubric -> check; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {
@@ -76,5 +71,4 @@ CHECKS: dict[str, type] = {
     "source_uses": SourceUses,
     "source_avoids": SourceAvoids,
 }
-
 __all__ = ["CHECKS"]

@@ -8,15 +8,35 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
+from grader.core.chart import Chart, Look, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Trace
-from grader.judging.findings import met, not_met
-from grader.judging.lateness import lag_ns
-from grader.judging.silence import explain_no_message, fault_hint, first_fault, heard_from_ns, student_endpoints
-from grader.judging.values import Held, Reading, delivered_numbers, held, last_of_instant, published, published_numbers
-from grader.judging.wording import counted, fault_sentence, moment, number, numbers, quote, span, unit_of
+from grader.judging.charts.drawing import (
+    answer_panel,
+    happenings,
+    input_panel,
+    points_of,
+    series,
+    time_chart,
+    which_answers,
+)
+from grader.judging.findings import explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.series import lag_ns
+from grader.judging.values import (
+    EXACT,
+    Held,
+    Reading,
+    delivered_numbers,
+    heard_from_ns,
+    held,
+    last_of_instant,
+    published,
+    published_numbers,
+    student_endpoints,
+)
+from grader.judging.wording import counted, moment, number, numbers, quote, span, unit_of
 
 #: How long after a new input an answer to the one before is still accepted.
 _GRACE_NS = 300 * NS_PER_MS
@@ -24,7 +44,6 @@ _GRACE_NS = 300 * NS_PER_MS
 _LONGEST_GRACE_NS = 1_200 * NS_PER_MS
 #: A controller that speaks at least this often repeats itself; silence then means that it stopped.
 _REPEATING_NS = 1_200 * NS_PER_MS
-_EXACT = 1e-6
 #: So many answers, and this share of them, that come in the instant of an input are no timer's.
 _FEWEST_AT_ONCE, _SHARE_AT_ONCE = 10, 0.97
 
@@ -61,6 +80,13 @@ class ThresholdResponse:
     above: float
     otherwise: float
     side: Literal["above", "at_or_below"]
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        side, answer = ("above", self.above) if self.side == "above" else ("at or below", self.otherwise)
+        return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every input on this side is answered rightly."""
@@ -102,7 +128,7 @@ class ThresholdResponse:
         return self.above if value > self.threshold else self.otherwise
 
     def _right(self, got: float, value: float) -> bool:
-        return within(got, self._expected(value), _EXACT)
+        return within(got, self._expected(value), EXACT)
 
     def _violation(self, asked: Held, answers: Sequence[Reading], trace: Trace, grace_ns: int) -> _Violation | None:
         during = [a for a in answers if asked.start_ns <= a.t_ns < asked.stop_ns]
@@ -135,7 +161,7 @@ class ThresholdResponse:
         for answer in during:
             if self._right(answer.value, asked.value):
                 came = True
-            elif came or not within(answer.value, old, _EXACT):
+            elif came or not within(answer.value, old, EXACT):
                 return answer
         return None if came else during[-1]
 
@@ -164,7 +190,7 @@ class ThresholdResponse:
         reason += f"expected {wanted}"
         fault = first_fault(trace)
         if fault is not None and first.got is None:
-            return not_met(f"{reason}; {fault_sentence(fault)}", evidence, hint=fault_hint(fault), fault=fault)
+            return faulted(fault, reason, evidence, last=True)
         both = {a.value for a in every if a.t_ns == first.t_ns and first.got is not None}
         if len(both) > 1:
             said = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
@@ -191,7 +217,7 @@ class ThresholdResponse:
         mistaken = [v.held.value for v in violations]
         if self.side == "at_or_below" and all(v == self.threshold for v in mistaken):
             return "", f"{limit} itself is not above {limit}: compare with > and not with >="
-        low = all(v.got is not None and within(v.got, self.otherwise, _EXACT) for v in violations)
+        low = all(v.got is not None and within(v.got, self.otherwise, EXACT) for v in violations)
         near = self.side == "above" and low and all(0 < v - self.threshold <= 1 for v in mistaken)
         if near and any(h.value > self.threshold + 1 for h in inputs):
             return "", f"every value above {limit} counts, however little: compare it as it is, without rounding"
@@ -220,12 +246,12 @@ class ThresholdResponse:
         both = {v > self.threshold for v, _ in pairs} == {True, False}
         # exactly at the threshold, inverted logic may fall on either side
         away = [(v, got) for v, got in pairs if v != self.threshold]
-        return both and all(within(got, flipped[self._expected(v)], _EXACT) for v, got in away)
+        return both and all(within(got, flipped[self._expected(v)], EXACT) for v, got in away)
 
     def _silent(self, trace: Trace) -> Finding:
         """Return why the controller never answered; that it did subscribe is said too."""
         why = explain_no_message(trace, self.output)
-        heard = [e for e in student_endpoints(trace, "subscription") if e.topic == self.input]
+        heard = student_endpoints(trace, "subscription", self.input)
         if first_fault(trace) is not None or why.evidence.get("messages"):
             return why
         if not heard:
@@ -239,7 +265,26 @@ class ThresholdResponse:
         fault = first_fault(trace)
         if fault is None:
             raise HarnessError(f"{self.input}: no value on this side of {number(self.threshold)} was published")
-        return not_met(f"{fault_sentence(fault)}; no answer on {self.output}", hint=fault_hint(fault), fault=fault)
+        return faulted(fault, f"no answer on {self.output}")
+
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return the numbers given to a controller and its answers under them, or None if nothing was given."""
+        sent = delivered_numbers(trace, self.input)
+        answers = published_numbers(trace, self.output)
+        if not sent:
+            return None
+        asked = held(trace, self.input)
+        expected = [Reading(h.start_ns, self.above if h.value > self.threshold else self.otherwise) for h in asked]
+        expected += [Reading(trace.stop_ns, expected[-1].value)]
+        about = f"{counted(len(asked), 'value')} on {self.input}, each held for a while "
+        about += f"({', '.join(number(h.value) for h in asked)}{unit_of(self.input)}); "
+        about += f"{counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
+        upper = input_panel(self.input, sent, self.threshold, Look.STEP)
+        lower = answer_panel(
+            self.output, answers, series("expected", points_of(expected), look=Look.STEP, tone=Tone.FAINT)
+        )
+        title = f"Answers on {self.output} to {self.input}"
+        return time_chart(f"response {self.input}", title, about, (upper, lower), happenings(trace))
 
 
 def _deaf(subscriptions: Sequence[Any]) -> str:

@@ -1,4 +1,4 @@
-"""Checks on the fields of the messages on a topic: what they equal, where they lie, and which way they go."""
+"""Checks on the numbers in the messages on a topic: their values, their range, a formula, or chance."""
 
 from __future__ import annotations
 
@@ -8,15 +8,26 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
-from grader.core.exercise import Finding
-from grader.core.quantities import SLACK, seconds
+from grader.core.chart import Band, Chart, Look, Panel
+from grader.core.exercise import Finding, Formula, Problem, ProblemKind
+from grader.core.quantities import SLACK, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.findings import met, not_met
-from grader.judging.paths import number_at
-from grader.judging.rules import FieldRule, as_rule, breach, broken_rules, told
-from grader.judging.silence import explain_no_message, fault_hint, first_fault
-from grader.judging.values import published
-from grader.judging.wording import counted, fault_sentence, moment, number, quote
+from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart
+from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
+from grader.judging.values import (
+    JITTER_NS,
+    FieldRule,
+    Reading,
+    as_rule,
+    breach,
+    broken_rules,
+    number_at,
+    published,
+    published_numbers,
+    told,
+)
+from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +176,220 @@ def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Findi
     if found == 0:
         return explain_no_message(trace, topic)
     reason = f"{topic}: {counted(found, 'message')}, expected at least {wanted}"
-    fault = first_fault(trace)
-    if fault is not None:
-        return not_met(f"{reason}; {fault_sentence(fault)}", hint=fault_hint(fault), fault=fault)
-    return not_met(reason, {"messages": found})
+    return explain_fault(trace, reason, last=True) or not_met(reason, {"messages": found})
+
+
+@dataclass(frozen=True, slots=True)
+class FieldFunction:
+    """A field of every message on a topic follows a formula of the message's number n, which is 0 for the first one.
+
+    The formula may use n, the time t in seconds since the first message, numbers, pi, + - * / % **, and sin, cos, tan,
+    exp, sqrt, abs and floor. On the wall clock t may be off by 50 ms. NaN follows nothing.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        formula: What the field holds, e.g. `sin(0.1 * n)`.
+        field: Path of the field, e.g. `data` or `linear.x`.
+        tolerance: Largest difference, unit of the field.
+        start_tolerance: How many messages may have been lost before the first one was seen.
+        at_least: How many messages there must be to tell.
+    """
+
+    topic: str
+    formula: Formula
+    field: str = "data"
+    tolerance: float = 1e-6
+    start_tolerance: int = 0
+    at_least: int = 10
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if no message differs; the reason names the first that does."""
+        messages = published(trace, self.topic)
+        if not messages:
+            return explain_no_message(trace, self.topic)
+        values = _numbers(messages, self.field)
+        if isinstance(values, Finding):
+            return values
+        times = (seconds(m.t_ns - messages[0].t_ns) for m in messages)
+        samples = [Sample(n, t_s, value) for n, (t_s, value) in enumerate(zip(times, values, strict=True))]
+        return self._judged(trace, messages, samples)
+
+    def _judged(self, trace: Trace, messages: Sequence[Message], samples: Sequence[Sample]) -> Finding:
+        wanted = curve(self.formula)
+        jitter_s = seconds(JITTER_NS[trace.clock])
+        start, wrong = self._best_start(wanted, samples, jitter_s)
+        evidence = {
+            "topic": self.topic,
+            "formula": self.formula,
+            "messages": len(samples),
+            "wrong": len(wrong),
+            "first_values": [s.value for s in samples[:10]],
+            "first_n": start,
+        }
+        if wrong:
+            return self._differs(wanted, messages, samples, (start, wrong), evidence)
+        if len(samples) < self.at_least:
+            return self._few(trace, samples, evidence)
+        lost = f", the first one seen being n = {start}" if start else ""
+        reason = f"{self.topic}: {self.field} follows {self.formula} in {counted(len(samples), 'message')}{lost}"
+        return met(reason, evidence)
+
+    def _best_start(self, wanted: Curve, samples: Sequence[Sample], jitter_s: float) -> tuple[int, list[Sample]]:
+        """Return the number of the first message that leaves the fewest wrong, 0 unless another is better."""
+        starts = range(max(0, self.start_tolerance) + 1)
+        ways = [[s for s in samples if not self._right(wanted, s, jitter_s, start)] for start in starts]
+        best = min(starts, key=lambda start: len(ways[start]))
+        return best, ways[best]
+
+    def _right(self, wanted: Curve, sample: Sample, jitter_s: float, start: int) -> bool:
+        got = [wanted.at(sample.n + start, sample.t_s + shift) for shift in (0.0, -jitter_s, jitter_s)]
+        if within(sample.value, got[0], self.tolerance):
+            return True
+        slack = self.tolerance + SLACK
+        return jitter_s > 0 and min(got) - slack <= sample.value <= max(got) + slack
+
+    def _few(self, trace: Trace, samples: Sequence[Sample], evidence: dict[str, Any]) -> Finding:
+        found = f"{self.topic}: {counted(len(samples), 'message')}, expected at least {self.at_least}"
+        fault = first_fault(trace)
+        if fault is None:
+            return not_met(found, evidence, blocked_by="topic_rate")
+        return faulted(fault, found, evidence, last=True)
+
+    def _differs(
+        self,
+        wanted: Curve,
+        messages: Sequence[Message],
+        samples: Sequence[Sample],
+        found: tuple[int, Sequence[Sample]],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        start, wrong = found
+        first = wrong[0]
+        t_ns = messages[first.n].t_ns
+        expected = number(wanted.at(first.n + start, first.t_s))
+        reason = f"{moment(t_ns)}, {self.topic}: {self.field} is {number(first.value)} in message n = "
+        reason += f"{first.n + start}, expected {self.formula} = {expected}; "
+        reason += f"wrong in {len(wrong)} of {counted(len(samples), 'message')}"
+        instead = followed_instead(wanted, samples, self.tolerance)
+        reason += f"; {instead.said}" if instead.said else ""
+        problem = Problem(ProblemKind.COUNT_START, start=instead.start) if instead.start is not None else None
+        return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, hint=instead.hint, problem=problem)
+
+
+#: Rounding to single precision must not push a value out of its range.
+_EDGE = 1e-5
+#: So many equal values or fewer may have been drawn: whole numbers repeat.
+_FEWEST_FOR_CONSTANT = 5
+_RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high})"
+
+
+@dataclass(frozen=True, slots=True)
+class RandomInRange:
+    """Every number on a topic lies in a range, and the numbers are drawn: no constant, cycle, ramp or smooth curve.
+
+    Attributes:
+        topic: Topic name as on the wire; its messages carry one number, as `data` or `temperature`.
+        low: Smallest value allowed, the edge inside.
+        high: Largest value allowed, the edge inside.
+    """
+
+    topic: str
+    low: float
+    high: float
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        span_ = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
+        return f"every value on {self.topic} within {span_}, and drawn at random"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if no value is outside and the values may have been drawn."""
+        messages = published(trace, self.topic)
+        if not messages:
+            silent = explain_no_message(trace, self.topic)
+            return not_met(silent.reason, silent.evidence, blocked_by="topic_rate")
+        values = published_numbers(trace, self.topic)
+        if len(values) < len(messages):
+            return not_met(f"{self.topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+        return self._outside(values) or self._computed(values) or self._drawn(values)
+
+    @property
+    def _hint(self) -> str:
+        return _RANDOM_HINT.format(low=f"{float(self.low)}", high=f"{float(self.high)}")
+
+    def _evidence(self, values: Sequence[Reading]) -> dict[str, Any]:
+        got = [r.value for r in values]
+        return {
+            "messages": len(got),
+            "min": min(got),
+            "max": max(got),
+            "distinct": len(set(got)),
+            "first_values": got[:10],
+        }
+
+    def _outside(self, values: Sequence[Reading]) -> Finding | None:
+        unit = unit_of(self.topic)
+        bad = [r for r in values if not self.low - _EDGE <= r.value <= self.high + _EDGE]
+        if not bad:
+            return None
+        first = bad[0]
+        side = f"above {number(self.high)}" if first.value > self.high else f"below {number(self.low)}"
+        side = "that is no number" if math.isnan(first.value) else f"{side}{unit}"
+        reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
+        reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
+        evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
+        return not_met(reason, evidence, hint=self._hint)
+
+    def _computed(self, values: Sequence[Reading]) -> Finding | None:
+        got = [r.value for r in values]
+        pattern = "constant" if len(got) == 1 else pattern_of(got)
+        if pattern is None:
+            return None
+        if pattern == "constant" and len(got) < _FEWEST_FOR_CONSTANT:
+            reason = (
+                f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{unit_of(self.topic)}) cannot show chance"
+            )
+            return not_met(reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate")
+        problem = None
+        if pattern == "constant":
+            shown = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
+            problem = Problem(ProblemKind.CONSTANT)
+        else:
+            shown = f"{pattern} ({numbers(got[:5])}, ...)"
+        reason = f"{self.topic}: the values are not random but {shown}"
+        return not_met(reason, self._evidence(values) | {"pattern": pattern}, hint=self._hint, problem=problem)
+
+    def _drawn(self, values: Sequence[Reading]) -> Finding:
+        got = [r.value for r in values]
+        unit = unit_of(self.topic)
+        reason = f"{self.topic}: {counted(len(got), 'value')} from {number(min(got))} to {number(max(got))}{unit}, "
+        reason += f"{len(set(got))} of them different; "
+        reason += f"expected random ones in {number(self.low)} to {number(self.high)}{unit}"
+        return met(reason, self._evidence(values))
+
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return the numbers on a topic in the range that they may come from, or None without numbers."""
+        values = published_numbers(trace, self.topic)
+        if not values:
+            return None
+        unit = unit_of(self.topic).strip()
+        got = [r.value for r in values]
+        outside = sum(not self.low <= v <= self.high for v in got)
+        about = f"{counted(len(got), 'value')} on {self.topic} from {number(min(got))} to {number(max(got))}"
+        about += f"{unit_of(self.topic)}, {len(set(got))} of them different; {outside or 'none'} outside "
+        label = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
+        dots = series(plain_topic(self.topic), points_of(values), look=Look.LINE)
+        band = Band(self.low, self.high, f"{label}: accepted")
+        return time_chart(
+            f"range {self.topic}",
+            f"Values on {self.topic}",
+            f"{about}{label}.",
+            (Panel(plain_topic(self.topic), unit, (dots,), bands=(band,)),),
+            happenings(trace),
+        )

@@ -1,16 +1,18 @@
-"""The check on two nodes that talk in both directions, asked of the live graph."""
+"""Checks on the ROS graph: names of nodes and topics, edges between nodes, and the QoS of an endpoint."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
+from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.quantities import seconds
+from grader.core.quantities import DurationNs, seconds
 from grader.core.trace import Endpoint, GraphSnapshot, Trace
-from grader.judging.findings import met, not_met
-from grader.judging.silence import fault_hint, first_fault
-from grader.judging.wording import fault_sentence, moment, quote
+from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met
+from grader.judging.values import student_endpoints
+from grader.judging.wording import counted, listed, moment, nearest, number, quote
 
 Pair = tuple[Endpoint, Endpoint]
 
@@ -24,8 +26,14 @@ class BidirectionalGraph:
         back: Topic of the other direction, e.g. `/fan_speed`.
     """
 
+    shows_graph: ClassVar[bool] = True
     forward: str
     back: str
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"one node reached by {self.forward}, the other by {self.back}, with the types agreeing"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if any snapshot has both directions between the same two processes."""
@@ -55,8 +63,7 @@ class BidirectionalGraph:
         broken = [topic for topic in (self.forward, self.back) if topic not in complete]
         fault = first_fault(trace)
         if broken and fault is not None:
-            reason = f"{fault_sentence(fault)}; no edge over {' and '.join(broken)}"
-            return not_met(reason, evidence, hint=fault_hint(fault), fault=fault)
+            return faulted(fault, f"no edge over {' and '.join(broken)}", evidence)
         if not broken:
             reason = (
                 f"{self.forward} and {self.back}: both have an edge, but not between the same two processes at once"
@@ -65,7 +72,7 @@ class BidirectionalGraph:
         reason = "; ".join(_gap(topic, endpoints) for topic in broken)
         reason += "; only one direction" if len(broken) == 1 else ""
         problem = Problem(ProblemKind.NO_EDGE, tuple(broken))
-        return not_met(reason, evidence, hint=_hint(broken[0], endpoints), problem=problem)
+        return not_met(reason, evidence, hint=_gap_hint(broken[0], endpoints), problem=problem)
 
 
 def _edges(snapshot: GraphSnapshot, topic: str) -> list[Pair]:
@@ -102,7 +109,7 @@ def _gap(topic: str, endpoints: list[Endpoint]) -> str:
     return f"{topic}: its publisher and its subscription are in one process or not there at the same time"
 
 
-def _hint(topic: str, endpoints: list[Endpoint]) -> str:
+def _gap_hint(topic: str, endpoints: list[Endpoint]) -> str:
     publishers, subscriptions = _split(topic, endpoints)
     if publishers and not subscriptions:
         return f"subscribe to {topic} in the other node"
@@ -111,3 +118,239 @@ def _hint(topic: str, endpoints: list[Endpoint]) -> str:
     if publishers and subscriptions and publishers[0].type != subscriptions[0].type:
         return f"use the same message type for {topic} in both files"
     return ""
+
+
+_QOS_HINT = "pass a QoSProfile with that policy where the {kind} is created"
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """A publisher or subscription of a student's node on a topic has the QoS policies that are named.
+
+    Of several endpoints one that fits is enough. The middleware does not tell every depth: where it does not, what
+    depends on it stays undecided.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        kind: `publisher` or `subscription`.
+        reliability: `reliable` or `best_effort`; free if left out.
+        durability: `volatile` or `transient_local`; free if left out.
+        deadline: Deadline offered or asked for; `0 s` for none; free if left out.
+        depth: Smallest history depth; free if left out.
+    """
+
+    topic: str
+    kind: Literal["publisher", "subscription"]
+    reliability: Literal["reliable", "best_effort"] | None = None
+    durability: Literal["volatile", "transient_local"] | None = None
+    deadline: DurationNs | None = None
+    depth: int | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"a {self.kind} on {self.topic} with {self._wanted}"
+
+    @property
+    def _wanted(self) -> str:
+        parts = [str(part) for part in (self.reliability, self.durability) if part]
+        if self.deadline is not None:
+            parts.append(f"a deadline of {number(seconds(self.deadline))} s" if self.deadline else "no deadline")
+        parts += [f"a depth of at least {self.depth}"] if self.depth is not None else []
+        return " and ".join(parts) or "any QoS"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if an endpoint has all of it; the reason says what the others have."""
+        mine = student_endpoints(trace, self.kind, self.topic)
+        if not mine:
+            return self._absent(trace)
+        fitting = [e for e in mine if self._fits(e) and (self.depth is None or e.depth >= self.depth)]
+        unknown = [e for e in mine if self._fits(e) and e.depth == 0]
+        evidence = {"endpoints": [_qos(e) for e in mine]}
+        if fitting:
+            return met(f"{self.topic}: the {self.kind} of {quote(fitting[0].node)} has {self._wanted}", evidence)
+        if unknown:
+            raise HarnessError(f"{self.topic}: the middleware does not tell the depth of the {self.kind}")
+        reason = f"{self.topic}: the {self.kind} of {quote(mine[0].node)} has {_policies(mine[0])}"
+        return not_met(f"{reason}, expected {self._wanted}", evidence, hint=_QOS_HINT.format(kind=self.kind))
+
+    def _fits(self, end: Endpoint) -> bool:
+        return (
+            self.reliability in (None, end.reliability)
+            and self.durability in (None, end.durability)
+            and self.deadline in (None, end.deadline_ns)
+        )
+
+    def _absent(self, trace: Trace) -> Finding:
+        if self.kind == "subscription":
+            return explain_no_subscription(trace, self.topic)
+        fault = first_fault(trace)
+        if fault is not None:
+            return faulted(fault, f"no publisher on {self.topic}")
+        seen = list(dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")))
+        return not_met(f"{self.topic}: no publisher{_seen(seen)}", {"seen": seen[:20]})
+
+
+def _qos(end: Endpoint) -> list[Any]:
+    return [end.node, end.reliability, end.durability, seconds(end.deadline_ns), end.depth]
+
+
+def _policies(end: Endpoint) -> str:
+    deadline = f", a deadline of {number(seconds(end.deadline_ns))} s" if end.deadline_ns else ""
+    depth = f", a depth of {end.depth}" if end.depth else ""
+    return f"{quote(end.reliability)} reliability, {quote(end.durability)} durability{deadline}{depth}"
+
+
+def _seen(names: Sequence[str]) -> str:
+    return f"; seen: {listed(names)}" if names else ""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeName:
+    """A node of a name is in the ROS graph.
+
+    Attributes:
+        name: Fully qualified, e.g. `/velocity_publisher`.
+    """
+
+    name: str
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"a node named {self.name}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if it ever was; the reason names the nodes that were."""
+        wanted = self.name if self.name.startswith("/") else f"/{self.name}"
+        nodes = list(dict.fromkeys(node for graph in trace.graphs() for node in graph.nodes))
+        if wanted in nodes:
+            return met(f"{wanted} is in the ROS graph", {"nodes": nodes[:20]})
+        fault = first_fault(trace)
+        if fault is not None and not nodes:
+            return faulted(fault, f"no node {wanted}")
+        found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
+        near = nearest(wanted, nodes) or (nodes[0] if len(nodes) == 1 else None)
+        hint = f"name the node {wanted.rsplit('/', 1)[-1]!r} instead of {quote(near)}" if near else ""
+        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint)
+
+
+@dataclass(frozen=True, slots=True)
+class TopicNames:
+    """The students' nodes publish and subscribe to the topics named, at least or exactly; types are free.
+
+    Topics that every node has are not counted.
+
+    Attributes:
+        publishes: Topics that are published.
+        subscribes: Topics that are subscribed to.
+        exactly: Whether other topics are a mistake.
+        node: Fully qualified name of the node that is meant; all of them if left out.
+    """
+
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    exactly: bool = False
+    node: str | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        parts = [f"publishes {', '.join(self.publishes)}"] if self.publishes or self.exactly else []
+        parts += [f"subscribes to {', '.join(self.subscribes)}"] if self.subscribes or self.exactly else []
+        return f"{self.node or 'the program'} {' and '.join(parts)}{' and nothing else' if self.exactly else ''}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if no topic is missing, nor too many if that is asked."""
+        made = [e for e in student_endpoints(trace) if self.node in (None, e.node)]
+        out, back = (sorted({e.topic for e in made if e.kind == k}) for k in ("publisher", "subscription"))
+        flaws = [*_flaws("published", self.publishes, out, exactly=self.exactly)]
+        flaws += _flaws("subscribed to", self.subscribes, back, exactly=self.exactly)
+        evidence = {"publishes": out, "subscribes": back}
+        if not flaws:
+            return met(f"published: {listed(out) or 'nothing'}; subscribed to: {listed(back) or 'nothing'}", evidence)
+        fault = first_fault(trace)
+        if fault is not None and not made:
+            return faulted(fault, flaws[0], evidence)
+        return not_met(f"{'; '.join(flaws[:3])}; expected that {self.expected}", evidence)
+
+
+def _flaws(word: str, wanted: Sequence[str], found: Sequence[str], *, exactly: bool) -> list[str]:
+    flaws = []
+    for topic in (t for t in wanted if t not in found):
+        near = nearest(topic, found)
+        flaws.append(f"{topic} is not {word}" + (f", but {quote(near)} is" if near else ""))
+    return flaws + [f"{quote(topic)} is {word} too" for topic in found if exactly and topic not in wanted]
+
+
+@dataclass(frozen=True, slots=True)
+class GraphEdge:
+    """One edge of the ROS graph; a node that is left out may be any of the students'.
+
+    Attributes:
+        topic: Topic name as on the wire.
+        source: Fully qualified name of the publishing node.
+        target: Fully qualified name of the subscribing node.
+    """
+
+    topic: str
+    source: str | None = None
+    target: str | None = None
+
+    def __str__(self) -> str:
+        """Return the edge as reports draw it."""
+        return f"{self.source or 'a node'} ─{self.topic}→ {self.target or 'a node'}"
+
+
+@dataclass(frozen=True, slots=True)
+class GraphEdges:
+    """The live graph has edges from a student's node by a topic to a student's node, the types agreeing.
+
+    Attributes:
+        edges: Each with `topic`, and `source` and `target` where the nodes' names matter.
+        at_once: Whether one moment must show all of them.
+        between_processes: Whether the two nodes must be of different processes.
+    """
+
+    edges: tuple[GraphEdge, ...]
+    at_once: bool = False
+    between_processes: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{', '.join(map(str, self.edges))} in the ROS graph{' at one moment' if self.at_once else ''}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if no edge is missing; the reason names the first that is."""
+        graphs = [g for g in trace.graphs() if g.t_ns < trace.stop_ns]
+        shown = {g.t_ns: [edge for edge in self.edges if self._has(g, edge)] for g in graphs}
+        seen = [edge for edge in self.edges if any(edge in edges for edges in shown.values())]
+        whole = next((t for t, edges in shown.items() if len(edges) == len(self.edges)), None)
+        evidence = {"edges": [str(edge) for edge in seen]}
+        if len(seen) == len(self.edges) and (not self.at_once or whole is not None):
+            when = f"{moment(whole)}: " if whole is not None else ""
+            return met(f"{when}{', '.join(map(str, self.edges))}", evidence)
+        missing = next((edge for edge in self.edges if edge not in seen), None)
+        if missing is None:
+            return not_met("every edge is there, but never all of them at once", evidence)
+        return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
+            f"no edge {missing}; {self._instead(trace, missing)}", evidence
+        )
+
+    def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:
+        return any(
+            edge.source in (None, source.node)
+            and edge.target in (None, target.node)
+            and not (self.between_processes and source.participant == target.participant)
+            for source, target in _edges(graph, edge.topic)
+        )
+
+    def _instead(self, trace: Trace, edge: GraphEdge) -> str:
+        ends = student_endpoints(trace, topic=edge.topic)
+        if not ends:
+            return f"nothing publishes {edge.topic} and nothing subscribes to it"
+        said = [
+            f"{quote(e.node)} {'publishes' if e.kind == 'publisher' else 'subscribes'} {quote(e.type)}" for e in ends
+        ]
+        return f"{edge.topic}: {', '.join(list(dict.fromkeys(said))[:4])}"

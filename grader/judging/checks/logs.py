@@ -1,18 +1,31 @@
-"""The check on whether a node writes through its logger."""
+"""Checks on whether a node writes through its logger, what, how often, and with how many of its messages."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+import re
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Literal
 
-from grader.core.exercise import Finding
-from grader.core.quantities import seconds
-from grader.core.trace import Trace
-from grader.judging.findings import met, not_met, partly
-from grader.judging.output import is_no_node, printed_lines, student_records
-from grader.judging.silence import fault_hint, first_fault
-from grader.judging.wording import counted, fault_sentence, moment, quote, span
+from grader.core.exercise import Finding, Location, Pattern
+from grader.core.quantities import DurationNs, seconds, within
+from grader.core.trace import LogRecord, Message, Trace
+from grader.judging.findings import (
+    explain_fault,
+    explain_no_message,
+    fault_sentence,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    partly,
+    waiting_for,
+)
+from grader.judging.output import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
+from grader.judging.values import JITTER_NS, number_at, published
+from grader.judging.wording import counted, listed, moment, number, quote, span
 
 LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 
@@ -24,6 +37,14 @@ def no_node(trace: Trace, process: str, evidence: Mapping[str, Any]) -> Finding:
     if fault is not None:
         reason = f"{fault_sentence(fault)}; {reason}"
     return not_met(reason, evidence, hint="create the node, and log with node.get_logger()", fault=fault)
+
+
+def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[str, Any], hint: str) -> Finding:
+    """Return no credit for records of severity ERROR or FATAL, at the place of the first one."""
+    reason = f"{process}: {counted(len(bad), 'record')} of severity ERROR or FATAL{when}, the first at "
+    reason += f"{moment(bad[0].t_ns)}: {quote(bad[0].text)}"
+    location = Location(bad[0].file, bad[0].line) if bad[0].file and bad[0].line > 0 else None
+    return replace(not_met(reason, {"records": len(bad), **more}, hint=hint), location=location)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +59,11 @@ class UsesLogger:
     """
 
     process: str
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"a record of {self.process} through its logger; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit for a record, half for printed lines only."""
@@ -54,9 +80,245 @@ class UsesLogger:
         if lines:
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, none through the logger"
             return partly(reason, evidence | {"first": quote(lines[0].text)}, hint=LOGGER_HINT)
+        return explain_fault(trace, "nothing was logged", evidence, process=self.process) or not_met(
+            f"{self.process}: no log record in {span(trace.stop_ns)}", evidence, hint=LOGGER_HINT
+        )
+
+
+_LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")
+_LONGEST = 2_000
+
+
+@dataclass(frozen=True, slots=True)
+class LogsMatching:
+    """A process writes log records that match a pattern, of a level, so many of them, with a period where one is given.
+
+    Lines that match are half of it, if they are enough and come in that period.
+
+    Attributes:
+        process: File name of the student process.
+        pattern: Regular expression that is found in the text; every text if left out.
+        level: Lowest severity that counts.
+        exactly: Whether a higher severity does not count.
+        at_least: Fewest records.
+        at_most: Most records; any number if left out.
+        period: Average time expected from one to the next.
+        tolerance: Largest difference of the average, as a share of the period.
+    """
+
+    process: str
+    pattern: Pattern | None = None
+    level: Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"] = "DEBUG"
+    exactly: bool = False
+    at_least: int = 1
+    at_most: int | None = None
+    period: DurationNs | None = None
+    tolerance: float = 0.1
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        most = f" and at most {self.at_most}" if self.at_most is not None else ""
+        text = f" matching {self.pattern}" if self.pattern else ""
+        level = "" if self.level == "DEBUG" else f" of severity {self.level}{'' if self.exactly else ' or higher'}"
+        every = f", one every {number(seconds(self.period))} s" if self.period is not None else ""
+        return f"at least {self.at_least}{most} log records of {self.process}{level}{text}{every}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit for records, half for printed lines."""
+        records = student_records(trace, self.process)
+        mine = [r for r in records if self._of_level(r) and self._matches(r)]
+        flaw = self._flaw(mine)
+        evidence = self._evidence(mine)
+        if mine and is_no_node(trace, self.process):
+            return no_node(trace, self.process, evidence)
+        if not flaw:
+            first = f", the first at {moment(mine[0].t_ns)}: {quote(mine[0].text, 80)}" if mine else ""
+            return met(f"{self.process}: {counted(len(mine), 'record')}{first}", evidence)
+        lines = [o for o in printed_lines(trace, self.process) if self._matches(o)]
+        if (
+            lines
+            and not is_no_node(trace, self.process)
+            and not self._flaw(sorted([*mine, *lines], key=lambda o: o.t_ns))
+        ):
+            reason = f"{self.process}: {counted(len(lines), 'line')} printed, {counted(len(mine), 'record')} logged"
+            return partly(f"{reason}; expected {self.expected}", evidence, hint=LOGGER_HINT)
+        reason = f"{self.process}: {flaw}; expected {self.expected}"
         fault = first_fault(trace, self.process)
-        if fault is not None:
-            return not_met(
-                f"{fault_sentence(fault)}; nothing was logged", evidence, hint=fault_hint(fault), fault=fault
-            )
-        return not_met(f"{self.process}: no log record in {span(trace.stop_ns)}", evidence, hint=LOGGER_HINT)
+        if fault is not None and len(mine) < self.at_least:
+            return faulted(fault, flaw, evidence)
+        return not_met(reason + self._others(records), evidence)
+
+    def _of_level(self, record: LogRecord) -> bool:
+        if record.severity not in _LEVELS:
+            return False
+        rank = _LEVELS.index(record.severity) - _LEVELS.index(self.level)
+        return rank == 0 if self.exactly else rank >= 0
+
+    def _matches(self, output: Output) -> bool:
+        return self.pattern is None or re.search(self.pattern, output.text[:_LONGEST]) is not None
+
+    def _flaw(self, found: Sequence[Output]) -> str:
+        if len(found) < self.at_least or (self.at_most is not None and len(found) > self.at_most):
+            return f"{counted(len(found), 'record')} of that kind"
+        if self.period is None:
+            return ""
+        if len(found) < 2:
+            return f"{counted(len(found), 'record')}, too few to have a period"
+        average = (found[-1].t_ns - found[0].t_ns) / (len(found) - 1)
+        if within(average, self.period, self.tolerance * self.period):
+            return ""
+        return f"{len(found)} records, one every {average / 1e9:.3f} s on average"
+
+    def _evidence(self, found: Sequence[Output]) -> dict[str, Any]:
+        return {"records": len(found), "times_s": [seconds(o.t_ns) for o in found[:60]]}
+
+    def _others(self, records: Sequence[LogRecord]) -> str:
+        seen = list(dict.fromkeys(f"{r.severity} {quote(r.text, 50)}" for r in records))
+        return f"; logged: {listed(seen, 2)}" if seen else "; nothing was logged"
+
+
+#: Share of the texts of one shape that must show the published number for the shape to count as its log.
+_SHOWING = 0.6
+#: Share of the messages with a log from which on it is one for every message.
+_FLOOD = 0.5
+#: Largest difference of the average, as a share of the distance asked for.
+_AVERAGE = 0.05
+_MOST_IN_EVIDENCE = 60
+
+
+@dataclass(frozen=True, slots=True)
+class _Rhythm:
+    """The numbers of the messages at which something was written, increasing."""
+
+    places: tuple[int, ...]
+
+    @property
+    def average(self) -> float:
+        return (self.places[-1] - self.places[0]) / (len(self.places) - 1)
+
+
+@dataclass(frozen=True, slots=True)
+class LogsEvery:
+    """A process writes one log for every so many messages that it publishes, and not one for each.
+
+    The logs that count are those that hold the published number; where none does, all that come with or after the first
+    message. With which message the first of them comes is free, and a gap may be off by one message. Logs that are
+    printed instead are half of it.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that it publishes.
+        every: How many messages there are from one log to the next.
+        field: Path of the published number.
+    """
+
+    process: str
+    topic: str
+    every: int
+    field: str = "data"
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return (
+            f"one log of {self.process} for every {self.every} messages on {self.topic}; printing alone is half of it"
+        )
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit for records in that rhythm, half for printed lines."""
+        messages = published(trace, self.topic)
+        if not messages:
+            return waiting_for("publishes", explain_no_message(trace, self.topic))
+        if len(messages) < 2 * self.every + 1:
+            return self._few(trace, messages)
+        records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
+        logged = self._rhythms(trace, messages, records)
+        flood = self._flooded(logged, messages)
+        if flood:
+            return flood
+        right = next((r for r in logged if not self._flaw(r, messages)), None)
+        if right is not None:
+            return met(self._said(right, records, "logged"), self._evidence(right, messages))
+        printed = self._rhythms(trace, messages, lines)
+        shown = next((r for r in printed if not self._flaw(r, messages)), None)
+        if shown is not None and not self._flooded(printed, messages):
+            reason = f"{self._said(shown, lines, 'printed')}, not through the logger"
+            return partly(reason, self._evidence(shown, messages), hint=LOGGER_HINT)
+        return self._wrong(messages, logged or printed)
+
+    def _rhythms(self, trace: Trace, messages: Sequence[Message], outputs: Sequence[Output]) -> list[_Rhythm]:
+        """Return the rhythms that the outputs may be meant in, the likeliest first; that of them all is among them."""
+        jitter_ns = JITTER_NS[trace.clock]
+        times = [m.t_ns for m in messages]
+        placed = [(bisect_right(times, o.t_ns + jitter_ns) - 1, o) for o in outputs]
+        placed = [(place, o) for place, o in placed if place >= 0]
+        shapes: dict[str, list[tuple[int, Output]]] = {}
+        for place, output in placed:
+            shapes.setdefault(shape_of(output.text), []).append((place, output))
+        showing = [group for group in shapes.values() if self._shows(group, messages)]
+        groups = [[pair for group in showing for pair in group], *showing] if showing else [placed, *shapes.values()]
+        rhythms = [_Rhythm(tuple(sorted({place for place, _ in group}))) for group in [*groups, placed] if group]
+        return list(dict.fromkeys(rhythms))
+
+    def _shows(self, group: Sequence[tuple[int, Output]], messages: Sequence[Message]) -> bool:
+        hits = 0
+        for place, output in group:
+            near = messages[max(0, place - 1) : place + 2]
+            values = [v for m in near if (v := number_at(m.value, self.field)) is not None]
+            hits += any(printed.shows(value) for printed in numbers_in(output.text) for value in values)
+        return hits >= _SHOWING * len(group)
+
+    def _flaw(self, found: _Rhythm, messages: Sequence[Message]) -> str:
+        """Return what is wrong with a rhythm, as a clause; empty if nothing is."""
+        places, last = found.places, len(messages) - 1
+        if len(places) < 2:
+            return f"only with message {places[0] + 1}"
+        slack = 1 if self.every > 2 else 0
+        if not within(found.average, self.every, _AVERAGE * self.every):
+            return f"one for {number(found.average)} messages on average"
+        gap = next(((a, b) for a, b in pairwise(places) if abs(b - a - self.every) > slack), None)
+        if gap is not None:
+            return f"{gap[1] - gap[0]} messages from number {gap[0] + 1} to number {gap[1] + 1}"
+        if places[0] > self.every:
+            return f"none before message {places[0] + 1}"
+        return f"none after message {places[-1] + 1}" if last - places[-1] > self.every + slack else ""
+
+    def _flooded(self, found: Sequence[_Rhythm], messages: Sequence[Message]) -> Finding | None:
+        """Return that there is a log for every message or nearly so; None if there is not."""
+        most = max(found, key=lambda rhythm: len(rhythm.places), default=_Rhythm(()))
+        if self.every < 3 or len(most.places) < _FLOOD * len(messages):
+            return None
+        reason = f"{self.process}: something is written with {len(most.places)} of {len(messages)} messages; "
+        hint = f"count the messages, and log when the count is divisible by {self.every}: count % {self.every} == 0"
+        return not_met(reason + self._wanted, self._evidence(most, messages), hint=hint)
+
+    @property
+    def _wanted(self) -> str:
+        return f"expected one log for every {self.every} messages on {self.topic}"
+
+    def _said(self, found: _Rhythm, outputs: Sequence[Output], how: str) -> str:
+        reason = f"{self.process}: {counted(len(found.places), 'time')} {how}, one for {number(found.average)} messages"
+        first = next((o for o in outputs if numbers_in(o.text)), outputs[0])
+        return f"{reason} on {self.topic}: {quote(first.text, 80)}"
+
+    def _evidence(self, found: _Rhythm, messages: Sequence[Message]) -> dict[str, Any]:
+        places = [place + 1 for place in found.places[:_MOST_IN_EVIDENCE]]
+        return {"messages": len(messages), "logs": len(found.places), "with_message": places, "every": self.every}
+
+    def _few(self, trace: Trace, messages: Sequence[Message]) -> Finding:
+        fault = first_fault(trace, self.process)
+        reason = f"{self.topic}: {counted(len(messages), 'message')} cannot show one log for every {self.every}"
+        if fault is None:
+            return not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate")
+        return faulted(fault, reason)
+
+    def _wrong(self, messages: Sequence[Message], found: Sequence[_Rhythm]) -> Finding:
+        if not found:
+            first = moment(messages[0].t_ns)
+            reason = f"{self.process}: nothing is logged from the first message at {first} on; {self._wanted}"
+            return not_met(reason, {"messages": len(messages), "logs": 0, "every": self.every}, hint=LOGGER_HINT)
+        flaw = self._flaw(found[0], messages)
+        reason = f"{self.process}: {counted(len(found[0].places), 'log')}, {flaw}; {self._wanted}"
+        hint = f"count every message that is published, and log when count % {self.every} == 0"
+        return not_met(reason, self._evidence(found[0], messages), hint=hint)

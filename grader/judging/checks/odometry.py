@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Location, Problem, ProblemKind
-from grader.core.quantities import DurationNs, seconds, within
-from grader.core.trace import Fault, LogRecord, Trace
-from grader.judging.findings import met, not_met, partly
+from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.trace import Fault, Trace
+from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.checks.logs import complained
+from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
 from grader.judging.output import printed_lines, student_records, written
-from grader.judging.positions.analysis import Analysis, logged_positions, printed_positions
-from grader.judging.positions.causes import cause_of
-from grader.judging.positions.matching import Group, blocks, grouped
-from grader.judging.positions.track import Track, track_of
-from grader.judging.silence import fault_hint, first_fault
-from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
+from grader.judging.position_logs.analysis import (
+    Analysis,
+    Group,
+    Track,
+    X,
+    Y,
+    blocks,
+    grouped,
+    logged_positions,
+    printed_positions,
+    track_of,
+)
+from grader.judging.position_logs.causes import cause_of
+from grader.judging.wording import counted, moment, number, quote, span
 
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
 _TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"
@@ -62,6 +73,11 @@ class LogsPosition:
     process: str
     topic: str
 
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
+
     def judge(self, trace: Trace) -> Finding:
         """Return full credit for right records, half for right printed lines; the reason names what is wrong."""
         track = _track(trace, self.process, self.topic)
@@ -93,8 +109,7 @@ class LogsPosition:
         cause = cause_of(found, track)
         evidence = _evidence(found) | {"cause": cause.name}
         if fault is not None and cause.name in ("no_pair", "few"):
-            reason = f"{fault_sentence(fault)}; {cause.sentence if found.right else 'no position was logged before it'}"
-            return not_met(reason, evidence, hint=fault_hint(fault), fault=fault)
+            return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
         if not found.groups and not self._wrote_after(trace, track):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
@@ -103,6 +118,31 @@ class LogsPosition:
 
     def _wrote_after(self, trace: Trace, track: Track) -> bool:
         return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))
+
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return the path that was driven with the logged positions on it, or None if nothing was played."""
+        track = track_of(trace, self.topic)
+        if track is None:
+            return None
+        logged = logged_positions(trace, self.process, track)
+        printed = Analysis() if logged.right else printed_positions(trace, self.process, track)
+        pairs = _pairs(printed if printed.right else logged)
+        shown = [pair for pair in pairs if _near(pair.point, track)]
+        poses = track.poses
+        path = [(p.x, p.y) for p in poses]
+        lines = [series(f"path on {self.topic}", path, tone=Tone.FAINT, texts=[moment(p.t_ns) for p in poses])]
+        lines += _dots("logged, agrees", [p for p in shown if p.right], Tone.GOOD)
+        lines += _dots("logged, does not agree", [p for p in shown if not p.right], Tone.BAD)
+        return Chart(
+            id=f"path {self.topic}",
+            title=f"The path on {self.topic} and the logged positions",
+            about=_told_path(self.topic, track, pairs, len(pairs) - len(shown)),
+            criteria=(),
+            x_title="x",
+            x_unit="m",
+            panels=(Panel("y", "m", tuple(lines)),),
+            square=True,
+        )
 
 
 def _evidence(found: Analysis) -> dict[str, Any]:
@@ -133,6 +173,12 @@ class LogPeriod:
     topic: str
     period: DurationNs
     tolerance: float = 0.1
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        share = number(100 * self.tolerance)
+        return f"one log every {number(seconds(self.period))} s ± {share} % on average while {self.topic} is played"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if the average is right and there is no long gap."""
@@ -200,6 +246,32 @@ class LogPeriod:
                 return tuple(dict.fromkeys(e.t_ns for e in commonest.entries))
         return ()
 
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return when positions were logged, against the grid of the period; None if there was nothing to log."""
+        track = track_of(trace, self.topic)
+        if track is None:
+            return None
+        times = self.log_times(trace, track)
+        if not times:
+            return None
+        period_s = seconds(self.period)
+        dots = series("log", [(seconds(t), 0.0) for t in times], look=Look.DOTS)
+        gaps = series(
+            "since the log before", [(seconds(b), seconds(b - a)) for a, b in pairwise(times)], look=Look.DOTS
+        )
+        share = self.tolerance * period_s
+        label = f"{number(period_s)} s ± {number(100 * self.tolerance)} % on average"
+        return time_chart(
+            f"period {self.topic}",
+            "When positions were logged",
+            _told_period(times, self),
+            (
+                Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
+                Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
+            ),
+            happenings(trace),
+        )
+
 
 def _commonest(groups: Sequence[Group]) -> Group | None:
     """Return the template seen most often; of equals the one that holds two numbers."""
@@ -220,6 +292,12 @@ class WaitsGracefully:
     topic: str
     silence: DurationNs
 
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        silence = number(seconds(self.silence))
+        return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
+
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if nothing went wrong and something was written after the first message."""
         fault = first_fault(trace, self.process)
@@ -227,7 +305,10 @@ class WaitsGracefully:
             return self._faulted(trace, fault)
         bad = [r for r in student_records(trace, self.process) if r.severity in ("ERROR", "FATAL")]
         if bad:
-            return self._complained(bad)
+            more = {"first_s": seconds(bad[0].t_ns), "first": quote(bad[0].text)}
+            return complained(
+                self.process, bad, "", more, "waiting for data is no error: say nothing, or use info or warn"
+            )
         deliveries = trace.deliveries(self.topic)
         if not deliveries or deliveries[0].t_ns < self.silence:
             raise HarnessError(
@@ -244,15 +325,6 @@ class WaitsGracefully:
             hint = "start with None and return early as long as no message has come"
         return not_met(f"{fault_sentence(fault)}, {when}", {"fault_s": seconds(fault.t_ns)}, hint=hint, fault=fault)
 
-    def _complained(self, bad: Sequence[LogRecord]) -> Finding:
-        first = bad[0]
-        reason = f"{self.process}: {counted(len(bad), 'record')} of severity ERROR or FATAL, the first at "
-        reason += f"{moment(first.t_ns)}: {quote(first.text)}"
-        evidence = {"records": len(bad), "first_s": seconds(first.t_ns), "first": quote(first.text)}
-        found = not_met(reason, evidence, hint="waiting for data is no error: say nothing, or use info or warn")
-        location = Location(first.file, first.line) if first.file and first.line > 0 else None
-        return replace(found, location=location)
-
     def _works(self, trace: Trace, first_ns: int) -> Finding:
         outputs = written(trace, self.process)
         before = {o.text for o in outputs if o.t_ns < first_ns and not _DIGIT.search(o.text)}
@@ -263,3 +335,72 @@ class WaitsGracefully:
             return not_met(f"{alive}, but no sign that the data arrived", blocked_by="logs_position")
         evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
+
+
+#: A logged pair further away than this many sizes of the path is told, not drawn: it would shrink the path to a dot.
+_FAR = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class _LoggedPair:
+    """A pair of numbers that was logged as a position."""
+
+    point: Point
+    text: str
+    right: bool
+
+
+def _pairs(found: Analysis) -> list[_LoggedPair]:
+    """Return the pairs of the templates that hold positions; where none does, of the commonest with two numbers."""
+    right = [g for g in found.groups if g.pair is not None and g.right]
+    rest = [g for g in found.groups if g.pair is not None]
+    chosen = right or sorted(rest, key=lambda g: -len(g.entries))[:1]
+    return [
+        _LoggedPair((e.numbers[g.pair[0]].value, e.numbers[g.pair[1]].value), f"{moment(e.t_ns)}: {e.text}", e.right)
+        for g in chosen
+        if g.pair is not None
+        for e in g.entries
+    ]
+
+
+def _near(point: Point, track: Track) -> bool:
+    for value, path in zip(point, (X, Y), strict=True):
+        values = [p.at(path) for p in track.poses]
+        low, high = min(values), max(values)
+        room = _FAR * max(high - low, 1.0)
+        if not low - room <= value <= high + room:  # NaN loses
+            return False
+    return True
+
+
+def _dots(name: str, pairs: Sequence[_LoggedPair], tone: Tone) -> list[Series]:
+    if not pairs:
+        return []
+    return [series(name, [p.point for p in pairs], look=Look.DOTS, tone=tone, texts=[p.text for p in pairs])]
+
+
+def _told_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
+    right = sum(p.right for p in pairs)
+    first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
+    said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
+    said += f"{_place(last.at(X), last.at(Y))}. "
+    if not pairs:
+        return f"{said}No pair of numbers was logged."
+    said += f"{right} of {counted(len(pairs), 'logged pair')} of numbers agree with it."
+    return f"{said} {hidden} too far away to be drawn." if hidden else said
+
+
+def _place(x: float, y: float) -> str:
+    return f"({x:.2f}, {y:.2f}) m"
+
+
+def _told_period(times: Sequence[int], check: LogPeriod) -> str:
+    wanted = f"Expected: one every {number(seconds(check.period))} s ± {number(100 * check.tolerance)} % on average."
+    if len(times) < 2:
+        return f"One log, at {moment(times[0])}. {wanted}"
+    average = (times[-1] - times[0]) / (len(times) - 1) / NS_PER_S
+    gaps = [seconds(b - a) for a, b in pairwise(times)]
+    return (
+        f"{len(times)} logs from {moment(times[0])} to {moment(times[-1])}, one every {average:.3f} s on average, "
+        f"intervals from {min(gaps):.3f} to {max(gaps):.3f} s. The grid starts at the first log. {wanted}"
+    )

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import statistics
+from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.findings import met, not_met, partly
-from grader.judging.silence import explain_no_message, fault_hint, first_fault
+from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
-from grader.judging.wording import counted, fault_sentence, moment, number, quote, span
+from grader.judging.wording import counted, moment, number, quote, span
 
 #: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
@@ -71,6 +74,15 @@ class TopicRate:
     tolerance: Hertz
     window: DurationNs | None = None
     partly_tolerance: Hertz | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        over = "over the whole observation" if self.window is None else f"over {span(self.window)}"
+        said = f"{self.topic} at {number(self.rate)} ± {number(self.tolerance)} Hz on average {over}"
+        if self.partly_tolerance is not None:
+            said += f"; half the points at {number(self.rate)} ± {number(self.partly_tolerance)} Hz"
+        return said
 
     def judge(self, trace: Trace) -> Finding:
         """Return full, half or no credit by how far the rate is off."""
@@ -182,6 +194,20 @@ class TopicRate:
             return f"a loop with sleep adds the time of its own work to each period; use {rule}"
         return rule
 
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return the picture of a rate, or None if fewer than two messages came."""
+        times = sorted(m.t_ns for m in published(trace, self.topic))
+        if len(times) < 2 or times[0] == times[-1]:
+            return None
+        inside = [t for t in times if self.window is None or t < times[0] + self.window]
+        return time_chart(
+            f"rate {self.topic}",
+            f"How often {self.topic} came",
+            _told_rate(self, inside),
+            (_rate_panel(self, times), _interval_panel(self, times)),
+            happenings(trace),
+        )
+
 
 def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:
     gaps = [seconds(b - a) for a, b in pairwise(times)]
@@ -202,3 +228,51 @@ def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | Non
         return fault_sentence(fault) if exited else f"{stopped}: {fault_sentence(fault)}", fault
     limit = next((m for m in trace.marks("limit") if m.t_ns >= last_ns), None)
     return (f"{stopped}: {quote(limit.detail)}" if limit else stopped), None
+
+
+#: The rate at a moment is that of so much time before it, or of so many periods if they are longer.
+_TRAILING_NS = NS_PER_S
+_TRAILING_PERIODS = 4
+
+
+def _rate_panel(check: TopicRate, times: Sequence[int]) -> Panel:
+    bands = [_band(check.rate, check.tolerance, "full points", Tone.GOOD)]
+    if check.partly_tolerance is not None:
+        bands.insert(0, _band(check.rate, check.partly_tolerance, "half the points", Tone.WARNING))
+    points = _rates(times, max(_TRAILING_NS, round(_TRAILING_PERIODS * NS_PER_S / check.rate)))
+    return Panel("rate over the last second", "Hz", (series("rate", points),), tuple(bands))
+
+
+def _interval_panel(check: TopicRate, times: Sequence[int]) -> Panel:
+    points = [(seconds(b), (b - a) / NS_PER_MS) for a, b in pairwise(times)]
+    expected = Level(1000 / check.rate, f"{number(1000 / check.rate)} ms")
+    dots = series("interval since the message before", points, look=Look.DOTS, tone=Tone.SECOND)
+    return Panel("interval", "ms", (dots,), levels=(expected,))
+
+
+def _band(rate: float, tolerance: float, label: str, tone: Tone) -> Band:
+    return Band(rate - tolerance, rate + tolerance, f"{number(rate)} ± {number(tolerance)} Hz: {label}", tone)
+
+
+def _rates(times: Sequence[int], trailing_ns: int) -> list[Point]:
+    """Return the rate over the time before each message, once that much time has passed."""
+    points = []
+    for k, t in enumerate(times):
+        first = bisect_left(times, t - trailing_ns)
+        whole = t - times[0] >= trailing_ns or k == len(times) - 1
+        if whole and t > times[first]:
+            points.append((seconds(t), (k - first) * NS_PER_S / (t - times[first])))
+    return points
+
+
+def _told_rate(check: TopicRate, times: Sequence[int]) -> str:
+    gaps = [(b - a) / NS_PER_MS for a, b in pairwise(times)]
+    if len(times) < 2 or times[-1] == times[0]:
+        return f"{counted(len(times), 'message')} on {check.topic} in the window."
+    average = (len(times) - 1) * NS_PER_S / (times[-1] - times[0])
+    span_s = seconds(times[-1] - times[0])
+    return (
+        f"{counted(len(times), 'message')} on {check.topic} within {span_s:.1f} s, at {average:.3f} Hz on average; "
+        f"single intervals from {min(gaps):.1f} to {max(gaps):.1f} ms. Accepted: {number(check.rate)} ± "
+        f"{number(check.tolerance)} Hz over the whole window, not interval by interval."
+    )

@@ -10,20 +10,37 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+from grader.core.chart import Chart, Look, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
-from grader.judging.findings import FAULT_KEY, met, not_met
-from grader.judging.lateness import steps_behind
-from grader.judging.silence import explain_no_message, fault_hint, first_fault, student_endpoints
-from grader.judging.values import JITTER_NS, Reading, last_of_instant, published, published_numbers
-from grader.judging.wording import counted, fault_sentence, moment, number, quote, span, unit_of
+from grader.judging.charts.drawing import (
+    answer_panel,
+    happenings,
+    input_panel,
+    plain_topic,
+    points_of,
+    series,
+    time_chart,
+    which_answers,
+)
+from grader.judging.findings import FAULT_KEY, explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met
+from grader.judging.series import steps_behind
+from grader.judging.values import (
+    EXACT,
+    JITTER_NS,
+    Reading,
+    last_of_instant,
+    published,
+    published_numbers,
+    student_endpoints,
+)
+from grader.judging.wording import counted, moment, number, quote, span, unit_of
 
 #: An answer may belong to any input that was current so long before it.
 _CURRENT_NS = 250 * NS_PER_MS
 #: A controller must speak within this time where its last answer does not fit the input: one period of 1 s and slack.
 _SPEAK_NS = 1_250 * NS_PER_MS
-_EXACT = 1e-6
 #: Share of the answers that must fit the input of one and the same delay, where there are enough of them.
 _AGREEING_SHARE = 0.75
 #: The same where time is exact and about every input is answered.
@@ -65,6 +82,13 @@ class AnswersTogether:
     threshold: float
     above: float
     otherwise: float
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        limit = f"{number(self.threshold)}{unit_of(self.input)}"
+        answers = f"{number(self.above)} above {limit}, {number(self.otherwise)} otherwise"
+        return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if all of that holds; the reason names the first moment at which it does not."""
@@ -122,7 +146,7 @@ class AnswersTogether:
             # at the instant of the very first input a timer may still have spoken before it
             if one.t_ns != following.t_ns or one.value == following.value or not recent or one.t_ns == times[0]:
                 continue
-            if any(within(one.value, self._expected(r.value), _EXACT) for r in recent):
+            if any(within(one.value, self._expected(r.value), EXACT) for r in recent):
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
             said = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
@@ -140,9 +164,9 @@ class AnswersTogether:
             recent = _recent(inputs, times, answer.t_ns, jitter_ns)
             # what a timer told of before the first input, nobody knows: until then either answer may be right
             first = timed and answer.t_ns <= times[0] + jitter_ns
-            if first and any(within(answer.value, either, _EXACT) for either in (self.above, self.otherwise)):
+            if first and any(within(answer.value, either, EXACT) for either in (self.above, self.otherwise)):
                 continue
-            if not recent or any(within(answer.value, self._expected(r.value), _EXACT) for r in recent):
+            if not recent or any(within(answer.value, self._expected(r.value), EXACT) for r in recent):
                 continue
             value, unit = recent[-1].value, unit_of(self.input)
             reason = f"{moment(answer.t_ns)}, {self.output}: {number(answer.value)} for {number(value)}{unit} on "
@@ -154,7 +178,7 @@ class AnswersTogether:
         self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding:
         """Return that an answer is wrong, and how far behind the answers are if that explains them all."""
-        behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), _EXACT))
+        behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
         if not behind:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers are right for what came {counted(behind, 'message')} before"
@@ -177,9 +201,7 @@ class AnswersTogether:
         for delay_ns in (-JITTER_NS[trace.clock], *range(0, latest_ns + 1, _CURRENT_NS // 5)):
             for side in (bisect_left, bisect_right):
                 seen = [inputs[side(times, a.t_ns - delay_ns) - 1] for a in later]
-                fitting = sum(
-                    within(a.value, self._expected(r.value), _EXACT) for a, r in zip(later, seen, strict=True)
-                )
+                fitting = sum(within(a.value, self._expected(r.value), EXACT) for a, r in zip(later, seen, strict=True))
                 shares.append(fitting / len(later))
                 if shares[-1] >= enough:
                     return None
@@ -206,7 +228,7 @@ class AnswersTogether:
                 continue
             before = answers[:later]
             # before its first answer nobody knows what a controller that publishes on change believes
-            if before and not within(before[-1].value, self._expected(asked.value), _EXACT):
+            if before and not within(before[-1].value, self._expected(asked.value), EXACT):
                 return self._stopped(trace, self.output, before[-1].t_ns, evidence)
         return None
 
@@ -235,7 +257,7 @@ class AnswersTogether:
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w, count in Counter(expected).items() if count > often}
         given = {a.value for a in answers}
-        lacking = sorted(w for w in asked if not any(within(g, w, _EXACT) for g in given))
+        lacking = sorted(w for w in asked if not any(within(g, w, EXACT) for g in given))
         if not lacking:
             return None
         reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
@@ -246,6 +268,23 @@ class AnswersTogether:
             f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
         )
         return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
+
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return what the student's two nodes said to each other, or None if the first was silent."""
+        inputs = published_numbers(trace, self.input)
+        answers = published_numbers(trace, self.output)
+        if not inputs:
+            return None
+        above = sum(r.value > self.threshold for r in inputs)
+        wanted = [Reading(r.t_ns, self.above if r.value > self.threshold else self.otherwise) for r in inputs]
+        about = f"{counted(len(inputs), 'value')} on {self.input}, {above} above {number(self.threshold)}"
+        about += f"{unit_of(self.input)}; {counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
+        upper = input_panel(self.input, inputs, self.threshold, Look.LINE)
+        lower = answer_panel(
+            self.output, answers, series("expected", points_of(wanted), look=Look.STEP, tone=Tone.FAINT)
+        )
+        title = f"{plain_topic(self.input).capitalize()} and {plain_topic(self.output)}, both nodes together"
+        return time_chart(f"together {self.input}", title, about, (upper, lower), happenings(trace))
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:
@@ -280,8 +319,8 @@ def _recent(inputs: Sequence[Reading], times: Sequence[int], t_ns: int, jitter_n
 
 def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     """Return why the two ends of a topic cannot talk, their types or their QoS; None if they can."""
-    publishers = [e for e in student_endpoints(trace, "publisher") if e.topic == topic]
-    subscriptions = [e for e in student_endpoints(trace, "subscription") if e.topic == topic]
+    publishers = student_endpoints(trace, "publisher", topic)
+    subscriptions = student_endpoints(trace, "subscription", topic)
     pairs = [(p, s) for p in publishers for s in subscriptions if p.participant != s.participant]
     alike = [(p, s) for p, s in pairs if p.type == s.type]
     if not pairs or any(_incompatible(p, s) is None for p, s in alike):

@@ -1,1 +1,171 @@
-"""Names the cause of a lost point, with file and line, from the trace and the syntax tree of the student's file."""
+"""Goes through the verdicts that lost points and adds what very likely caused them; outcomes and points stay."""
+
+from __future__ import annotations
+
+import ast
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from grader.core.exercise import Check, Criterion, Exercise, Outcome, ProblemKind
+from grader.core.report import Verdict
+from grader.core.submission import Submission, main_not_called
+from grader.core.trace import Fault, Trace
+from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.fields import RandomInRange
+from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.diagnosis import callbacks, crashes, fan, loading, logs, positions, rates, silence, values
+from grader.judging.diagnosis.rules import Case, Clue, Rule
+from grader.judging.findings import FAULT_KEY
+from grader.judging.source import Source, first_line, last_name, read, text_of
+
+#: The modules of rules, in the order in which they are asked; within each the order is that of the text.
+_MODULES = (loading, callbacks, crashes, silence, rates, values, logs, positions, fan)
+#: Every rule there is; the first that applies is named.
+RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
+_LOST = (Outcome.NOT_MET, Outcome.PARTLY)
+_LOG = logging.getLogger(__name__)
+#: Evidence key that holds the id of the cause.
+CAUSE_KEY = "diagnosis"
+
+
+def diagnose(
+    verdicts: tuple[Verdict, ...],
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str],
+) -> tuple[Verdict, ...]:
+    """Return the verdicts with a place and one hint wherever a cause is very likely.
+
+    Args:
+        verdicts: In rubric order; outcomes, points and reasons are returned as they are.
+        exercise: What was asked.
+        traces: Scenario id -> what was recorded.
+        submission: Says under which path each wanted file was found.
+        sources: Wanted file name -> its text.
+    """
+    asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
+    if not asked:
+        return verdicts
+    # only these, because parsing a file takes longer than judging it
+    names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
+    read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
+    said = _Said(exercise)
+    return tuple(said.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
+
+
+def clue_for(case: Case) -> tuple[str, Clue] | None:
+    """Return the id and the clue of the first rule that applies to a case; None if nothing is very likely.
+
+    A rule that raises is logged and passed over: a mistake of ours must not keep a student from a report.
+    """
+    for rule in RULES:
+        try:
+            clue = rule.clue(case)
+        except Exception:
+            _LOG.exception("the rule %s failed on the criterion %s", rule.id, case.criterion.id)
+            continue
+        if clue is not None:
+            return rule.id, clue
+    return None
+
+
+@dataclass(slots=True)
+class _Said:
+    """Remembers which cause was named with which criterion, so that none is named twice."""
+
+    exercise: Exercise
+    owner: dict[str, str] = field(default_factory=dict)
+    lost: dict[str, Check] = field(default_factory=dict)
+
+    def on(
+        self, verdict: Verdict, criterion: Criterion, traces: Mapping[str, Trace], sources: Mapping[str, Source]
+    ) -> Verdict:
+        """Return the verdict with what is known about its cause."""
+        trace = traces.get(criterion.scenario)
+        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
+            return verdict
+        found = clue_for(self._case(verdict, criterion, trace, sources))
+        earlier = "" if found is not None else self._follows(criterion.check, verdict)
+        if verdict.outcome is Outcome.NOT_MET:
+            self.lost[criterion.id] = criterion.check
+        if found is None:
+            return _same_as(earlier, verdict) if earlier else verdict
+        id_, clue = found
+        key = clue.key or f"{id_}:{clue.location}"
+        earlier = self.owner.setdefault(key, criterion.id)
+        evidence = {**verdict.evidence, CAUSE_KEY: id_}
+        placed = replace(verdict, hint=clue.hint, location=clue.location or verdict.location, evidence=evidence)
+        return placed if earlier == criterion.id else _same_as(earlier, placed)
+
+    def _case(self, verdict: Verdict, criterion: Criterion, trace: Trace, sources: Mapping[str, Source]) -> Case:
+        scenario = next(s for s in self.exercise.scenarios if s.id == criterion.scenario)
+        own = {name: sources[name] for name in scenario.processes if name in sources}
+        siblings = tuple(c.check for c in self.exercise.criteria if c is not criterion)
+        return Case(criterion, verdict, trace, own, _fault_of(verdict, trace), siblings)
+
+    def _follows(self, check: Check, verdict: Verdict) -> str:
+        """Return the criterion whose loss explains that two nodes do not work together; empty if none surely does."""
+        problem = verdict.problem
+        if not isinstance(check, AnswersTogether) or problem is None:
+            return ""
+        quiet = problem.kind in (ProblemKind.STOPPED, ProblemKind.NO_MESSAGE)
+        fixed = problem.kind is ProblemKind.NEVER_CHANGES
+        stopped = problem.kind is ProblemKind.STOPPED and check.input in problem.topics
+        answered = problem.kind is ProblemKind.WRONG_ANSWER or (quiet and check.output in problem.topics)
+        for id_, other in self.lost.items():
+            controller = isinstance(other, ThresholdResponse) and other.output == check.output
+            sensor = isinstance(other, RandomInRange) and other.topic == check.input
+            pace = isinstance(other, TopicRate) and other.topic == check.input
+            if (controller and answered) or (sensor and fixed) or (pace and stopped):
+                return id_
+        return ""
+
+
+def _same_as(criterion: str, verdict: Verdict) -> Verdict:
+    hint = f"this has the same cause as {criterion}: mend that first"
+    return replace(verdict, hint=hint, same_cause_as=criterion)
+
+
+def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
+    """Return the fault of the trace that a verdict rests on."""
+    known = verdict.evidence.get(FAULT_KEY)
+    if not isinstance(known, Mapping):
+        return None
+    wanted = (known["process"], known["text"], known["line"])
+    return next((f for f in trace.faults() if (f.process, f.text, f.line) == wanted), None)
+
+
+def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the notes; one that says that nothing calls main() names the line of the guard or of main itself."""
+    files = {submission.files[name].found or name: text for name, text in sources.items()}
+    uncalled = {main_not_called(file): file for file in files}
+    return tuple(_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes)
+
+
+def _placed(file: str, text: str) -> str:
+    source = read(file, text)
+    guard = _wrong_guard(source)
+    if guard is not None:
+        said = (
+            f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so `python3 {file}` would"
+        )
+        return f"{said} do nothing; write: if __name__ == '__main__':"
+    main = next(iter(source.functions("main")), None)
+    return main_not_called(file, first_line(main) if main is not None else 0)
+
+
+def _wrong_guard(source: Source) -> ast.If | None:
+    """Return the condition at the top of the file that was meant for the usual one."""
+    for node in source.all(ast.If):
+        test = node.test
+        if source.function_of(node) is not None or not isinstance(test, ast.Compare):
+            continue
+        sides = [test.left, *test.comparators]
+        texts = [t for s in sides if (t := text_of(s)) is not None]
+        named = any(last_name(s) == "__name__" for s in sides)
+        if (named and texts != ["__main__"]) or (not named and any("main" in t for t in texts)):
+            return node
+    return None

@@ -1,26 +1,29 @@
-"""Causes behind exceptions around callbacks: what is passed, what is taken, and what is not there yet or any more."""
+"""Causes behind exceptions while a node is built, and around its callbacks: what is passed, taken, or not there yet."""
 
 from __future__ import annotations
 
 import ast
 import re
 
-from grader.judging.diagnosis.case import Case, Cause, Clue, frames
-from grader.judging.diagnosis.wiring import made
+from grader.core.trace import Fault, FaultKind
+from grader.judging.diagnosis.names import NODE_PROPERTIES, closest
+from grader.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
+from grader.judging.diagnosis.wiring import Made, made
 from grader.judging.source import Function, Source, argument, chain, covers, first_line, last_name, parameters
 
+_QUOTES = "\"'"
 
-def _callback_called(case: Case) -> Clue | None:
+
+@crash_rule("", *FaultKind)
+def _callback_called(crash: Crash) -> Clue | None:
     """`create_timer(0.05, self.tick())`: the function runs once, and its result is what is called back."""
-    if case.faulty is None:
-        return None
-    fault, source = case.faulty
-    result = case.said(r"not callable|callable object|callback should be either")
+    source = crash.source
+    result = crash.said(r"not callable|callable object|callback should be either")
     for item in (*made(source, "timer"), *made(source, "subscription")):
         called = item.callback
         if not isinstance(called, ast.Call) or not _returns_nothing(source, called):
             continue
-        if result or covers(item.call, fault.line):
+        if result or covers(item.call, crash.line):
             bare = source.code(called.func)
             hint = f"{source.code(called)} calls the function at once: pass {bare}, without the parentheses"
             return Clue(hint, source.place(item.call))
@@ -33,29 +36,27 @@ def _returns_nothing(source: Source, call: ast.Call) -> bool:
     return bool(functions) and not returns
 
 
-def _signature(case: Case) -> Clue | None:
+@crash_rule()
+def _callback_signature(crash: Crash) -> Clue | None:
     """A callback that does not take what it is called with."""
-    if case.faulty is None:
-        return None
-    source = case.faulty[1]
     return (
-        _lacks_self(case, source)
-        or _timed_with_message(case, source)
-        or _subscription_signature(case)
-        or _service_signature(case)
+        _lacks_self(crash, crash.source)
+        or _timed_with_message(crash, crash.source)
+        or _subscription_signature(crash)
+        or _service_signature(crash)
     )
 
 
-def _lacks_self(case: Case, source: Source) -> Clue | None:
-    found = case.said(r"(\w+)\(\) takes 0 positional arguments but 1 was given")
+def _lacks_self(crash: Crash, source: Source) -> Clue | None:
+    found = crash.said(r"(\w+)\(\) takes 0 positional arguments but 1 was given")
     methods = [f for f in source.functions(found[1]) if source.is_method(f)] if found else []
     if len(methods) != 1 or parameters(methods[0]):
         return None
     return Clue(f"a method takes self first: def {methods[0].name}(self):", source.place(methods[0]))
 
 
-def _timed_with_message(case: Case, source: Source) -> Clue | None:
-    found = case.said(r"(\w+)\(\) missing 1 required positional argument: '(\w+)'")
+def _timed_with_message(crash: Crash, source: Source) -> Clue | None:
+    found = crash.said(r"(\w+)\(\) missing 1 required positional argument: '(\w+)'")
     functions = source.functions(found[1]) if found else []
     if (
         found is None
@@ -68,14 +69,14 @@ def _timed_with_message(case: Case, source: Source) -> Clue | None:
     return Clue(hint, source.place(functions[0]))
 
 
-def _subscription_signature(case: Case) -> Clue | None:
-    if case.faulty is None or not case.said(r"callback should be either be callable|takes \d positional argument"):
+def _subscription_signature(crash: Crash) -> Clue | None:
+    if not crash.said(r"callback should be either be callable|takes \d positional argument"):
         return None
-    fault, source = case.faulty
+    source = crash.source
     for item in made(source, "subscription"):
-        named = case.said(rf"\b{re.escape(last_name(item.callback))}\(\) takes")
+        named = crash.said(rf"\b{re.escape(last_name(item.callback))}\(\) takes")
         functions = source.functions(last_name(item.callback))
-        if len(functions) == 1 and (named or covers(item.call, fault.line)):
+        if len(functions) == 1 and (named or covers(item.call, crash.line)):
             return _too_few_parameters(source, functions[0], item.callback)
     return None
 
@@ -92,35 +93,32 @@ def _too_few_parameters(source: Source, function: Function, callback: ast.expr |
     return Clue(hint, source.place(function))
 
 
-def _service_signature(case: Case) -> Clue | None:
-    if case.faulty is None:
-        return None
-    _, source = case.faulty
+def _service_signature(crash: Crash) -> Clue | None:
+    source = crash.source
     for call in source.calls("create_service"):
         callback = argument(call, 2, "callback")
         functions = source.functions(last_name(callback))
         if len(functions) != 1:
             continue
         function = functions[0]
-        if case.said(rf"\b{re.escape(function.name)}\(\) (takes|missing)"):
+        if crash.said(rf"\b{re.escape(function.name)}\(\) (takes|missing)"):
             hint = f"a service hands over request and response: def {function.name}(self, request, response):"
             return Clue(hint, source.place(function))
         empty = all(r.value is None for r in source.all(ast.Return) if source.function_of(r) is function)
-        if empty and case.said(r"^TypeError$|^TypeError: *$|[Rr]esponse"):
+        if empty and crash.said(r"^TypeError$|^TypeError: *$|[Rr]esponse"):
             return Clue(f"{function.name} must end with: return response", source.place(function))
     return None
 
 
-def _no_data_yet(case: Case) -> Clue | None:
+@crash_rule("NoneType|has no attribute")
+def _no_data_yet(crash: Crash) -> Clue | None:
     """What a callback is to store is read before the first message has come."""
-    if case.faulty is None or not case.said(r"NoneType|has no attribute"):
-        return None
-    fault, source = case.faulty
-    function = source.function_at(fault.line)
+    source = crash.source
+    function = source.function_at(crash.line)
     callbacks = {last_name(m.callback) for m in made(source, "subscription")}
-    if function is None or not frames(fault) or function.name in callbacks:
+    if function is None or not crash.frames() or function.name in callbacks:
         return None
-    for node in source.on_line(fault.line, ast.Attribute):
+    for node in source.on_line(crash.line, ast.Attribute):
         name = chain(node)
         if name != f"self.{node.attr}" or not isinstance(node.ctx, ast.Load):
             continue
@@ -129,9 +127,9 @@ def _no_data_yet(case: Case) -> Clue | None:
         if not stored_by & callbacks:
             continue
         begin = f"begin {function.name} with: if {name} is None: return"
-        if case.said("NoneType") and any(_starts_with_none(source, n) for n in stores):
+        if crash.said("NoneType") and any(_starts_with_none(source, n) for n in stores):
             return Clue(f"{name} is None until the first message comes: {begin}")
-        unset = case.said(rf"object has no attribute '{re.escape(node.attr)}'")
+        unset = crash.said(rf"object has no attribute '{re.escape(node.attr)}'")
         if unset and "__init__" not in stored_by:
             return Clue(f"{name} is not there before the first message: set {name} = None in __init__, and {begin}")
     return None
@@ -143,26 +141,184 @@ def _starts_with_none(source: Source, store: ast.AST) -> bool:
     return isinstance(value, ast.Constant) and value.value is None
 
 
-def _shut_down_early(case: Case) -> Clue | None:
-    texts = r"Context must be initialized before|rcl_shutdown already called|does not support the context manager"
-    if case.faulty is None or not case.said(rf"{texts}|InvalidHandle|context is (not valid|invalid)"):
-        return None
-    fault, source = case.faulty
+@crash_rule(
+    "Context must be initialized before|rcl_shutdown already called|does not support the context manager"
+    "|InvalidHandle|context is (not valid|invalid)"
+)
+def _shut_down_early(crash: Crash) -> Clue | None:
+    source, line = crash.source, crash.line
     for call in source.calls("shutdown", "try_shutdown", "destroy_node", "destroy_publisher"):
         function = source.function_of(call)
         if function is not None and source.is_method(function) and function.name not in ("__del__", "destroy_node"):
             hint = f"{source.code(call)} in {function.name} ends the node while it runs: take it out"
             return Clue(hint, source.place(call))
-        before = function is source.function_at(fault.line) and first_line(call) < fault.line
-        if before and last_name(call.func) != "destroy_node" and "shutdown" not in source.line(fault.line):
-            hint = f"{source.code(call)} comes too early: ROS has ended before line {fault.line}"
+        before = function is source.function_at(line) and first_line(call) < line
+        if before and last_name(call.func) != "destroy_node" and "shutdown" not in source.line(line):
+            hint = f"{source.code(call)} comes too early: ROS has ended before line {line}"
             return Clue(hint, source.place(call))
     return None
 
 
-CALLBACKS = (
-    Cause("callback_called", _callback_called),
-    Cause("callback_signature", _signature),
-    Cause("no_data_yet", _no_data_yet),
-    Cause("shut_down_early", _shut_down_early),
-)
+@crash_rule(r"create_(publisher|subscription)\(\) missing \d required positional arguments?: (.*)")
+def _missing_qos(crash: Crash) -> Clue | None:
+    found, call = crash.found, _call_at_fault(crash, f"create_{crash.found[1]}")
+    if call is None or not call.args:
+        return None
+    written, last = crash.source.code(call), call.args[-1]
+    if found[1] == "subscription" and isinstance(last, ast.Constant) and isinstance(last.value, int):
+        return Clue(f"{written} names no callback: the third argument is the method to call, the depth comes after it")
+    if "callback" in found[2] or "topic" in found[2] or not written.endswith(")"):
+        return None
+    return Clue(f"the queue depth is missing: {written[:-1]}, 10)")
+
+
+def _call_at_fault(crash: Crash, *names: str) -> ast.Call | None:
+    """Return the call of one of these names in the line of the fault."""
+    return next((c for c in crash.source.calls(*names) if covers(c, crash.line)), None)
+
+
+@crash_rule("has no setter|can't set attribute|handle cannot be modified|has no attribute 'add_node'")
+def _read_only_property(crash: Crash) -> Clue | None:
+    for node in crash.source.on_line(crash.line, ast.Attribute):
+        if isinstance(node.ctx, ast.Store) and chain(node) == f"self.{node.attr}" and node.attr in NODE_PROPERTIES:
+            return Clue(f"Node itself uses the name {node.attr}; rename yours, for example self.my_{node.attr}")
+    return None
+
+
+@crash_rule()
+def _super_init(crash: Crash) -> Clue | None:
+    """The constructor of Node was not called, was called too late or was misspelt."""
+    if crash.said(r"descriptor '__init__' requires a 'super' object"):
+        return Clue("super needs parentheses: super().__init__('node_name')")
+    misspelt = crash.said(r"'super' object has no attribute '(\w+)'")
+    if misspelt and closest(misspelt[1], ("__init__",)):
+        return Clue(f"{misspelt[1]} is a slip: write super().__init__('node_name')")
+    if crash.said(r"Node\.__init__\(\) missing 1 required positional argument: 'node_name'"):
+        return _no_name(crash.fault, crash.source)
+    return _no_base(crash) or _used_before_super(crash)
+
+
+def _no_base(crash: Crash) -> Clue | None:
+    owner = next(crash.source.on_line(crash.line, ast.ClassDef), None)
+    if owner is None or owner.bases or not crash.said(r"object\.__init__\(\) takes exactly one argument"):
+        return None
+    return Clue(f"make it a node: class {owner.name}(Node):", crash.source.place(owner))
+
+
+def _no_name(fault: Fault, source: Source) -> Clue | None:
+    calls = list(source.on_line(fault.line, ast.Call))
+    if any(chain(c.func) == "super().__init__" for c in calls):
+        return Clue(f"give the node a name: super().__init__('{fault.process.removesuffix('.py')}')")
+    made_here = {last_name(c.func) for c in calls}
+    for function in source.functions():
+        owner = source.parents.get(function)
+        slip = function.name != "__init__" and function.name.strip("_").lower() in ("init", "int", "inti", "ini")
+        if slip and isinstance(owner, ast.ClassDef) and owner.name in made_here:
+            hint = f"{function.name} is never called: the constructor's name is __init__"
+            return Clue(f"{hint}, two underscores on each side", source.place(function))
+    return None
+
+
+def _used_before_super(crash: Crash) -> Clue | None:
+    missing = crash.said(r"'(\w+)' object has no attribute '(_\w+)'")
+    source, where = crash.source, crash.frames()
+    if missing is None or not where or where[-1][1] != "__init__":
+        return None
+    owner = next((c for c in source.all(ast.ClassDef) if c.name == missing[1]), None)
+    if owner is None or any(last_name(n) == missing[2] for n in source.all(ast.Attribute)):
+        return None
+    constructor = next((f for f in source.functions("__init__") if source.class_of(f) is owner), None)
+    calls = [c for c in source.calls("__init__") if source.class_of(c) is owner]
+    if constructor is None or not owner.bases:
+        return None
+    if not calls:
+        hint = "the first line of __init__ must be super().__init__('node_name')"
+        return Clue(hint, source.place(constructor))
+    if first_line(calls[0]) > crash.line:
+        hint = f"{source.code(calls[0])} must come first: before it, the node cannot be used in line {crash.line}"
+        return Clue(hint, source.place(calls[0]))
+    return None
+
+
+@crash_rule()
+def _init_order(crash: Crash) -> Clue | None:
+    source, line = crash.source, crash.line
+    inits = [c for c in source.calls("init") if chain(c.func) in ("rclpy.init", "init")]
+    if crash.said(r"init\(\) must only be called once"):
+        others = [c for c in inits if first_line(c) != line]
+        again = f" and in {lines_of(*others)}" if others else ""
+        return Clue(f"rclpy.init() may be called once only; it is called here{again}: remove one of them")
+    if not crash.said(r"NotInitializedException|rclpy\.init\(\) has not been called"):
+        return None
+    used = next((number for number, name in reversed(crash.frames()) if name != "__init__"), line)
+    if not inits:
+        at = next((c for c in source.on_line(used, ast.Call) if first_line(c) == used), None)
+        hint = f"call rclpy.init() before line {used}: nothing of ROS works without it"
+        return Clue(hint, source.place(at) if at is not None else None)
+    return _init_elsewhere(source, inits, used)
+
+
+def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | None:
+    """Return that ROS was started after line `used`, or ended before it, in the same function."""
+    here = source.function_at(used)
+    late = [c for c in inits if first_line(c) > used and source.function_of(c) is here]
+    if late and len(late) == len(inits):
+        hint = f"{source.code(late[0])} comes too late: the node is made before it, in line {used}"
+        return Clue(hint, source.place(late[0]))
+    stops = [c for c in source.calls("shutdown", "try_shutdown") if first_line(c) < used]
+    if stops and source.function_of(stops[-1]) is here:
+        return Clue(f"{source.code(stops[-1])} has ended ROS before line {used}", source.place(stops[-1]))
+    return None
+
+
+@crash_rule()
+def _endpoint_arguments(crash: Crash) -> Clue | None:
+    """Arguments of create_publisher, create_subscription or create_timer in the wrong order or of the wrong kind."""
+    source = crash.source
+    items = (m for kind in ("publisher", "subscription", "timer") for m in made(source, kind))
+    item = next((m for m in items if covers(m.call, crash.line) and m.call.args), None)
+    if item is None:
+        return None
+    return _timer_arguments(crash, item) if item.kind == "timer" else _topic_arguments(crash, item)
+
+
+def _timer_arguments(crash: Crash, item: Made) -> Clue | None:
+    if not crash.said(r"must be a string or a real number, not '(method|function)'|operand type.*'(method|function)'"):
+        return None
+    period = crash.source.code(item.call.args[1]) if len(item.call.args) > 1 else "..."
+    return Clue(
+        f"the period comes first, then the callback: create_timer({period}, {crash.source.code(item.call.args[0])})"
+    )
+
+
+def _topic_arguments(crash: Crash, item: Made) -> Clue | None:
+    source, first = crash.source, item.call.args[0]
+    text_first = isinstance(first, ast.Constant) and isinstance(first.value, str)
+    if text_first and len(item.call.args) > 1 and crash.said(r"rclpy_resolve_name\(\): incompatible"):
+        other = source.code(item.call.args[1])
+        return Clue(f"the message type comes first, then the topic: ({other}, {source.code(first)}, ...)")
+    if text_first and crash.said(r"has no attribute '_TYPE_SUPPORT'"):
+        return Clue(f"the message type is a class, without quotation marks: {source.code(first).strip(_QUOTES)}")
+    if crash.said(r"type object 'module' has no attribute '_TYPE_SUPPORT'"):
+        return Clue(f"{source.code(first)} is a module; name the message class in it")
+    if crash.said(r"Expected QoSProfile or int") and item.qos is not None:
+        return Clue(f"the queue depth is a number: write 10 instead of {source.code(item.qos)}")
+    return None
+
+
+@crash_rule(r"Invalid(Node|Topic)NameException", in_file=False)
+def _bad_name(crash: Crash) -> Clue | None:
+    if crash.found[1] == "Node":
+        return Clue("a node name holds letters, digits and underscores only")
+    return Clue("a topic name holds letters, digits, underscores and slashes only, and no part starts with a digit")
+
+
+@crash_rule("^TypeError|^AttributeError")
+def _spun_class(crash: Crash) -> Clue | None:
+    call = _call_at_fault(crash, "spin", "spin_once")
+    if call is None or not call.args:
+        return None
+    name = last_name(call.args[0])
+    if not any(c.name == name for c in crash.source.all(ast.ClassDef)):
+        return None
+    return Clue(f"spin takes a node, {name} is the class: {name}()")

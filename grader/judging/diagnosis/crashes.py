@@ -1,31 +1,32 @@
-"""Causes behind exceptions from values and names: wrong types in fields, slips of the pen, nobody at the keyboard."""
+"""Causes behind exceptions from values and names, and behind nodes that end by themselves or never come back."""
 
 from __future__ import annotations
 
 import ast
 
-from grader.judging.diagnosis.case import Case, Cause, Clue
+from grader.core.trace import FaultKind
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
-from grader.judging.diagnosis.wiring import made, target_of
-from grader.judging.source import Source, chain, last_name, subtree
+from grader.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, rule
+from grader.judging.diagnosis.wiring import head_of, made, node_made, reached, spins, target_of, variable_of
+from grader.judging.source import Loop, Source, chain, covers, first_line, last_name, subtree
+
+_EXITS = ("exit", "quit", "_exit")
 
 
-def _wrong_field_type(case: Case) -> Clue | None:
-    found = case.said(r"The '(\w+)' field must be (?:of type '(\w+)'|a sub message of type '(\w+)')")
-    if found is None:
-        return None
-    field, type_, message = found[1], found[2] or "", found[3] or ""
-    value, target = _given(case, field)
+@crash_rule(r"The '(\w+)' field must be (?:of type '(\w+)'|a sub message of type '(\w+)')", in_file=False)
+def _wrong_field_type(crash: Crash) -> Clue | None:
+    field, type_, message = crash.found.groups(default="")
+    value, target = _given(crash, field)
     if message:
         inner = ", ".join(MESSAGE_FIELDS.get(message, ())) or "fields"
         return Clue(f"{target.removesuffix(' = ') or field} is a {message}: set its own {inner} one by one")
     if type_ != "float":
         other = {"int": "a whole number", "str": "text", "bool": "True or False"}.get(type_)
-        written = case.source.code(value, 40) if value is not None and case.source is not None else "..."
+        written = crash.source.code(value, 40) if value is not None else "..."
         return Clue(f"the field {field} takes {other}: write {target}{type_}({written})") if other else None
-    if value is None or case.source is None:
+    if value is None:
         return Clue(f"the field {field} takes a float: write 0.5 or 0.0, or float(...) around a variable")
-    return _not_a_float(case.source, value, target)
+    return _not_a_float(crash.source, value, target)
 
 
 def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
@@ -38,16 +39,14 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
     return Clue(f"the field takes a float only: write {target}float({written})")
 
 
-def _given(case: Case, field: str) -> tuple[ast.expr | None, str]:
+def _given(crash: Crash, field: str) -> tuple[ast.expr | None, str]:
     """Return the value that a field is given at the fault, and what stands before it, such as `msg.x = `."""
-    if case.faulty is None:
-        return None, ""
-    fault, source = case.faulty
-    for statement in source.on_line(fault.line, ast.Assign):
+    source = crash.source
+    for statement in source.on_line(crash.line, ast.Assign):
         for target in statement.targets:
             if isinstance(target, ast.Attribute) and target.attr == field:
                 return statement.value, f"{source.code(target)} = "
-    keywords = [k for c in source.on_line(fault.line, ast.Call) for k in c.keywords if k.arg == field]
+    keywords = [k for c in source.on_line(crash.line, ast.Call) for k in c.keywords if k.arg == field]
     chosen = next((k for k in keywords if _is_whole(k.value)), keywords[0] if len(keywords) == 1 else None)
     return (chosen.value, f"{field}=") if chosen is not None else (None, "")
 
@@ -58,36 +57,38 @@ def _is_whole(value: ast.expr | None) -> bool:
     return isinstance(value, ast.Constant) and type(value.value) is int
 
 
-def _published_wrongly(case: Case) -> Clue | None:
-    wrong = case.said(r"Expected <class '([\w.]+)\.(\w+)'>, got <class '([\w.]+)'>")
+@crash_rule(
+    r"Expected <class '([\w.]+)\.(\w+)'>, got <class '([\w.]+)'>"
+    r"|Publisher\.publish\(\) missing 1 required positional argument",
+    in_file=False,
+)
+def _published_wrongly(crash: Crash) -> Clue | None:
+    wrong = crash.said(r"Expected <class '[\w.]+\.(\w+)'>, got <class '([\w.]+)'>")
     if wrong is None:
-        lacks = case.said(r"Publisher\.publish\(\) missing 1 required positional argument")
-        return Clue("publish takes the message to send: publish(msg)") if lacks else None
-    expected, got = wrong[2], wrong[3].rpartition(".")[2]
+        return Clue("publish takes the message to send: publish(msg)")
+    expected, got = wrong[1], wrong[2].rpartition(".")[2]
     if got == f"Metaclass_{expected}":
         return Clue(f"{expected} is the class; publish an object of it: {expected}()")
     return Clue(f"this publisher sends {expected} objects, not {got}: make one, set its fields and publish it")
 
 
-def _undeclared_parameter(case: Case) -> Clue | None:
-    found = case.said(r"undeclared parameter\(s\): ([\w./]+)")
-    if found is None:
-        return None
-    return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{found[1][:60]}', default_value)")
+@crash_rule(r"undeclared parameter\(s\): ([\w./]+)", in_file=False)
+def _undeclared_parameter(crash: Crash) -> Clue | None:
+    name = crash.found[1][:60]
+    return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{name}', default_value)")
 
 
-def _wrong_attribute(case: Case) -> Clue | None:
-    found = case.said(r"^AttributeError: '(\w+)' object has no attribute '(\w+)'")
-    if found is None:
-        module = case.said(r"^AttributeError: module 'rclpy' has no attribute '(\w+)'")
-        return _rclpy_name(module[1]) if module else None
-    owner, name = found[1], found[2]
+@crash_rule(r"^AttributeError: (?:module '(rclpy)'|'(\w+)' object) has no attribute '(\w+)'", in_file=False)
+def _wrong_attribute(crash: Crash) -> Clue | None:
+    module, owner, name = crash.found.groups()
+    if module:
+        return _rclpy_name(name)
     if owner in ("function", "method") and name in LOGGER:
         return Clue(f"get_logger is a method, call it: self.get_logger().{name}(...)")
     if owner in ("Publisher", "RcutilsLogger"):
         near = closest(name, PUBLISHER if owner == "Publisher" else LOGGER)
         return Clue(f"{name} should be {near}") if near else None
-    return _message_field(owner, name) or _own_attribute(case, owner, name)
+    return _message_field(owner, name) or _own_attribute(crash, owner, name)
 
 
 def _message_field(owner: str, name: str) -> Clue | None:
@@ -106,18 +107,18 @@ def _rclpy_name(name: str) -> Clue | None:
     return Clue(f"rclpy.{name} should be rclpy.{near}") if near else None
 
 
-def _own_attribute(case: Case, owner: str, name: str) -> Clue | None:
+def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     """A misspelt attribute of the student's own node, or one that was made a local variable."""
-    if case.faulty is None or not any(c.name == owner for c in case.faulty[1].all(ast.ClassDef)):
+    source = crash.source
+    if not any(c.name == owner for c in source.all(ast.ClassDef)):
         return None
-    fault, source = case.faulty
     items = [m for kind in ("publisher", "subscription", "timer") for m in made(source, kind)]
     local = next((m for m in items if target_of(source, m.call) == name), None)
     if local is not None:
         hint = f"{name} is a variable of {_name_of(source, local.call)} only: write self.{name} = ..."
         return Clue(hint, source.place(local.call))
     publishers = [t for m in items if m.kind == "publisher" and (t := target_of(source, m.call)).startswith("self.")]
-    if f"self.{name}.publish(" in source.line(fault.line) and len(publishers) == 1:
+    if f"self.{name}.publish(" in source.line(crash.line) and len(publishers) == 1:
         return Clue(f"the publisher is called {publishers[0]}: write {publishers[0]}.publish(...)")
     stored = [
         n.attr for n in source.all(ast.Attribute) if chain(n) == f"self.{n.attr}" and isinstance(n.ctx, ast.Store)
@@ -132,68 +133,222 @@ def _name_of(source: Source, node: ast.AST) -> str:
     return function.name if function is not None else "the file"
 
 
-def _with_init(case: Case) -> Clue | None:
+@crash_rule("does not support the context manager|__enter__")
+def _with_init(crash: Crash) -> Clue | None:
     """`with rclpy.init():`, which later releases of rclpy know."""
-    if case.faulty is None or not case.said(r"does not support the context manager|__enter__"):
-        return None
-    fault, source = case.faulty
-    for block in source.on_line(fault.line, ast.With):
+    for block in crash.source.on_line(crash.line, ast.With):
         first = block.items[0].context_expr
         if isinstance(first, ast.Call) and chain(first.func) == "rclpy.init":
             hint = "this release of rclpy does not know 'with rclpy.init()': call rclpy.init() on a line of its own"
-            return Clue(hint, source.place(block))
+            return Clue(hint, crash.source.place(block))
     return None
 
 
-def _logger_arguments(case: Case) -> Clue | None:
-    if case.said(r"rclpy_logging_rcutils_log\(\): incompatible function arguments"):
+@crash_rule(
+    r"rclpy_logging_rcutils_log\(\): incompatible function arguments"
+    r"|RcutilsLogger\.(\w+)\(\) takes 2 positional arguments but \d+ were given",
+    in_file=False,
+)
+def _logger_arguments(crash: Crash) -> Clue | None:
+    name = crash.found[1]
+    if name is None:
         return Clue("the logger takes text: put the value into an f-string, info(f'{value}')")
-    found = case.said(r"RcutilsLogger\.(\w+)\(\) takes 2 positional arguments but \d+ were given")
-    return Clue(f"{found[1]} takes one text: put the values into it, {found[1]}(f'... {{value}}')") if found else None
+    return Clue(f"{name} takes one text: put the values into it, {name}(f'... {{value}}')")
 
 
-def _own_raise(case: Case) -> Clue | None:
-    """The student's own raise ends the node."""
-    if case.faulty is None or not case.said(""):
+@crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False)
+def _unattended(crash: Crash) -> Clue | None:
+    """The program waits for somebody at the keyboard, or for arguments on the command line."""
+    if crash.found[0] != "IndexError":
+        what = "input()" if crash.found[0] == "EOFError" else "the keyboard"
+        return Clue(f"nobody sits at the keyboard while the node runs: write the values down, without {what}")
+    if "argv" not in crash.source.line(crash.line):
         return None
-    fault, source = case.faulty
-    raised = next(source.on_line(fault.line, ast.Raise), None)
-    if raised is None or source.function_at(fault.line) is None:
+    return Clue("the file is run without arguments: give the value a default in the program")
+
+
+@crash_rule("^RecursionError")
+def _endless_recursion(crash: Crash) -> Clue | None:
+    function = crash.source.function_at(crash.line)
+    if function is None or f" in {function.name}" not in "".join(crash.fault.frames[-3:]):
+        return None
+    named = any(last_name(n) == function.name for n in subtree(function) if isinstance(n, (ast.Name, ast.Attribute)))
+    hint = f"{function.name} uses itself again and again: give what it stands for another name"
+    return Clue(hint, crash.source.place(function)) if named else None
+
+
+@crash_rule()
+def _own_raise(crash: Crash) -> Clue | None:
+    """The student's own raise ends the node."""
+    source = crash.source
+    raised = next(source.on_line(crash.line, ast.Raise), None)
+    if raised is None or source.function_at(crash.line) is None:
         return None
     return Clue(f"{source.code(raised)} ends the node: log a warning instead, and go on")
 
 
-def _recursion(case: Case) -> Clue | None:
-    found = case.said(r"^RecursionError") and case.faulty
-    function = found[1].function_at(found[0].line) if found else None
-    if not found or function is None or f" in {function.name}" not in "".join(found[0].frames[-3:]):
+@rule(fault=None)
+def _events_executor(case: Case) -> Clue | None:
+    used = next(case.source.calls("EventsExecutor"), None)
+    stuck = made(case.source, "timer") if case.fault is None else case.fault.kind is FaultKind.HUNG
+    if used is None or not stuck:
         return None
-    named = any(last_name(n) == function.name for n in subtree(function) if isinstance(n, (ast.Name, ast.Attribute)))
-    hint = f"{function.name} uses itself again and again: give what it stands for another name"
-    return Clue(hint, found[1].place(function)) if named else None
+    hint = "EventsExecutor never calls timers in this release of rclpy: use rclpy.spin(node)"
+    return Clue(hint, case.source.place(used))
 
 
-def _unattended(case: Case) -> Clue | None:
-    """The program waits for somebody at the keyboard, or for arguments on the command line."""
-    if case.said(r"^EOFError|^termios\.error|^_?curses\.error"):
-        what = "input()" if case.said("^EOFError") else "the keyboard"
-        return Clue(f"nobody sits at the keyboard while the node runs: write the values down, without {what}")
-    if case.faulty is None:
+@crash_rule("", FaultKind.HUNG)
+def _endless_loop(crash: Crash) -> Clue | None:
+    source, where = crash.source, crash.frames()
+    loops = [n for n in source.loops() if covers(n, crash.line)]
+    if not loops or not where:
         return None
-    fault, source = case.faulty
-    if case.said(r"^IndexError") and "argv" in source.line(fault.line):
-        return Clue("the file is run without arguments: give the value a default in the program")
+    loop, name = loops[-1], where[-1][1]
+    head = f"'{head_of(source, loop)}'"
+    if name == "__init__":
+        hint = f"the loop {head} keeps the constructor from returning, so nothing else can happen"
+    elif name in _callbacks(source):
+        hint = f"the loop {head} keeps {name} from returning: a callback must return at once"
+    else:
+        hint = f"the loop {head} neither waits nor spins: let a timer call the code instead"
+    return Clue(hint, source.place(loop))
+
+
+def _callbacks(source: Source) -> set[str]:
+    return {last_name(m.callback) for kind in ("timer", "subscription") for m in made(source, kind)}
+
+
+@crash_rule("", FaultKind.EXITED)
+def _empty_file(crash: Crash) -> Clue | None:
+    if crash.source.nodes or any(row.strip() for row in crash.source.lines[:2000]):
+        return None
+    return Clue("the file is empty: hand in the one that holds your node")
+
+
+@crash_rule("", FaultKind.EXITED)
+def _left_by_arguments(crash: Crash) -> Clue | None:
+    source = crash.source
+    if crash.fault.exit_code != 2:
+        return None
+    for call in source.calls("add_argument"):
+        first = call.args[0] if call.args else None
+        keywords = {k.arg: k.value for k in call.keywords}
+        positional = isinstance(first, ast.Constant) and not str(first.value).startswith("-")
+        required = isinstance(keywords.get("required"), ast.Constant) and "default" not in keywords
+        if (positional and "nargs" not in keywords and "default" not in keywords) or required:
+            hint = "the file is run without arguments: give this one a default, as an option such as '--speed'"
+            return Clue(hint, source.place(call))
     return None
 
 
-CRASHES = (
-    Cause("wrong_field_type", _wrong_field_type),
-    Cause("published_wrongly", _published_wrongly),
-    Cause("undeclared_parameter", _undeclared_parameter),
-    Cause("wrong_attribute", _wrong_attribute),
-    Cause("with_init", _with_init),
-    Cause("logger_arguments", _logger_arguments),
-    Cause("unattended", _unattended),
-    Cause("endless_recursion", _recursion),
-    Cause("own_raise", _own_raise),
-)
+@crash_rule("", FaultKind.EXITED)
+def _left_by_exit(crash: Crash) -> Clue | None:
+    source = crash.source
+    exits: list[ast.AST] = [c for c in source.calls(*_EXITS) if chain(c.func) in (*_EXITS, "sys.exit", "os._exit")]
+    exits += [r for r in source.all(ast.Raise) if last_name(_raised(r)) == "SystemExit"]
+    if len(exits) != 1 or _at_the_end(source, exits[0]):
+        return None
+    leaving = exits[0]
+    test = _argument_test(source, leaving)
+    if test:
+        hint = f"the file is run without arguments, so '{test}' is true: give the values defaults"
+        return Clue(hint, source.place(leaving))
+    if str(crash.fault.exit_code) != _exit_code(leaving):
+        return None
+    hint = f"{source.code(leaving, 40)} ends the program: the node must run until it is stopped"
+    return Clue(hint, source.place(leaving))
+
+
+def _argument_test(source: Source, node: ast.AST) -> str:
+    """Return the condition on the command line under which a node stands; empty if there is none."""
+    tests = (source.code(n.test, 40) for n in source.around(node) if isinstance(n, ast.If))
+    return next((t for t in tests if "argv" in t), "")
+
+
+def _raised(node: ast.Raise) -> ast.AST | None:
+    return node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+
+
+def _exit_code(node: ast.AST) -> str:
+    call = node.exc if isinstance(node, ast.Raise) else node
+    if not isinstance(call, ast.Call) or not call.args:
+        return "0"
+    first = call.args[0]
+    return str(first.value) if isinstance(first, ast.Constant) else ""
+
+
+def _at_the_end(source: Source, node: ast.AST) -> bool:
+    """Return whether an exit is the way out after main(), or the answer to Ctrl-C."""
+    if any(isinstance(n, ast.ExceptHandler) for n in source.around(node)):
+        return True
+    return source.function_of(node) is None and not _argument_test(source, node)
+
+
+@crash_rule("", FaultKind.EXITED)
+def _shut_down_in_callback(crash: Crash) -> Clue | None:
+    source = crash.source
+    for kind in ("timer", "subscription"):
+        for item in made(source, kind):
+            for node in reached(source, source.functions(last_name(item.callback))):
+                if isinstance(node, ast.Call) and chain(node.func) in ("rclpy.shutdown", "rclpy.try_shutdown"):
+                    hint = f"{source.code(node)} in a callback ends the node: it must run until it is stopped"
+                    return Clue(hint, source.place(node))
+    return None
+
+
+@crash_rule("", FaultKind.EXITED)
+def _no_spin(crash: Crash) -> Clue | None:
+    """The node is made, and the program ends."""
+    source = crash.source
+    node = node_made(source)
+    if node is None or spins(source) or crash.fault.exit_code != 0:
+        return None
+    loops = [n for n in source.loops() if _publishes(source, n)]
+    if loops:
+        return _bounded_loop(source, loops)
+    name = variable_of(source, node)
+    hint = f"{source.code(node)} makes the node, then the program ends: call rclpy.spin({name}) after it"
+    return Clue(hint, source.place(node))
+
+
+def _bounded_loop(source: Source, loops: list[Loop]) -> Clue | None:
+    loop = loops[-1]
+    if isinstance(loop, ast.While) and not isinstance(loop.test, (ast.Compare, ast.BoolOp)):
+        return None
+    hint = f"the loop '{head_of(source, loop)}' comes to an end, and the program with it"
+    return Clue(f"{hint}: go on until the node is stopped", source.place(loop))
+
+
+def _publishes(source: Source, loop: ast.AST) -> bool:
+    return any(isinstance(n, ast.Call) and last_name(n.func) == "publish" for n in reached(source, [loop]))
+
+
+@crash_rule("", FaultKind.EXITED)
+def _spins_once(crash: Crash) -> Clue | None:
+    source = crash.source
+    if crash.fault.exit_code != 0 or any(last_name(n) == "spin" for n in spins(source)):
+        return None
+    once = list(source.calls("spin_once"))
+    loops = [n for c in once for n in source.around(c) if isinstance(n, (ast.While, ast.For))]
+    if len(once) == 1 and not loops:
+        hint = f"{source.code(once[0])} handles one event and returns: use spin to go on until the node is stopped"
+        return Clue(hint, source.place(once[0]))
+    if len(loops) == 1:
+        return _bounded_loop(source, loops)
+    return None
+
+
+@crash_rule("", FaultKind.EXITED)
+def _gave_up(crash: Crash) -> Clue | None:
+    """A return that leaves main before the node is spun."""
+    source = crash.source
+    last = list(source.calls("spin"))[-1:]
+    if not last or crash.fault.exit_code != 0:
+        return None
+    leaving = [r for r in source.all(ast.Return) if source.function_of(r) is source.function_of(last[0])]
+    early = [r for r in leaving if first_line(r) < first_line(last[0])]
+    test = next((n for n in source.around(early[0]) if isinstance(n, ast.If)), None) if len(early) == 1 else None
+    if test is None:
+        return None
+    hint = f"the return under 'if {source.code(test.test, 40)}' ends the program before {source.code(last[0], 40)}"
+    return Clue(f"{hint}: keep waiting instead", source.place(early[0]))

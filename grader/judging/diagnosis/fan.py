@@ -1,26 +1,78 @@
-"""Causes behind a controller that answers wrongly: the comparison, the numbers, or an answer that is not sent."""
+"""Causes behind a controller that answers wrongly or late: the comparison, the numbers, or no answer."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from grader.core.exercise import ProblemKind
 from grader.core.quantities import within
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.together import AnswersTogether
-from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.constants import Constant, constant
-from grader.judging.diagnosis.fields import given_leaf
-from grader.judging.diagnosis.silence import silent_topic, timer_code
-from grader.judging.diagnosis.wiring import conditions, is_flag, made, made_for, publish_calls, reached, roots
-from grader.judging.source import Source, chain, last_name, subtree
-from grader.judging.values import published, published_numbers
+from grader.judging.diagnosis.rules import Case, Clue, rule, silent_topic
+from grader.judging.diagnosis.wiring import (
+    Constant,
+    conditions,
+    constant,
+    given_leaf,
+    is_flag,
+    made,
+    made_for,
+    number_at,
+    publish_calls,
+    reached,
+    roots,
+    text,
+    timer_code,
+)
+from grader.judging.source import Source, chain, first_line, last_name, subtree, text_of
+from grader.judging.values import EXACT, published, published_numbers
 from grader.judging.wording import number
 
-_EXACT = 1e-6
+#: Answers put off by no more than this are prompt enough.
+_PROMPT_S = 0.3
+_MEANS = ("mean", "fmean", "average", "median", "nanmean")
 _ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hearer:
+    """A file that hears a controller's input and answers, and the code that its subscription leads to."""
+
+    source: Source
+    reached: list[ast.AST]
+
+    def comparisons(self) -> list[ast.Compare]:
+        return [n for n in self.reached if isinstance(n, ast.Compare)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Controller:
+    """A controller that answers, and the check that asks it."""
+
+    case: Case
+    source: Source
+    check: ThresholdResponse | AnswersTogether
+
+
+def _hearers(case: Case) -> Iterator[_Hearer]:
+    """Yield the files that hear the input and answer."""
+    for source in case.sources.values():
+        item = made_for(source, "subscription", case.check.input)
+        if item is not None and made_for(source, "publisher", case.check.output) is not None:
+            yield _Hearer(source, list(reached(source, roots(source, item.callback))))
+
+
+def _late(case: Case) -> _Hearer | None:
+    """Return the controller, if its answers are late."""
+    late = case.evidence("lag_s") is not None or case.evidence("behind") is not None
+    return next(_hearers(case), None) if late else None
+
+
+def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
+    """Yield the comparisons of two sides that the controller's subscription leads to."""
+    yield from ((h.source, n) for h in _hearers(case) for n in h.comparisons() if len(n.ops) == 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +85,13 @@ class _Switch:
     tested: ast.expr
 
 
-def _controller(case: Case) -> tuple[Source, ThresholdResponse | AnswersTogether] | None:
-    """Return the controller's source, if it answers at all."""
-    check = case.criterion.check
-    if not isinstance(check, (ThresholdResponse, AnswersTogether)) or case.fault is not None or silent_topic(case):
-        return None
-    if case.is_about(ProblemKind.NEVER_CHANGES):
+def _controller(case: Case) -> _Controller | None:
+    """Return the controller, if it answers at all."""
+    check: ThresholdResponse | AnswersTogether = case.check
+    if silent_topic(case) or case.is_about(ProblemKind.NEVER_CHANGES):
         return None
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.output) is not None]
-    return (owners[0], check) if len(owners) == 1 else None
+    return _Controller(case, owners[0], check) if len(owners) == 1 else None
 
 
 def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
@@ -56,7 +106,7 @@ def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
             found.append(_Switch(node, op, right, node.left))
         elif left is not None and right is None and isinstance(op, _ORDERS):
             found.append(_Switch(node, _turned(op), left, node.comparators[0]))
-    return [s for s in found if limit is None or within(s.limit.value, limit, _EXACT)]
+    return [s for s in found if limit is None or within(s.limit.value, limit, EXACT)]
 
 
 def _turned(op: ast.cmpop) -> ast.cmpop:
@@ -71,17 +121,110 @@ def _rows(case: Case) -> list[tuple[float, float | None, float]]:
 
 
 def _wrong_inputs(case: Case) -> list[float]:
-    return [v for v, got, want in _rows(case) if got is None or not within(got, want, _EXACT)]
+    return [v for v, got, want in _rows(case) if got is None or not within(got, want, EXACT)]
 
 
-def _at_the_threshold(case: Case) -> Clue | None:
-    """Only the threshold itself is answered wrongly."""
-    found = _controller(case)
-    if found is None or not isinstance(found[1], ThresholdResponse):
+@rule(ThresholdResponse, AnswersTogether, given=_late)
+def _stored_late(late: _Hearer) -> Clue | None:
+    """An attribute is compared first, and given the new value only afterwards."""
+    source = late.source
+    for test in late.comparisons():
+        for node in subtree(test):
+            name = chain(node) if isinstance(node, ast.Attribute) else ""
+            stores = [s for s in source.stores(name) if source.function_of(s) is source.function_of(test)]
+            if len(stores) == 1 and first_line(stores[0]) > first_line(test):
+                stored = source.code(source.parents.get(stores[0], stores[0]), 40)
+                hint = f"{source.code(test, 40)} is asked before '{stored}': it sees the value that came before"
+                return Clue(hint, source.place(test), key="late_answer")
+    return None
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_late)
+def _oldest_compared(late: _Hearer) -> Clue | None:
+    """The oldest of the values that are kept is compared."""
+    source = late.source
+    for test in late.comparisons():
+        for node in subtree(test):
+            if isinstance(node, ast.Subscript) and number_at(source, node.slice) == 0 and _grows(source, node.value):
+                hint = f"{source.code(node, 40)} is the oldest of the values that are kept: compare the newest"
+                return Clue(hint, source.place(test), key="late_answer")
+    return None
+
+
+def _grows(source: Source, values: ast.expr) -> bool:
+    """Return whether new values are put at the end of a list or the like."""
+    calls = (c for c in source.calls("append") if isinstance(c.func, ast.Attribute))
+    return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in calls)
+
+
+@rule(ThresholdResponse, AnswersTogether, given=_late)
+def _put_off(late: _Hearer) -> Clue | None:
+    """The answer is handed to a timer, or the callback sleeps before it answers."""
+    source = late.source
+    for node in late.reached:
+        name = last_name(node.func) if isinstance(node, ast.Call) else ""
+        if isinstance(node, ast.Call) and name in ("Timer", "create_timer", "sleep", "call_later"):
+            worth = number_at(source, node.args[0] if node.args else None)
+            if worth is not None and worth > _PROMPT_S:
+                hint = f"{source.code(node, 50)} puts the answer off by {number(worth)} s: answer at once"
+                return Clue(hint, source.place(node), key="late_answer")
+    return None
+
+
+@rule(ThresholdResponse, AnswersTogether)
+def _compared_as_text(case: Case) -> Clue | None:
+    """`str(msg.data) > '25'` asks which text comes first in the alphabet."""
+    for source, test in _compared(case):
+        sides = [text(source, side) for side in (test.left, test.comparators[0])]
+        said = next((side for side in sides if side is not None), None)
+        ordered = isinstance(test.ops[0], (ast.Gt, ast.GtE, ast.Lt, ast.LtE))
+        if said is None or not _is_number(said) or not ordered:
+            continue
+        limit = number(case.check.threshold)
+        hint = f"{source.code(test, 50)} compares texts, letter by letter: compare the number itself with {limit}"
+        return Clue(hint, source.place(test), key="as_text")
+    return None
+
+
+def _is_number(said: str) -> bool:
+    return said.strip().replace(".", "", 1).isdigit()
+
+
+@rule(ThresholdResponse, AnswersTogether)
+def _compared_mean(case: Case) -> Clue | None:
+    """A mean of the last values follows late, and stands still near the threshold."""
+    for source, test in _compared(case):
+        for node in subtree(test):
+            counted = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and _sum_by_count(node)
+            averaged = isinstance(node, ast.Call) and last_name(node.func) in _MEANS
+            if (counted or averaged) and text_of(node) is None:
+                hint = f"{source.code(node, 50)} is made of several values: compare the newest alone"
+                return Clue(hint, source.place(test), key="of_many")
+    return None
+
+
+def _sum_by_count(node: ast.BinOp) -> bool:
+    calls = [last_name(side.func) if isinstance(side, ast.Call) else "" for side in (node.left, node.right)]
+    return calls[0] == "sum"
+
+
+@rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller)
+def _answer_without_number(controller: _Controller) -> Clue | None:
+    """Answers in a type that carries no number."""
+    source, check = controller.source, controller.check
+    item = made_for(source, "publisher", check.output)
+    if item is None:
         return None
-    source, check = found
-    wrong = _wrong_inputs(case)
-    if not wrong or any(not within(v, check.threshold, _EXACT) for v in wrong):
+    hint = f"{source.code(item.call)}: {item.type} carries no number, use a numeric type such as Float32"
+    return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
+
+
+@rule(ThresholdResponse, given=_controller)
+def _at_the_threshold(controller: _Controller) -> Clue | None:
+    """Only the threshold itself is answered wrongly."""
+    source, check = controller.source, controller.check
+    wrong = _wrong_inputs(controller.case)
+    if not wrong or any(not within(v, check.threshold, EXACT) for v in wrong):
         return None
     for switch in _switches(source, check.threshold):
         code = source.code(switch.node, 40)
@@ -94,14 +237,14 @@ def _at_the_threshold(case: Case) -> Clue | None:
     return None
 
 
-def _inverted(case: Case) -> Clue | None:
+@rule(ThresholdResponse, given=_controller)
+def _inverted(controller: _Controller) -> Clue | None:
     """The answers are the wrong way round."""
-    found = _controller(case)
-    if found is None or not isinstance(found[1], ThresholdResponse):
-        return None
-    source, check = found
-    away = [(v, got) for v, got, _ in _rows(case) if not within(v, check.threshold, _EXACT) and got is not None]
-    flipped = [within(got, check.otherwise if v > check.threshold else check.above, _EXACT) for v, got in away]
+    source, check = controller.source, controller.check
+    away = [
+        (v, got) for v, got, _ in _rows(controller.case) if not within(v, check.threshold, EXACT) and got is not None
+    ]
+    flipped = [within(got, check.otherwise if v > check.threshold else check.above, EXACT) for v, got in away]
     both = len({v > check.threshold for v, _ in away}) == 2
     switches = _switches(source, check.threshold)
     if not both or not all(flipped) or len(switches) != 1:
@@ -127,13 +270,11 @@ def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | A
     return wrong in numbers and right not in numbers
 
 
-def _rounded(case: Case) -> Clue | None:
+@rule(ThresholdResponse, given=_controller)
+def _rounded(controller: _Controller) -> Clue | None:
     """The input is cut or rounded before it is compared."""
-    found = _controller(case)
-    if found is None or not isinstance(found[1], ThresholdResponse):
-        return None
-    source, check = found
-    wrong = _wrong_inputs(case)
+    source, check = controller.source, controller.check
+    wrong = _wrong_inputs(controller.case)
     if not wrong or any(not 0 < abs(v - check.threshold) < 1 for v in wrong):
         return None
     for switch in _switches(source, check.threshold):
@@ -147,19 +288,17 @@ def _rounded(case: Case) -> Clue | None:
     return None
 
 
-def _other_threshold(case: Case) -> Clue | None:
-    found = _controller(case)
-    if found is None or not isinstance(found[1], ThresholdResponse):
-        return None
-    source, check = found
+@rule(ThresholdResponse, given=_controller)
+def _other_threshold(controller: _Controller) -> Clue | None:
+    source, check = controller.source, controller.check
     known = _switches(source)
-    away = [s for s in known if not within(s.limit.value, check.threshold, _EXACT) and s.limit.value > 1]
+    away = [s for s in known if not within(s.limit.value, check.threshold, EXACT) and s.limit.value > 1]
     others = [s for s in away if abs(s.limit.value - check.threshold) <= 10 or len(known) == 1]
-    wrong = _wrong_inputs(case)
+    wrong = _wrong_inputs(controller.case)
     if len(others) != 1 or not wrong:
         return None
     lower, upper = sorted((check.threshold, others[0].limit.value))
-    if any(not lower - _EXACT <= v <= upper + _EXACT for v in wrong):
+    if any(not lower - EXACT <= v <= upper + EXACT for v in wrong):
         return None
     hint = f"{source.code(others[0].node, 40)} compares with {number(others[0].limit.value)}: the limit is "
     if _switches(source, check.threshold):
@@ -168,22 +307,18 @@ def _other_threshold(case: Case) -> Clue | None:
     return Clue(f"{hint}{number(check.threshold)}", source.place(others[0].limit.origin), key="other_threshold")
 
 
-def _wrong_answer(case: Case) -> Clue | None:
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _wrong_answer(controller: _Controller) -> Clue | None:
     """A number is sent that the exercise does not know."""
-    found = _controller(case)
-    if found is None:
-        return None
-    source, check = found
-    strange = {r.value for r in published_numbers(case.trace, check.output)}
+    source, check = controller.source, controller.check
+    strange = {r.value for r in published_numbers(controller.case.trace, check.output)}
     strange -= {check.above, check.otherwise}
     if len(strange) != 1:
         return None
     value = next(iter(strange))
-    if isinstance(check, ThresholdResponse):
-        sides = {want for _, got, want in _rows(case) if got is not None and within(got, value, _EXACT)}
-        wanted = number(next(iter(sides))) if len(sides) == 1 else f"{number(check.above)} or {number(check.otherwise)}"
-    else:
-        wanted = f"{number(check.above)} or {number(check.otherwise)}"
+    rows = _rows(controller.case) if isinstance(check, ThresholdResponse) else []
+    sides = {want for _, got, want in rows if got is not None and within(got, value, EXACT)}
+    wanted = number(next(iter(sides))) if len(sides) == 1 else f"{number(check.above)} or {number(check.otherwise)}"
     places = [n for n in _answers(source) if _is_worth(source, n, value)]
     if len(places) != 1:
         return None
@@ -207,16 +342,14 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
         return False
     # the number itself, not another name for it: else one mistake is seen at two places
     worth = constant(source, expression) if not isinstance(expression, (ast.Name, ast.Attribute)) else None
-    return worth is not None and within(worth.value, value, _EXACT)
+    return worth is not None and within(worth.value, value, EXACT)
 
 
-def _one_branch(case: Case) -> Clue | None:
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _one_branch(controller: _Controller) -> Clue | None:
     """An answer is sent on one side of the threshold only."""
-    found = _controller(case)
-    if found is None:
-        return None
-    source, check = found
-    given = {r.value for r in published_numbers(case.trace, check.output)}
+    source, check = controller.source, controller.check
+    given = {r.value for r in published_numbers(controller.case.trace, check.output)}
     item = made_for(source, "publisher", check.output)
     if given not in ({check.above}, {check.otherwise}):
         return None
@@ -234,52 +367,11 @@ def _tests_threshold(source: Source, test: ast.expr, threshold: float) -> bool:
     return any(s.node in inside for s in _switches(source, threshold))
 
 
-def _latched(case: Case) -> Clue | None:
-    """Something is set on one side of the threshold, and nothing ever takes it back."""
-    found = _controller(case)
-    if found is None:
-        return None
-    source, check = found
-    item = made_for(source, "subscription", check.input)
-    inside: Iterable[ast.AST] = list(reached(source, roots(source, item.callback))) if item is not None else []
-    for node in inside:
-        if not isinstance(node, ast.If) or node.orelse:
-            continue
-        stores = [n for s in node.body for n in subtree(s) if isinstance(n, ast.Attribute)]
-        kept = [n for n in stores if isinstance(n.ctx, ast.Store) and chain(n) == f"self.{n.attr}"]
-        for store in kept:
-            others = [n for n in source.stores(chain(store)) if n is not store and not _in_constructor(source, n)]
-            read = any(chain(n) == chain(store) and isinstance(n.ctx, ast.Load) for n in source.all(ast.Attribute))
-            once = _asks_none(node.test, chain(store)) or _tests_threshold(source, node.test, check.threshold)
-            if not others and read and once:
-                hint = f"{chain(store)} is set under 'if {source.code(node.test, 40)}' and never again"
-                return Clue(f"{hint}: decide anew for each value", source.place(node), key="latched")
-    return None
-
-
-def _slow_timer(case: Case) -> Clue | None:
-    """A timer answers too seldom."""
-    found = _controller(case)
-    if found is None:
-        return None
-    source, check = found
-    calls = publish_calls(source, made_for(source, "publisher", check.output))
-    for item in made(source, "timer"):
-        worth = constant(source, item.period)
-        inside = set(reached(source, roots(source, item.callback)))
-        if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
-            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
-            return Clue(hint, source.place(worth.origin), key="slow_timer")
-    return None
-
-
-def _answered_once(case: Case) -> Clue | None:
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _answered_once(controller: _Controller) -> Clue | None:
     """A flag lets one answer through."""
-    found = _controller(case)
-    if found is None:
-        return None
-    source, check = found
-    if len(published(case.trace, check.output)) > 2:
+    source, check = controller.source, controller.check
+    if len(published(controller.case.trace, check.output)) > 2:
         return None
     for call in publish_calls(source, made_for(source, "publisher", check.output)):
         for test in conditions(source, call):
@@ -303,28 +395,36 @@ def _asks_none(test: ast.expr, name: str) -> bool:
     return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) and chain(test.operand) == name
 
 
-def _no_number(case: Case) -> Clue | None:
-    """Answers in a type that carries no number."""
-    found = _controller(case)
-    if found is None or not case.is_about(ProblemKind.NO_NUMBER):
-        return None
-    source, check = found
-    item = made_for(source, "publisher", check.output)
-    if item is None:
-        return None
-    hint = f"{source.code(item.call)}: {item.type} carries no number, use a numeric type such as Float32"
-    return Clue(hint, source.place(item.call), key=f"apart:{check.output}")
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _latched(controller: _Controller) -> Clue | None:
+    """Something is set on one side of the threshold, and nothing ever takes it back."""
+    source, check = controller.source, controller.check
+    item = made_for(source, "subscription", check.input)
+    inside: Iterable[ast.AST] = list(reached(source, roots(source, item.callback))) if item is not None else []
+    for node in inside:
+        if not isinstance(node, ast.If) or node.orelse:
+            continue
+        stores = [n for s in node.body for n in subtree(s) if isinstance(n, ast.Attribute)]
+        kept = [n for n in stores if isinstance(n.ctx, ast.Store) and chain(n) == f"self.{n.attr}"]
+        for store in kept:
+            others = [n for n in source.stores(chain(store)) if n is not store and not _in_constructor(source, n)]
+            read = any(chain(n) == chain(store) and isinstance(n.ctx, ast.Load) for n in source.all(ast.Attribute))
+            once = _asks_none(node.test, chain(store)) or _tests_threshold(source, node.test, check.threshold)
+            if not others and read and once:
+                hint = f"{chain(store)} is set under 'if {source.code(node.test, 40)}' and never again"
+                return Clue(f"{hint}: decide anew for each value", source.place(node), key="latched")
+    return None
 
 
-FAN = (
-    Cause("answer_without_number", _no_number),
-    Cause("at_the_threshold", _at_the_threshold),
-    Cause("inverted", _inverted),
-    Cause("rounded", _rounded),
-    Cause("other_threshold", _other_threshold),
-    Cause("wrong_answer", _wrong_answer),
-    Cause("one_branch", _one_branch),
-    Cause("answered_once", _answered_once),
-    Cause("latched", _latched),
-    Cause("slow_timer", _slow_timer),
-)
+@rule(ThresholdResponse, AnswersTogether, given=_controller)
+def _slow_timer(controller: _Controller) -> Clue | None:
+    """A timer answers too seldom."""
+    source, check = controller.source, controller.check
+    calls = publish_calls(source, made_for(source, "publisher", check.output))
+    for item in made(source, "timer"):
+        worth = constant(source, item.period)
+        inside = set(reached(source, roots(source, item.callback)))
+        if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
+            hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
+            return Clue(hint, source.place(worth.origin), key="slow_timer")
+    return None

@@ -1,4 +1,4 @@
-"""Causes behind logs that are printed, hidden, missing, wrong, or too many."""
+"""Causes behind logs that are printed, hidden, missing, wrong, too many, or written into a file."""
 
 from __future__ import annotations
 
@@ -10,29 +10,77 @@ from grader.core.exercise import Location, Outcome, ProblemKind
 from grader.core.quantities import seconds
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogPeriod, LogsPosition, WaitsGracefully
-from grader.judging.checks.sensor import LogsReceived
-from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.constants import constant, number_at
-from grader.judging.diagnosis.silence import timer_code
-from grader.judging.diagnosis.wiring import Made, is_flag, is_log, made, made_for, python_loggers, reached, roots
+from grader.judging.checks.received import LogsReceived
+from grader.judging.diagnosis.rules import Case, Clue, rule
+from grader.judging.diagnosis.wiring import (
+    Made,
+    constant,
+    is_flag,
+    is_log,
+    made,
+    made_for,
+    number_at,
+    python_loggers,
+    reached,
+    roots,
+    timer_code,
+)
 from grader.judging.output import printed_lines, student_records
 from grader.judging.source import Source, argument, chain, last_name, text_of
 from grader.judging.wording import number
 
+_HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
+_OPENS = ("open", "io.open", "codecs.open")
 _COMMENTED_LOG = re.compile(r"^\s*#.*get_logger\(\)\.(info|warn|warning|error)\s*\(")
+#: Methods of the loggers of Python's own logging module that log.
+_PYTHON_LOGS = ("debug", "info", "warning", "warn", "error", "critical", "exception")
 
 
 def _prints(source: Source) -> list[ast.Call]:
     return [c for c in source.all(ast.Call) if chain(c.func) in ("print", "sys.stdout.write", "pprint")]
 
 
+@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
+def _into_file(case: Case) -> Clue | None:
+    """Nothing that was asked for is logged or printed, and the program writes into a file."""
+    source = case.source
+    writing = _opened(source)
+    if writing is None or not _unseen(case):
+        return None
+    hint = f"{source.code(writing, 60)}: what goes into a file is not seen by the grader; "
+    return Clue(f"{hint}write it with self.get_logger().info(...)", source.place(writing), key="into_file")
+
+
+def _unseen(case: Case) -> bool:
+    check = case.check
+    if isinstance(check, UsesLogger):
+        return not student_records(case.trace, case.process) and not printed_lines(case.trace, case.process)
+    if isinstance(check, LogsPosition):
+        return case.evidence("cause") in ("nothing", "no_pair") and case.evidence("right") == 0
+    values, missing = case.evidence("values"), case.evidence("missing")
+    return bool(values) and values == missing
+
+
+def _opened(source: Source) -> ast.Call | None:
+    """Return the call that opens a file for what is logged, if there is one."""
+    return next((call for call in source.all(ast.Call) if _writes(call)), None)
+
+
+def _writes(call: ast.Call) -> bool:
+    name = last_name(call.func)
+    if name in _HANDLERS or name == "write_text":
+        return True
+    if name == "basicConfig":
+        return any(k.arg == "filename" for k in call.keywords)
+    plain = chain(call.func) in _OPENS
+    mode = text_of(argument(call, 1 if plain else 0, "mode")) if name == "open" else None
+    return bool(mode) and mode is not None and bool(set(mode) & set("wax"))
+
+
+@rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.PARTLY, fault=None)
 def _printed(case: Case) -> Clue | None:
     """Lines are printed that should be logged."""
-    check = case.criterion.check
-    partly = case.verdict.outcome is Outcome.PARTLY
-    if not isinstance(check, (UsesLogger, LogsPosition, LogsReceived)) or not partly or case.source is None:
-        return None
-    source = case.source
+    check, source = case.check, case.source
     prints = [c for c in _prints(source) if c.args]
     if isinstance(check, LogsReceived):
         item = made_for(source, "subscription", check.topic)
@@ -41,7 +89,7 @@ def _printed(case: Case) -> Clue | None:
     elif len(prints) > 1:
         prints = _most_printed(case, prints)
     if not prints:
-        return _python_logging(case)
+        return _by_python(case) if isinstance(check, UsesLogger) and case.fault is None else None
     code = source.code(prints[0], 60)
     hint = f"{code} does not log: write self.get_logger().info(...)"
     return Clue(hint, source.place(prints[0]), key="printed")
@@ -55,17 +103,19 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
         words = [w for n in ast.walk(call) if (w := text_of(n)) and len(w.strip()) > 2]
         return max((sum(w.strip() in line for line in lines) for w in words), default=0)
 
-    return sorted(prints, key=seen, reverse=True) if isinstance(case.criterion.check, LogsPosition) else prints
+    return sorted(prints, key=seen, reverse=True) if isinstance(case.check, LogsPosition) else prints
 
 
+@rule(UsesLogger)
 def _python_logging(case: Case) -> Clue | None:
     """Python's own logging module instead of the node's logger."""
-    check = case.criterion.check
-    if not isinstance(check, UsesLogger) or case.source is None or case.fault is not None:
-        return None
+    return _by_python(case)
+
+
+def _by_python(case: Case) -> Clue | None:
     source = case.source
     names = python_loggers(source)
-    calls = (c for c in source.calls(*_LEVELS) if chain(c.func).rpartition(".")[0] in names)
+    calls = (c for c in source.calls(*_PYTHON_LOGS) if chain(c.func).rpartition(".")[0] in names)
     own = next(calls, None)
     if own is None:
         return None
@@ -73,17 +123,13 @@ def _python_logging(case: Case) -> Clue | None:
     return Clue(hint, source.place(own))
 
 
-_LEVELS = ("debug", "info", "warning", "warn", "error", "critical", "exception")
-
-
 def _nothing_logged(case: Case) -> bool:
-    check = case.criterion.check
-    asks = isinstance(check, (UsesLogger, LogsPosition))
-    return asks and case.fault is None and not student_records(case.trace, case.process)
+    return not student_records(case.trace, case.process)
 
 
+@rule(UsesLogger, LogsPosition)
 def _debug_only(case: Case) -> Clue | None:
-    if not _nothing_logged(case) or case.source is None or list(case.source.calls("set_level")):
+    if not _nothing_logged(case) or list(case.source.calls("set_level")):
         return None
     logs = [n for n in case.source.all(ast.Call) if is_log(case.source, n)]
     if not logs or any(last_name(c.func) != "debug" for c in logs):
@@ -92,23 +138,18 @@ def _debug_only(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(logs[0]))
 
 
+@rule(UsesLogger, LogsPosition, outcome=Outcome.NOT_MET)
 def _commented_out(case: Case) -> Clue | None:
-    if (
-        not _nothing_logged(case)
-        or case.source is None
-        or any(is_log(case.source, n) for n in case.source.all(ast.Call))
-    ):
+    if not _nothing_logged(case) or any(is_log(case.source, n) for n in case.source.all(ast.Call)):
         return None
     row = next((k for k, line in enumerate(case.source.lines, 1) if _COMMENTED_LOG.match(line[:300])), 0)
-    if not row or case.verdict.outcome is Outcome.PARTLY:
+    if not row:
         return None
     return Clue("the log is commented out: take the # away", Location(case.source.file, row))
 
 
 def position_log(case: Case) -> ast.Call | None:
     """Return the call that wrote most of the records."""
-    if case.source is None:
-        return None
     source = case.source
     lines = Counter(r.line for r in student_records(case.trace, case.process) if r.file == source.file and r.line)
     for row, _ in lines.most_common():
@@ -119,14 +160,38 @@ def position_log(case: Case) -> ast.Call | None:
     return logs[0] if len(logs) == 1 else None
 
 
+@rule(LogPeriod, LogsPosition, LogsReceived)
+def _logged_once(case: Case) -> Clue | None:
+    call = position_log(case)
+    if call is None:
+        return None
+    once = argument(call, 99, "once")
+    if isinstance(once, ast.Constant) and once.value is True:
+        return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
+    few = case.evidence("cause") == "few" or case.evidence("logs") == 1
+    test = next((n for n in case.source.around(call) if isinstance(n, ast.If)), None)
+    if not few or test is None or not _set_inside(test):
+        return None
+    hint = f"under 'if {case.source.code(test.test, 40)}' this logs a single time: log again and again"
+    return Clue(hint, case.source.place(test), key="once")
+
+
+def _set_inside(test: ast.If) -> bool:
+    """Return whether a condition is changed by what stands under it."""
+    if not is_flag(test.test):
+        return False
+    asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
+    stored = (t for s in test.body for n in ast.walk(s) if isinstance(n, ast.Assign) for t in n.targets)
+    return any(chain(t) in asked for t in stored)
+
+
+@rule(LogPeriod)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback that sets the pace of the logs."""
-    check = case.criterion.check
-    average = case.evidence("average_period_s")
-    call = position_log(case) if isinstance(check, LogPeriod) and case.fault is None else None
-    if not isinstance(check, LogPeriod) or case.source is None or call is None or not isinstance(average, float):
+    average, call = case.evidence("average_period_s"), position_log(case)
+    if call is None or not isinstance(average, float):
         return None
-    source, wanted_s = case.source, seconds(check.period)
+    source, wanted_s = case.source, seconds(case.check.period)
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
         hint = f"throttle_duration_sec={number(worth.value)} lets a log through every {number(worth.value)} s"
@@ -170,38 +235,10 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
     return Clue(hint, source.place(worth.origin), key="log_pace")
 
 
-def _logged_once(case: Case) -> Clue | None:
-    check = case.criterion.check
-    asks = isinstance(check, (LogPeriod, LogsPosition, LogsReceived)) and case.fault is None
-    call = position_log(case) if asks else None
-    if call is None or case.source is None:
-        return None
-    once = argument(call, 99, "once")
-    if isinstance(once, ast.Constant) and once.value is True:
-        return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
-    few = case.evidence("cause") == "few" or case.evidence("logs") == 1
-    test = next((n for n in case.source.around(call) if isinstance(n, ast.If)), None)
-    if not few or test is None or not _set_inside(test):
-        return None
-    hint = f"under 'if {case.source.code(test.test, 40)}' this logs a single time: log again and again"
-    return Clue(hint, case.source.place(test), key="once")
-
-
-def _set_inside(test: ast.If) -> bool:
-    """Return whether a condition is changed by what stands under it."""
-    if not is_flag(test.test):
-        return False
-    asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
-    stored = (t for s in test.body for n in ast.walk(s) if isinstance(n, ast.Assign) for t in n.targets)
-    return any(chain(t) in asked for t in stored)
-
-
+@rule(LogsReceived)
 def _received_not_logged(case: Case) -> Clue | None:
     """The callback of the subscription logs nothing, or not what it received."""
-    check = case.criterion.check
-    if not isinstance(check, LogsReceived) or case.source is None or case.fault is not None:
-        return None
-    source = case.source
+    source, check = case.source, case.check
     item = made_for(source, "subscription", check.topic)
     start = roots(source, item.callback) if item is not None else []
     if item is None or not start or not case.evidence("missing"):
@@ -246,24 +283,12 @@ def _shows(log: ast.AST, attributes: set[str]) -> bool:
     return any(chain(n) in attributes for n in ast.walk(log) if isinstance(n, ast.Attribute))
 
 
+@rule(WaitsGracefully)
 def _error_while_waiting(case: Case) -> Clue | None:
-    check = case.criterion.check
-    if not isinstance(check, WaitsGracefully) or case.source is None or case.verdict.location is None or case.fault:
+    if case.verdict.location is None:
         return None
     logs = (c for c in case.source.on_line(case.verdict.location.line, ast.Call) if is_log(case.source, c))
     call = next(logs, None)
     if call is None or last_name(call.func) not in ("error", "fatal"):
         return None
     return Clue(f"that no data has come yet is no failure: use info or warn instead of {last_name(call.func)}")
-
-
-LOGS = (
-    Cause("printed", _printed),
-    Cause("python_logging", _python_logging),
-    Cause("debug_only", _debug_only),
-    Cause("commented_out", _commented_out),
-    Cause("logged_once", _logged_once),
-    Cause("log_period", _log_period),
-    Cause("received_not_logged", _received_not_logged),
-    Cause("error_while_waiting", _error_while_waiting),
-)

@@ -100,7 +100,11 @@ RCLPY = (
     "get_global_executor",
 )
 PUBLISHER = ("publish", "get_subscription_count", "wait_for_all_acked", "destroy", "assert_liveliness")
-LOGGER = ("debug", "info", "warning", "warn", "error", "fatal", "set_level", "get_child", "log", "get_effective_level")
+#: Functions that call callbacks.
+SPINS = ("spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete")
+#: Methods of a logger that log.
+LOG_METHODS = ("debug", "info", "warn", "warning", "error", "fatal")
+LOGGER = (*LOG_METHODS, "set_level", "get_child", "log", "get_effective_level")
 
 _STD = "Bool Byte Char Empty Float32 Float64 Header Int8 Int16 Int32 Int64 UInt8 UInt16 UInt32 UInt64 String ColorRGBA "
 _STD += "Float32MultiArray Float64MultiArray Int32MultiArray"

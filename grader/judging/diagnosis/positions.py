@@ -6,28 +6,29 @@ import ast
 
 from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
-from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.constants import number_at
 from grader.judging.diagnosis.logs import position_log
-from grader.judging.diagnosis.wiring import is_flag, made, reached, roots
+from grader.judging.diagnosis.rules import Case, Clue, Maker, rule
+from grader.judging.diagnosis.wiring import is_flag, made, number_at, reached, roots
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
 #: What the check found, and the parts of the message that may have been read instead of the position.
-_PARTS = (
-    ("twist", ("twist",)),
-    ("orientation", ("orientation",)),
-    ("constant", ("orientation", "covariance")),
-    ("no_pair", ("orientation",)),
-)
+_PARTS = {
+    "twist": ("twist",),
+    "orientation": ("orientation",),
+    "constant": ("orientation", "covariance"),
+    "no_pair": ("orientation",),
+}
 _MEANING = {"twist": "velocity"}
 
 
-def _found(case: Case, *causes: str) -> Source | None:
-    """Return the source if the check found one of these things in the logs."""
-    check = case.criterion.check
-    lost = isinstance(check, LogsPosition) and case.verdict.outcome is Outcome.NOT_MET and case.fault is None
-    return case.source if lost and case.evidence("cause") in causes else None
+def _position_rule(*causes: str) -> Maker[Case]:
+    """Make a rule about position logs in which the check found one of these things."""
+
+    def found(case: Case) -> Case | None:
+        return case if case.evidence("cause") in causes else None
+
+    return rule(LogsPosition, outcome=Outcome.NOT_MET, given=found)
 
 
 def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
@@ -41,23 +42,21 @@ def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
     return found
 
 
+@_position_rule(*_PARTS)
 def _other_part(case: Case) -> Clue | None:
     """The velocity or the orientation is read instead of the position."""
-    for name, parts in _PARTS:
-        source = _found(case, name)
-        reads = _reads(source, *parts) if source is not None else []
-        if source is None or not reads or (name in ("constant", "no_pair") and _reads(source, "position")):
-            continue
-        what = next(part for part in parts if f".{part}." in f"{chain(reads[0])}.")
-        hint = f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_POSITION}.x and .y"
-        return Clue(hint, source.place(reads[0]))
-    return None
-
-
-def _swapped(case: Case) -> Clue | None:
-    source = _found(case, "swapped")
-    if source is None:
+    source, cause = case.source, str(case.evidence("cause"))
+    reads = _reads(source, *_PARTS[cause])
+    if not reads or (cause in ("constant", "no_pair") and _reads(source, "position")):
         return None
+    what = next(part for part in _PARTS[cause] if f".{part}." in f"{chain(reads[0])}.")
+    hint = f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_POSITION}.x and .y"
+    return Clue(hint, source.place(reads[0]))
+
+
+@_position_rule("swapped")
+def _swapped_axes(case: Case) -> Clue | None:
+    source = case.source
     for statement in source.all(ast.Assign):
         target, value = chain(statement.targets[0]), chain(statement.value)
         if "." in value and {_axis(target), _axis(value)} == {"x", "y"}:
@@ -101,11 +100,11 @@ def _order_in(call: ast.Call) -> list[str]:
     return [_axis(chain(n)) for n in places]
 
 
+@_position_rule("wrong", "sign", "no_sign", "abs")
 def _no_sign(case: Case) -> Clue | None:
     """`abs()` takes the sign away."""
-    source = _found(case, "wrong", "sign", "no_sign", "abs")
-    call = position_log(case) if source is not None else None
-    if source is None or call is None:
+    source, call = case.source, position_log(case)
+    if call is None:
         return None
     function = source.function_of(call)
     calls = [c for c in source.all(ast.Call) if last_name(c.func) in ("abs", "fabs") and len(c.args) == 1]
@@ -115,29 +114,25 @@ def _no_sign(case: Case) -> Clue | None:
     return Clue(f"{source.code(near[0])} takes the sign away: log the number as it is", source.place(near[0]))
 
 
+@_position_rule("no_y", "no_x", "only_x", "only_y")
 def _wrong_axis(case: Case) -> Clue | None:
     """Z in the place of y, or one number only."""
-    source = _found(case, "no_y", "no_x")
-    if source is not None:
+    source, cause = case.source, case.evidence("cause")
+    missing = "y" if cause in ("no_y", "only_x") else "x"
+    if cause in ("no_y", "no_x"):
         reads = [n for n in source.all(ast.Attribute) if n.attr == "z" and isinstance(n.ctx, ast.Load)]
-        missing = "y" if case.evidence("cause") == "no_y" else "x"
-        if len(reads) == 1:
-            hint = f"{source.code(reads[0], 50)} is the height: {missing} of the position is asked for"
-            return Clue(hint, source.place(reads[0]))
+        hint = f"{source.code(reads[0], 50)} is the height: {missing} of the position is asked for" if reads else ""
+        return Clue(hint, source.place(reads[0])) if len(reads) == 1 else None
+    call = position_log(case)
+    if call is None:
         return None
-    source = _found(case, "only_x", "only_y")
-    call = position_log(case) if source is not None else None
-    if source is None or call is None:
-        return None
-    missing = "y" if case.evidence("cause") == "only_x" else "x"
     return Clue(f"{source.code(call, 60)} does not show {missing}: log {_POSITION}.{missing} too", source.place(call))
 
 
+@_position_rule("first_value")
 def _kept_first(case: Case) -> Clue | None:
     """The callback stores a position only while there is none."""
-    source = _found(case, "first_value")
-    if source is None:
-        return None
+    source = case.source
     for item in made(source, "subscription"):
         for node in reached(source, roots(source, item.callback)):
             if isinstance(node, ast.If) and is_flag(node.test) and _stores(source, node):
@@ -146,22 +141,22 @@ def _kept_first(case: Case) -> Clue | None:
     return None
 
 
+@_position_rule("constant", "wrong")
 def _rounded_away(case: Case) -> Clue | None:
     """`round(x, -1)` leaves tens of metres."""
-    source = _found(case, "constant", "wrong")
-    for call in source.calls("round") if source is not None else ():
-        places = number_at(source, argument(call, 1, "ndigits")) if source is not None else None
-        if source is not None and places is not None and places < 0:
+    source = case.source
+    for call in source.calls("round"):
+        places = number_at(source, argument(call, 1, "ndigits"))
+        if places is not None and places < 0:
             hint = f"{source.code(call)} leaves tens of metres: keep a decimal or two"
             return Clue(hint, source.place(call))
     return None
 
 
+@_position_rule("constant")
 def _never_stored(case: Case) -> Clue | None:
     """The callback assigns local variables, and others are logged."""
-    source = _found(case, "constant")
-    if source is None:
-        return None
+    source = case.source
     for item in made(source, "subscription"):
         for function in roots(source, item.callback):
             names = [n for n in reached(source, [function]) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
@@ -173,11 +168,11 @@ def _never_stored(case: Case) -> Clue | None:
     return None
 
 
-def _scaled(case: Case) -> Clue | None:
+@_position_rule("wrong")
+def _scaled_position(case: Case) -> Clue | None:
     """The position is multiplied, as for another unit."""
-    source = _found(case, "wrong")
-    call = position_log(case) if source is not None else None
-    if source is None or call is None:
+    source, call = case.source, position_log(case)
+    if call is None:
         return None
     for node in subtree(call):
         if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Mult, ast.Div)):
@@ -187,15 +182,16 @@ def _scaled(case: Case) -> Clue | None:
     return None
 
 
-def _held_up(case: Case) -> Clue | None:
+@_position_rule("stale")
+def _old_messages(case: Case) -> Clue | None:
     """A callback that sleeps works through old messages."""
-    source = _found(case, "stale")
-    oldest = _oldest_taken(source) if source is not None else None
+    source = case.source
+    oldest = _oldest_taken(source)
     if oldest is not None:
         return oldest
-    for item in made(source, "subscription") if source is not None else ():
-        for node in reached(source, roots(source, item.callback)) if source is not None else ():
-            if source is not None and isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
+    for item in made(source, "subscription"):
+        for node in reached(source, roots(source, item.callback)):
+            if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
                 hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
                 return Clue(hint, source.place(node))
     return None
@@ -211,13 +207,11 @@ def _oldest_taken(source: Source) -> Clue | None:
     return None
 
 
+@_position_rule("wrong", "no_pair", "constant", "few", "stale", "sign")
 def _log_line(case: Case) -> Clue | None:
     """Nothing better is known than the line that logs."""
-    source = _found(case, "wrong", "no_pair", "constant", "few", "stale", "sign")
-    call = position_log(case) if source is not None else None
-    if source is None or call is None or not case.verdict.hint:
-        return None
-    return Clue(case.verdict.hint, source.place(call))
+    call = position_log(case)
+    return Clue(case.verdict.hint, case.source.place(call)) if call is not None and case.verdict.hint else None
 
 
 def _stores(source: Source, node: ast.If) -> bool:
@@ -228,17 +222,3 @@ def _stores(source: Source, node: ast.If) -> bool:
     assigned = [n for s in node.body for n in ast.walk(s) if isinstance(n, ast.Assign)]
     kept = [s for s in assigned if message & {last_name(n) for n in ast.walk(s.value)}]
     return not node.orelse and any(chain(t) in asked for s in kept for t in s.targets)
-
-
-POSITIONS = (
-    Cause("other_part", _other_part),
-    Cause("swapped_axes", _swapped),
-    Cause("no_sign", _no_sign),
-    Cause("wrong_axis", _wrong_axis),
-    Cause("kept_first", _kept_first),
-    Cause("rounded_away", _rounded_away),
-    Cause("never_stored", _never_stored),
-    Cause("scaled_position", _scaled),
-    Cause("old_messages", _held_up),
-    Cause("log_line", _log_line),
-)

@@ -9,20 +9,21 @@ from dataclasses import dataclass
 
 from grader.core.exercise import ProblemKind
 from grader.judging.checks.rate import TopicRate
-from grader.judging.diagnosis.case import Case, Cause, Clue, lines_of
-from grader.judging.diagnosis.constants import Constant, constant
-from grader.judging.diagnosis.endings import head_of
-from grader.judging.diagnosis.silence import silent_topic, timer_code
+from grader.judging.diagnosis.rules import Case, Clue, lines_of, rule, silent_topic
 from grader.judging.diagnosis.wiring import (
+    Constant,
     Made,
     called_only,
     changes,
     conditions,
+    constant,
+    head_of,
     made,
     made_for,
     publish_calls,
     reached,
     roots,
+    timer_code,
 )
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
@@ -35,6 +36,7 @@ _SAME = 0.03
 class _Paced:
     """A rate that was asked for and another that was found, with the calls that publish."""
 
+    case: Case
     source: Source
     calls: Sequence[ast.Call]
     wanted_hz: float
@@ -56,25 +58,25 @@ class _Paced:
 
 
 def _paced(case: Case) -> _Paced | None:
-    check = case.criterion.check
-    if not isinstance(check, TopicRate) or case.source is None or case.fault is not None or silent_topic(case):
+    check: TopicRate = case.check
+    if silent_topic(case):
         return None
     calls = publish_calls(case.source, made_for(case.source, "publisher", check.topic))
     found, first, count = (case.evidence(key) for key in ("rate_hz", "first_s", "window"))
     known = float(found) if isinstance(found, (int, float)) else math.nan
     first_s = float(first) if isinstance(first, (int, float)) else math.nan
-    return _Paced(case.source, calls, check.rate, known, first_s, count if isinstance(count, int) else 0)
+    return _Paced(case, case.source, calls, check.rate, known, first_s, count if isinstance(count, int) else 0)
 
 
 def _same(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME)
 
 
-def _period(case: Case) -> Clue | None:
+@rule(TopicRate, given=_paced)
+def _period(paced: _Paced) -> Clue | None:
     """The period of the timer is what makes the rate."""
-    paced = _paced(case)
-    timers = paced.timers() if paced is not None else []
-    if paced is None or len(timers) != 1:
+    timers = paced.timers()
+    if len(timers) != 1:
         return None
     worth = constant(paced.source, timers[0].period)
     if worth is None or _same(worth.value, paced.period_s):
@@ -99,10 +101,10 @@ def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float)
     return Clue(hint, source.place(worth.origin), key=f"period:{timer.call.lineno}")
 
 
-def _held_up(case: Case) -> Clue | None:
+@rule(TopicRate, given=_paced)
+def _callback_held_up(paced: _Paced) -> Clue | None:
     """The callback of the timer sleeps, or never returns."""
-    paced = _paced(case)
-    if paced is None or not paced.found_hz < paced.wanted_hz:
+    if not paced.found_hz < paced.wanted_hz:
         return None
     for timer in paced.timers():
         for node in reached(paced.source, roots(paced.source, timer.callback)):
@@ -138,11 +140,11 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
     return _sleeps(source, reached(source, [loop]))
 
 
-def _several(case: Case) -> Clue | None:
+@rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced)
+def _published_several_times(paced: _Paced) -> Clue | None:
     """Each round publishes more than once, or several timers publish."""
-    paced = _paced(case)
-    timers = paced.timers() if paced is not None else []
-    if paced is None or not timers or math.isnan(paced.found_hz) or not case.is_about(ProblemKind.BURSTS):
+    timers = paced.timers()
+    if not timers or math.isnan(paced.found_hz):
         return None
     source = paced.source
     if len(timers) > 1:
@@ -159,10 +161,45 @@ def _several(case: Case) -> Clue | None:
     return Clue(f"{hint}: one every {number(paced.period_s)} s is asked for", source.place(loop))
 
 
-def _loop_pace(case: Case) -> Clue | None:
+@rule(TopicRate, given=_paced)
+def _stopped_itself(paced: _Paced) -> Clue | None:
+    """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
+    if not (paced.case.is_about(ProblemKind.STOPPED) or paced.count == 1):
+        return None
+    source = paced.source
+    for timer in paced.timers():
+        inside = list(reached(source, roots(source, timer.callback)))
+        for node in inside:
+            if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
+                hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
+                return Clue(hint, source.place(node))
+        tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
+        if len(tests) == 1:
+            hint = (
+                f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"
+            )
+            return Clue(hint, source.place(tests[0]))
+    return None
+
+
+@rule(TopicRate, given=_paced)
+def _too_slow(paced: _Paced) -> Clue | None:
+    """The period is right, and still the rate is too low."""
+    timers = paced.timers()
+    worth = constant(paced.source, timers[0].period) if len(timers) == 1 else None
+    if worth is None or not _same(worth.value, paced.period_s):
+        return None
+    if math.isnan(paced.found_hz) or paced.found_hz > 0.97 * paced.wanted_hz:
+        return None
+    start = roots(paced.source, timers[0].callback)
+    hint = f"{timer_code(paced.source, timers[0])} has the right period, but a callback takes longer than that"
+    return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
+
+
+@rule(TopicRate, given=_paced)
+def _loop_pace(paced: _Paced) -> Clue | None:
     """A loop publishes, and what it waits for is not the period asked for."""
-    paced = _paced(case)
-    if paced is None or paced.timers() or math.isnan(paced.found_hz):
+    if paced.timers() or math.isnan(paced.found_hz):
         return None
     source = paced.source
     rates = list(source.calls("create_rate", "Rate"))
@@ -203,10 +240,10 @@ def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     return Clue(hint, paced.source.place(loop))
 
 
-def _published_once(case: Case) -> Clue | None:
+@rule(TopicRate, given=_paced)
+def _published_once(paced: _Paced) -> Clue | None:
     """No timer and no loop leads to publish."""
-    paced = _paced(case)
-    if paced is None or paced.count != 1 or paced.timers() or not paced.calls:
+    if paced.count != 1 or paced.timers() or not paced.calls:
         return None
     source = paced.source
     function = source.function_of(paced.calls[0])
@@ -222,49 +259,3 @@ def _published_once(case: Case) -> Clue | None:
 
 def _heard(source: Source, item: Made) -> list[ast.AST]:
     return list(reached(source, roots(source, item.callback)))
-
-
-def _stopped_itself(case: Case) -> Clue | None:
-    """A callback cancels its timer, destroys the node, or stops publishing on a condition."""
-    paced = _paced(case)
-    if paced is None or not (case.is_about(ProblemKind.STOPPED) or paced.count == 1):
-        return None
-    source = paced.source
-    for timer in paced.timers():
-        inside = list(reached(source, roots(source, timer.callback)))
-        for node in inside:
-            if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
-                hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
-                return Clue(hint, source.place(node))
-        tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
-        if len(tests) == 1:
-            hint = (
-                f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"
-            )
-            return Clue(hint, source.place(tests[0]))
-    return None
-
-
-def _too_slow(case: Case) -> Clue | None:
-    """The period is right, and still the rate is too low."""
-    paced = _paced(case)
-    timers = paced.timers() if paced is not None else []
-    worth = constant(paced.source, timers[0].period) if paced is not None and len(timers) == 1 else None
-    if paced is None or worth is None or not _same(worth.value, paced.period_s):
-        return None
-    if math.isnan(paced.found_hz) or paced.found_hz > 0.97 * paced.wanted_hz:
-        return None
-    start = roots(paced.source, timers[0].callback)
-    hint = f"{timer_code(paced.source, timers[0])} has the right period, but a callback takes longer than that"
-    return Clue(f"{hint}: do less in it", paced.source.place(start[0] if start else timers[0].call))
-
-
-RATES = (
-    Cause("period", _period),
-    Cause("callback_held_up", _held_up),
-    Cause("published_several_times", _several),
-    Cause("stopped_itself", _stopped_itself),
-    Cause("too_slow", _too_slow),
-    Cause("loop_pace", _loop_pace),
-    Cause("published_once", _published_once),
-)

@@ -1,94 +1,97 @@
-"""Causes behind topics that stay silent and nodes that do not listen: wrong names, types, policies, and dead code."""
+"""Causes behind silent topics and services and deaf nodes: wrong names, types and policies, and dead code."""
 
 from __future__ import annotations
 
 import ast
 import re
+from dataclasses import dataclass
 
 from grader.core.exercise import Location, Outcome
 from grader.core.quantities import seconds
+from grader.judging.checks.clients import ReactsToResponses, ServiceCalls
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.checks.rate import TopicRate
-from grader.judging.checks.sensor import LogsReceived
+from grader.judging.checks.received import LogsReceived
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import Publishes, Subscribes
-from grader.judging.diagnosis.case import Case, Cause, Clue
-from grader.judging.diagnosis.constants import constant
-from grader.judging.diagnosis.endings import head_of, node_made, spins, variable_of
-from grader.judging.diagnosis.wiring import MOST_MADE, Made, is_log, made, made_for, publish_calls, reached, roots, used
+from grader.judging.diagnosis.rules import NO_SOURCE, Case, Clue, file_for, rule, silent_topic, unheard_topic
+from grader.judging.diagnosis.wiring import (
+    MOST_MADE,
+    Made,
+    conditions,
+    constant,
+    head_of,
+    is_flag,
+    is_log,
+    made,
+    made_for,
+    node_made,
+    publish_calls,
+    reached,
+    roots,
+    short,
+    spins,
+    timer_code,
+    used,
+    variable_of,
+)
 from grader.judging.output import student_records
-from grader.judging.silence import student_endpoints
 from grader.judging.source import Function, Source, argument, chain, covers, last_name
-from grader.judging.values import carries_number, published
+from grader.judging.values import carries_number, student_endpoints
 from grader.judging.wording import quote
 
+_THREADS = {"Thread", "MultiThreadedExecutor", "start_new_thread", "ThreadPoolExecutor"}
 _COMMENTED_TIMER = re.compile(r"^\s*#.*\bcreate_timer\s*\(")
 #: A sleep longer than this before the node spins looks like the reason for its silence.
 _LONG_SLEEP_S = 15.0
 
 
-def silent_topic(case: Case) -> str:
-    """Return the topic on which messages were asked for and none came; empty if that is not the matter."""
-    check = case.criterion.check
-    if isinstance(check, (Publishes, TopicRate)):
-        asked = [check.topic]
-    elif isinstance(check, ThresholdResponse):
-        asked = [check.output]
-    else:
-        asked = [check.input, check.output] if isinstance(check, AnswersTogether) else []
-    type_ = check.type if isinstance(check, Publishes) else None
-    silent = (t for t in asked if not any(type_ in (None, m.type) for m in published(case.trace, t)))
-    return next(silent, "")
+@dataclass(frozen=True, slots=True)
+class _Unseen:
+    """The calls that should have run and left no trace: they publish, or they log."""
+
+    case: Case
+    source: Source
+    calls: list[ast.Call]
 
 
-def unheard_topic(case: Case) -> str:
-    """Return the topic to which nothing fitting subscribes; empty if that is not the matter."""
-    check = case.criterion.check
-    if isinstance(check, ThresholdResponse):
-        topic = check.input if silent_topic(case) else ""
-    elif isinstance(check, AnswersTogether):
-        topic = check.input if silent_topic(case) == check.output else ""
-    else:
-        topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else ""
-    type_ = check.type if isinstance(check, Subscribes) else None
-    there = [e for e in student_endpoints(case.trace, "subscription") if e.topic == topic and type_ in (None, e.type)]
-    return "" if there else topic
+def _unseen(case: Case) -> _Unseen | None:
+    topic = silent_topic(case)
+    if topic:
+        source = file_for(case, "publisher", topic)
+        return _Unseen(case, source, publish_calls(source, made_for(source, "publisher", topic)))
+    position = isinstance(case.check, LogsPosition) and case.evidence("right") == 0
+    if position or (isinstance(case.check, UsesLogger) and not student_records(case.trace, case.process)):
+        return _Unseen(case, case.source, _unseen_logs(case))
+    return None
 
 
-def speaker(case: Case, topic: str) -> Source | None:
-    """Return the file that is to publish a topic: the only one, or the only one that does not subscribe to it."""
-    candidates = [s for s in case.sources.values() if made_for(s, "subscription", topic) is None]
-    chosen = list(case.sources.values()) if len(case.sources) == 1 else candidates
-    return case.source or (chosen[0] if len(chosen) == 1 else None)
+def _unseen_or_once(case: Case) -> _Unseen | None:
+    """Return what left no trace, or nothing but one message."""
+    once = isinstance(case.check, TopicRate) and case.evidence("window") == 1
+    return _unseen(case) or (_Unseen(case, case.source, []) if once else None)
 
 
-def listener(case: Case, topic: str) -> Source | None:
-    """Return the file that is to subscribe to a topic: the only one, or the only one that does not publish it."""
-    candidates = [s for s in case.sources.values() if made_for(s, "publisher", topic) is None]
-    chosen = list(case.sources.values()) if len(case.sources) == 1 else candidates
-    return case.source or (chosen[0] if len(chosen) == 1 else None)
+def _unseen_logs(case: Case) -> list[ast.Call]:
+    """Return the calls that log and that no record came from."""
+    source = case.source
+    seen = {r.line for r in student_records(case.trace, case.process) if r.file == source.file}
+    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
+    return [n for n in logs if not any(covers(n, line) for line in seen)]
 
 
-def short(type_: str) -> str:
-    """Return the class name of a message type."""
-    return quote(type_.rpartition("/")[2], 40)
-
-
+@rule()
 def _wrong_topic(case: Case) -> Clue | None:
     for kind, topic in (("publisher", silent_topic(case)), ("subscription", unheard_topic(case))):
-        source = (speaker if kind == "publisher" else listener)(case, topic) if topic else None
-        others = [e for e in student_endpoints(case.trace, kind) if e.topic != topic]
-        if (
-            source is None
-            or case.fault is not None
-            or any(e.topic == topic for e in student_endpoints(case.trace, kind))
-        ):
+        ends = student_endpoints(case.trace, kind)
+        if not topic or any(e.topic == topic for e in ends):
             continue
-        own = [(e, m) for e in others if (m := made_for(source, kind, e.topic, short(e.type))) is not None]
-        type_ = str(getattr(case.criterion.check, "type", ""))
+        source = file_for(case, kind, topic)
+        own = [(e, m) for e in ends if (m := made_for(source, kind, e.topic, short(e.type))) is not None]
+        type_ = str(getattr(case.check, "type", ""))
         own = [(e, m) for e, m in own if type_ in ("", e.type)] or own
         if len({m.call for _, m in own}) == 1:
             return _elsewhere(source, own[0][1], own[0][0].topic, topic)
@@ -105,13 +108,12 @@ def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
 
 
+@rule(Publishes, Subscribes)
 def _wrong_type(case: Case) -> Clue | None:
-    check = case.criterion.check
-    if not isinstance(check, (Publishes, Subscribes)) or case.fault is not None or case.source is None:
-        return None
+    check: Publishes | Subscribes = case.check
     kind = "publisher" if isinstance(check, Publishes) else "subscription"
-    wrong = [e for e in student_endpoints(case.trace, kind) if e.topic == check.topic and e.type != check.type]
-    if not wrong or len(wrong) < sum(e.topic == check.topic for e in student_endpoints(case.trace, kind)):
+    wrong = student_endpoints(case.trace, kind, check.topic)
+    if not wrong or any(e.type == check.type for e in wrong):
         return None
     item = made_for(case.source, kind, check.topic, short(wrong[0].type))
     if item is None:
@@ -121,15 +123,16 @@ def _wrong_type(case: Case) -> Clue | None:
     return Clue(f"{hint}from {module.replace('/', '.')} import {name}", case.source.place(item.call))
 
 
+@rule()
 def _latched_subscription(case: Case) -> Clue | None:
     """A subscription that asks for transient_local durability hears only publishers that offer it."""
-    check = case.criterion.check
+    check = case.check
     topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else getattr(check, "input", "")
-    listening = [e for e in student_endpoints(case.trace, "subscription") if e.topic == topic]
-    source = listener(case, topic) if listening else None
+    listening = student_endpoints(case.trace, "subscription", topic)
     deaf = not isinstance(check, (AnswersTogether, ThresholdResponse)) or bool(silent_topic(case))
-    if source is None or not deaf or any(e.durability != "transient_local" for e in listening) or case.fault:
+    if not listening or not deaf or any(e.durability != "transient_local" for e in listening):
         return None
+    source = file_for(case, "subscription", topic)
     item = made_for(source, "subscription", topic, short(listening[0].type))
     if item is None:
         return None
@@ -138,18 +141,16 @@ def _latched_subscription(case: Case) -> Clue | None:
     return Clue(hint, source.place(policy if policy is not None else item.call), key=f"apart:{topic}")
 
 
+@rule(AnswersTogether, BidirectionalGraph)
 def _kept_apart(case: Case) -> Clue | None:
     """Two files that each are right, and cannot talk to each other."""
-    check = case.criterion.check
-    if isinstance(check, AnswersTogether):
-        topics = [check.input, check.output]
-    else:
-        topics = [check.forward, check.back] if isinstance(check, BidirectionalGraph) else []
-    for topic in topics:
-        ends = [e for e in student_endpoints(case.trace) if e.topic == topic]
+    check: AnswersTogether | BidirectionalGraph = case.check
+    ends_of = (check.input, check.output) if isinstance(check, AnswersTogether) else (check.forward, check.back)
+    for topic in ends_of:
+        ends = student_endpoints(case.trace, topic=topic)
         here = [e for e in ends if e.kind == "publisher"]
         there = [e for e in ends if e.kind == "subscription"]
-        if len(here) != 1 or len(there) != 1 or case.fault is not None or topic not in case.topics:
+        if len(here) != 1 or len(there) != 1 or topic not in case.topics:
             continue
         talker, hearer = _file_with(case, "publisher", topic), _file_with(case, "subscription", topic)
         if talker is None or hearer is None or talker[0] is hearer[0]:
@@ -172,45 +173,59 @@ def _file_with(case: Case, kind: str, topic: str) -> tuple[Source, Made] | None:
     return found[0] if len(found) == 1 else None
 
 
-def _needed_calls(case: Case) -> tuple[Source, list[ast.Call]] | None:
-    """Return the calls that should have run and left no trace: they publish, or they log."""
-    topic = silent_topic(case)
-    source = speaker(case, topic) if topic else case.source
-    if source is None or case.fault is not None:
-        return None
-    if topic:
-        return source, publish_calls(source, made_for(source, "publisher", topic))
-    position = isinstance(case.criterion.check, LogsPosition) and case.evidence("right") == 0
-    if position or (isinstance(case.criterion.check, UsesLogger) and not student_records(case.trace, case.process)):
-        return source, _unseen_logs(case, source)
+@rule(BidirectionalGraph)
+def _graph_topic(case: Case) -> Clue | None:
+    """A direction is missing from the graph because its topic has another name in one file."""
+    check: BidirectionalGraph = case.check
+    for topic in (t for t in (check.forward, check.back) if t in case.topics):
+        for kind in ("publisher", "subscription"):
+            source, ends = file_for(case, kind, topic), student_endpoints(case.trace, kind)
+            if any(e.topic == topic for e in ends):
+                continue
+            items = made(source, kind)
+            found = [e.topic for e in ends if items and _same_made(made_for(source, kind, e.topic), items[0])]
+            if len(items) == 1 and len(found) == 1:
+                return _elsewhere(source, items[0], found[0], topic)
     return None
 
 
-def _unseen_logs(case: Case, source: Source) -> list[ast.Call]:
-    """Return the calls that log and that no record came from."""
-    seen = {r.line for r in student_records(case.trace, case.process) if r.file == source.file}
-    logs = [n for n in source.all(ast.Call) if is_log(source, n)]
-    return [n for n in logs if not any(covers(n, line) for line in seen)]
+def _same_made(one: Made | None, other: Made) -> bool:
+    return one is not None and one.call is other.call
 
 
+@rule()
+def _no_subscription(case: Case) -> Clue | None:
+    """One direction of two is not written at all."""
+    check = case.check
+    topic = unheard_topic(case)
+    if isinstance(check, BidirectionalGraph):
+        topic = next((t for t in (check.back, check.forward) if t in case.topics), "")
+        there = student_endpoints(case.trace, "subscription", topic)
+        topic = "" if there else topic
+    source = file_for(case, "subscription", topic)
+    if not topic or made(source, "subscription") or "Subscriber" in {last_name(n) for n in source.names()}:
+        return None
+    node = next((c for c in source.all(ast.ClassDef) if any(last_name(b) == "Node" for b in c.bases)), None)
+    if node is None or any(chain(n).startswith("super().create") for n in source.all(ast.Attribute)):
+        return None
+    hint = f"{source.file} subscribes to nothing: add self.create_subscription(..., '{topic}', self.callback, 10)"
+    return Clue(hint, source.place(node), key=f"unheard:{topic}")
+
+
+@rule()
 def _never_publishes(case: Case) -> Clue | None:
     topic = silent_topic(case)
-    source = speaker(case, topic) if topic else None
-    item = made_for(source, "publisher", topic) if source is not None else None
-    if source is None or item is None or case.fault is not None:
-        return None
-    named = [n for n in source.names() if last_name(n).startswith("publish")]
-    if [n for n in named if last_name(n) == "publish"] or unheard_topic(case):
+    source = file_for(case, "publisher", topic)
+    item = made_for(source, "publisher", topic) if topic else None
+    if item is None or any(last_name(n) == "publish" for n in source.names()) or unheard_topic(case):
         return None
     hint = f"{source.code(item.call)} makes a publisher, but nothing in the file calls its publish()"
     return Clue(hint, source.place(item.call))
 
 
-def _not_spun(case: Case) -> Clue | None:
-    found = _needed_calls(case)
-    if found is None:
-        return None
-    source, _ = found
+@rule(given=_unseen)
+def _not_spun(unseen: _Unseen) -> Clue | None:
+    source = unseen.source
     node = node_made(source)
     waits = made(source, "timer") or made(source, "subscription")
     if node is None or spins(source) or not waits or "asyncio" in "".join(source.lines[:60]):
@@ -219,42 +234,80 @@ def _not_spun(case: Case) -> Clue | None:
     return Clue(f"{hint} is ever called", source.place(node))
 
 
-def _waits_for_service(case: Case) -> Clue | None:
-    found = _needed_calls(case)
-    call = next(found[0].calls("wait_for_service"), None) if found is not None else None
-    if found is None or call is None:
+@rule(LogsReceived)
+def _no_number_heard(case: Case) -> Clue | None:
+    """A subscription whose type carries no number."""
+    check: LogsReceived = case.check
+    types = {e.type for e in student_endpoints(case.trace, "subscription", check.topic)}
+    item = made_for(case.source, "subscription", check.topic)
+    if item is None or len(types) != 1 or carries_number(next(iter(types))):
         return None
-    return Clue(
-        "this waits for a service that nobody offers here: the node must start without it", found[0].place(call)
-    )
+    hint = f"{short(next(iter(types)))} carries no number: use a numeric type such as Float32 in both files"
+    return Clue(hint, case.source.place(item.call), key=f"apart:{check.topic}")
 
 
-def _unwoken_rate(case: Case) -> Clue | None:
+@rule(given=_unseen_or_once)
+def _nested_spin(unseen: _Unseen) -> Clue | None:
+    """The node is spun where it can never come back: in its constructor, or inside a callback."""
+    source = unseen.source
+    for call in source.calls("spin", "spin_until_future_complete"):
+        function = source.function_of(call)
+        if function is None or not source.is_method(function):
+            continue
+        code = source.code(call)
+        if function.name == "__init__":
+            hint = f"{code} in the constructor does not return: what stands after it is never reached"
+            return Clue(hint, source.place(call), key="nested_spin")
+        callbacks = [m for kind in ("timer", "subscription") for m in made(source, kind)]
+        if any(call in set(reached(source, roots(source, m.callback))) for m in callbacks):
+            hint = f"{code} inside a callback waits for something that can only come after the callback has returned"
+            return Clue(hint, source.place(call), key="nested_spin")
+    return None
+
+
+@rule(LogsPosition)
+def _stopped_listening(case: Case) -> Clue | None:
+    """The subscription asks for a deadline that nobody promises, or is destroyed before the data come."""
+    if case.evidence("right") != 0:
+        return None
+    source = case.source
+    for item in made(source, "subscription"):
+        name = source.code(item.qos) if isinstance(item.qos, (ast.Name, ast.Attribute)) else ""
+        policies = [k for k in source.all(ast.keyword) if k.arg in ("deadline", "liveliness_lease_duration")]
+        near = [k for k in policies if covers(item.call, k.lineno) or name]
+        if len(near) == 1:
+            hint = f"with {source.code(near[0], 50)} it hears only publishers that promise the same: leave it out"
+            return Clue(hint, source.place(near[0]))
+    ends = next(source.calls("destroy_subscription"), None)
+    if ends is None:
+        return None
+    return Clue(f"after {source.code(ends)} no message can come any more: keep listening", source.place(ends))
+
+
+@rule(given=_unseen)
+def _waits_for_service(unseen: _Unseen) -> Clue | None:
+    call = next(unseen.source.calls("wait_for_service"), None)
+    hint = "this waits for a service that nobody offers here: the node must start without it"
+    return None if call is None else Clue(hint, unseen.source.place(call))
+
+
+@rule(given=_unseen_or_once)
+def _unwoken_rate(unseen: _Unseen) -> Clue | None:
     """`rate.sleep()` returns only when another thread spins the node."""
-    few = isinstance(case.criterion.check, TopicRate) and case.evidence("window") == 1
-    found = _needed_calls(case)
-    source = found[0] if found is not None else case.source
-    if source is None or case.fault is not None or not (few or found is not None):
-        return None
+    source = unseen.source
     rate = next(source.calls("create_rate"), None)
     names = {last_name(n) for n in source.names()}
     sleeps = [c for c in source.calls("sleep") if not c.args and not c.keywords]
-    if (
-        rate is None
-        or not sleeps
-        or names & {"Thread", "MultiThreadedExecutor", "start_new_thread", "ThreadPoolExecutor"}
-    ):
+    if rate is None or not sleeps or names & _THREADS:
         return None
     hint = f"{source.code(sleeps[0])} waits for ever: a rate is woken only by another thread that spins the node"
     return Clue(f"{hint}: use create_timer instead", source.place(sleeps[0]), key="unwoken_rate")
 
 
-def _held_up(case: Case) -> Clue | None:
+@rule(given=_unseen)
+def _held_up(unseen: _Unseen) -> Clue | None:
     """A long sleep, or a loop that waits, before the node spins."""
-    found = _needed_calls(case)
-    if found is None:
-        return None
-    source, _ = found
+    source = unseen.source
     for call in source.calls("sleep"):
         worth = constant(source, argument(call, 0, "secs"))
         function = source.function_of(call)
@@ -279,13 +332,11 @@ def _waits_in_constructor(source: Source) -> Clue | None:
     return None
 
 
-def _never_called(case: Case) -> Clue | None:
+@rule(given=_unseen)
+def _never_called(unseen: _Unseen) -> Clue | None:
     """What publishes or logs stands in a method that nothing calls."""
-    found = _needed_calls(case)
-    if found is None or not found[1]:
-        return None
-    source, calls = found
-    functions = list(dict.fromkeys(source.function_of(c) for c in calls))[:MOST_MADE]
+    source = unseen.source
+    functions = list(dict.fromkeys(source.function_of(c) for c in unseen.calls))[:MOST_MADE]
     dead = [f for f in functions if f is not None and not used(source, f) and _may_be_unused(source, f)]
     if len(dead) < len(functions) or not dead:
         return None
@@ -294,7 +345,7 @@ def _never_called(case: Case) -> Clue | None:
     if row:
         hint = f"the timer that should call {name} is commented out"
         return Clue(hint, Location(source.file, row), key=f"dead:{name}")
-    does = "publishes" if silent_topic(case) else "logs"
+    does = "publishes" if silent_topic(unseen.case) else "logs"
     owner = "self." if source.is_method(dead[0]) else ""
     hint = f"nothing calls {name}, which {does}: create a timer that does, create_timer(..., {owner}{name})"
     return Clue(hint, source.place(dead[0]), key=f"dead:{name}")
@@ -307,158 +358,90 @@ def _may_be_unused(source: Source, function: Function) -> bool:
     return plain and not function.name.startswith("__") and function.name != "main" and not function.decorator_list
 
 
-def _late_timer(case: Case) -> Clue | None:
+@rule(given=_unseen)
+def _late_timer(unseen: _Unseen) -> Clue | None:
     """The timer's period is longer than anybody waits."""
-    found = _needed_calls(case)
-    if found is None:
-        return None
-    source, calls = found
+    source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
     for item in made(source, "timer"):
         worth = constant(source, item.period)
         inside = set(reached(source, roots(source, item.callback)))
-        if worth is not None and worth.value > seconds(case.trace.stop_ns) - 1 and any(c in inside for c in calls):
+        if worth is not None and worth.value > latest_s and any(c in inside for c in unseen.calls):
             hint = f"{timer_code(source, item)} waits {worth.value:g} s before the first call: the period is in seconds"
             return Clue(hint, source.place(worth.origin), key=f"period:{item.call.lineno}")
     return None
 
 
-def timer_code(source: Source, item: Made) -> str:
-    """Return how a timer is made, in short."""
-    period = source.code(item.period, 40) if item.period is not None else "?"
-    callback = source.code(item.callback, 40) if item.callback is not None else "?"
-    return f"create_timer({period}, {callback})"
-
-
-def _nested_spin(case: Case) -> Clue | None:
-    """The node is spun where it can never come back: in its constructor, or inside a callback."""
-    stopped = isinstance(case.criterion.check, TopicRate) and case.evidence("window") == 1
-    found = _needed_calls(case)
-    source = found[0] if found is not None else case.source
-    if source is None or case.fault is not None or not (stopped or found is not None):
-        return None
-    for call in source.calls("spin", "spin_until_future_complete"):
-        function = source.function_of(call)
-        if function is None or not source.is_method(function):
-            continue
-        code = source.code(call)
-        if function.name == "__init__":
-            hint = f"{code} in the constructor does not return: what stands after it is never reached"
-            return Clue(hint, source.place(call), key="nested_spin")
-        callbacks = [m for kind in ("timer", "subscription") for m in made(source, kind)]
-        if any(call in set(reached(source, roots(source, m.callback))) for m in callbacks):
-            hint = f"{code} inside a callback waits for something that can only come after the callback has returned"
-            return Clue(hint, source.place(call), key="nested_spin")
-    return None
-
-
-def _stopped_listening(case: Case) -> Clue | None:
-    """The subscription asks for a deadline that nobody promises, or is destroyed before the data come."""
-    if not isinstance(case.criterion.check, LogsPosition) or case.evidence("right") != 0 or case.source is None:
-        return None
-    source = case.source
-    for item in made(source, "subscription"):
-        name = source.code(item.qos) if isinstance(item.qos, (ast.Name, ast.Attribute)) else ""
-        policies = [k for k in source.all(ast.keyword) if k.arg in ("deadline", "liveliness_lease_duration")]
-        near = [k for k in policies if covers(item.call, k.lineno) or name]
-        if len(near) == 1 and case.fault is None:
-            hint = f"with {source.code(near[0], 50)} it hears only publishers that promise the same: leave it out"
-            return Clue(hint, source.place(near[0]))
-    ends = next(source.calls("destroy_subscription"), None)
-    if ends is None or case.fault is not None:
-        return None
-    return Clue(f"after {source.code(ends)} no message can come any more: keep listening", source.place(ends))
-
-
-def _no_number_heard(case: Case) -> Clue | None:
-    """A subscription whose type carries no number."""
-    check = case.criterion.check
-    if not isinstance(check, LogsReceived) or case.source is None or case.fault is not None:
-        return None
-    types = {e.type for e in student_endpoints(case.trace, "subscription") if e.topic == check.topic}
-    item = made_for(case.source, "subscription", check.topic)
-    if item is None or len(types) != 1 or carries_number(next(iter(types))):
-        return None
-    hint = f"{short(next(iter(types)))} carries no number: use a numeric type such as Float32 in both files"
-    return Clue(hint, case.source.place(item.call), key=f"apart:{check.topic}")
-
-
-def _only_when_told(case: Case) -> Clue | None:
+@rule(outcome=Outcome.NOT_MET, given=_unseen)
+def _only_when_told(unseen: _Unseen) -> Clue | None:
     """Everything is published from the callback of a topic that nobody publishes."""
-    found = _needed_calls(case)
-    if found is None or not found[1]:
-        return None
-    source, calls = found
+    source, calls = unseen.source, unseen.calls
     for item in made(source, "subscription"):
         inside = set(reached(source, roots(source, item.callback)))
-        if item.topic is None or not all(c in inside for c in calls):
+        if item.topic is None or not calls or not all(c in inside for c in calls):
             continue
         timed = [n for t in made(source, "timer") for n in reached(source, roots(source, t.callback))]
-        heard = case.trace.deliveries(f"/{item.topic.strip('/')}")
-        own = case.trace.messages(f"/{item.topic.strip('/')}")
-        if not heard and not own and not any(c in timed for c in calls) and case.verdict.outcome is Outcome.NOT_MET:
+        if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
             hint = f"this runs only when a message comes on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
     return None
 
 
-def _no_subscription(case: Case) -> Clue | None:
-    """One direction of two is not written at all."""
-    check = case.criterion.check
-    topic = unheard_topic(case)
-    if isinstance(check, BidirectionalGraph):
-        topic = next((t for t in (check.back, check.forward) if t in case.topics), "")
-        there = [e for e in student_endpoints(case.trace, "subscription") if e.topic == topic]
-        topic = "" if there else topic
-    source = listener(case, topic) if topic else None
-    if source is None or case.fault is not None or not source.nodes:
-        return None
-    if made(source, "subscription") or "Subscriber" in {last_name(n) for n in source.names()}:
-        return None
-    node = next((c for c in source.all(ast.ClassDef) if any(last_name(b) == "Node" for b in c.bases)), None)
-    if node is None or any(chain(n).startswith("super().create") for n in source.all(ast.Attribute)):
-        return None
-    hint = f"{source.file} subscribes to nothing: add self.create_subscription(..., '{topic}', self.callback, 10)"
-    return Clue(hint, source.place(node), key=f"unheard:{topic}")
-
-
-def _graph_topic(case: Case) -> Clue | None:
-    """A direction is missing from the graph because its topic has another name in one file."""
-    check = case.criterion.check
-    if not isinstance(check, BidirectionalGraph) or case.fault is not None:
-        return None
-    for topic in (check.forward, check.back):
-        for kind, finder in (("publisher", speaker), ("subscription", listener)):
-            source = finder(case, topic)
-            ends = student_endpoints(case.trace, kind)
-            if source is None or topic not in case.topics or any(e.topic == topic for e in ends):
-                continue
-            items = made(source, kind)
-            found = [e.topic for e in ends if items and _same_made(made_for(source, kind, e.topic), items[0])]
-            if len(items) == 1 and len(found) == 1:
-                return _elsewhere(source, items[0], found[0], topic)
+@rule()
+def _waits_to_hear(case: Case) -> Clue | None:
+    """Whatever publishes depends on an attribute that only a subscription sets, to a topic without messages."""
+    topic = silent_topic(case)
+    source = file_for(case, "publisher", topic) if topic else NO_SOURCE
+    calls = publish_calls(source, made_for(source, "publisher", topic))
+    for item in made(source, "subscription"):
+        unheard = item.topic is not None and not _heard(case, item.topic)
+        tests = [_held_back(source, call, item) for call in calls] if unheard else []
+        if tests and tests[0] is not None and all(tests):
+            hint = f"'if {source.code(tests[0].test, 40)}' holds everything back until a message comes on "
+            hint += f"{quote(item.topic or '', 60)}, and none does: publish without it"
+            return Clue(hint, source.place(tests[0]), key=f"told:{item.call.lineno}")
     return None
 
 
-def _same_made(one: Made | None, other: Made) -> bool:
-    return one is not None and one.call is other.call
+def _heard(case: Case, written: str) -> bool:
+    topic = f"/{written.strip('/')}"
+    return bool(case.trace.deliveries(topic) or case.trace.messages(topic))
 
 
-SILENCE = (
-    Cause("wrong_topic", _wrong_topic),
-    Cause("wrong_type", _wrong_type),
-    Cause("latched_subscription", _latched_subscription),
-    Cause("kept_apart", _kept_apart),
-    Cause("graph_topic", _graph_topic),
-    Cause("no_subscription", _no_subscription),
-    Cause("never_publishes", _never_publishes),
-    Cause("not_spun", _not_spun),
-    Cause("no_number_heard", _no_number_heard),
-    Cause("nested_spin", _nested_spin),
-    Cause("stopped_listening", _stopped_listening),
-    Cause("waits_for_service", _waits_for_service),
-    Cause("unwoken_rate", _unwoken_rate),
-    Cause("held_up", _held_up),
-    Cause("never_called", _never_called),
-    Cause("late_timer", _late_timer),
-    Cause("only_when_told", _only_when_told),
-)
+def _held_back(source: Source, call: ast.Call, item: Made) -> ast.If | None:
+    """Return the condition on which a call waits for what the callback of a subscription stores."""
+    brought = {
+        chain(n)
+        for n in reached(source, roots(source, item.callback))
+        if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+    }
+    for test in conditions(source, call):
+        asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, ast.Attribute)}
+        others = [s for name in asked & brought for s in source.stores(name) if not _from(source, s, item)]
+        early = all((f := source.function_of(s)) is not None and f.name == "__init__" for s in others)
+        if is_flag(test.test) and asked & brought and early:
+            return test
+    return None
+
+
+def _from(source: Source, store: ast.AST, item: Made) -> bool:
+    return store in set(reached(source, roots(source, item.callback)))
+
+
+@rule(ServiceCalls, ReactsToResponses)
+def _shared_callback_group(case: Case) -> Clue | None:
+    """A callback awaits the answer of a client that is of the same group, whose callbacks run one at a time."""
+    source = case.source
+    grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
+    clients, waits = list(source.calls("create_client")), _waits(source)
+    if grouped or not waits or len(clients) != 1:
+        return None
+    hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
+    hint += "no answer is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
+    return Clue(hint, source.place(clients[0]), key="shared_group")
+
+
+def _waits(source: Source) -> list[ast.AST]:
+    """Return the places where a function awaits an answer of a service."""
+    return [
+        n for n in source.all(ast.Await) if isinstance(n.value, ast.Call) and last_name(n.value.func) == "call_async"
+    ]

@@ -1,0 +1,258 @@
+"""The charts of an exercise: those of its checks, the graph, a timeline of each scenario, and lines of the source."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Look, Moment, Panel, Series, Stage, Tone
+from grader.core.exercise import Check, Criterion, Exercise, Location
+from grader.core.quantities import seconds
+from grader.core.report import ExerciseReport
+from grader.core.scenario import Scenario
+from grader.core.submission import Submission
+from grader.core.trace import GraphSnapshot, Request, Response, Trace
+from grader.judging.charts.drawing import series, time_chart, written_in_lane
+from grader.judging.findings import fault_sentence
+from grader.judging.output import printed_lines
+from grader.judging.values import on_student_topic
+from grader.judging.wording import counted, quote
+
+
+def illustrated(
+    report: ExerciseReport,
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str],
+) -> ExerciseReport:
+    """Return the report with what a reader wants to look at: figures, lines of the source, and what was expected.
+
+    Args:
+        report: What judging came to.
+        exercise: What was asked.
+        traces: Scenario id -> what was recorded.
+        submission: Says which files were found.
+        sources: Wanted file name -> its text.
+    """
+    return replace(
+        report,
+        figures=figures_of(exercise, traces),
+        excerpts=excerpts_for(report, submission, sources),
+        expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c.check))},
+    )
+
+
+def expectation(check: Check) -> str:
+    """Return what a check expects, without a full stop; empty if it does not say."""
+    own = getattr(check, "expected", "")
+    return own if isinstance(own, str) else ""
+
+
+def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure, ...]:
+    """Return the pictures of an exercise in rubric order, then the graph, then a timeline of each scenario."""
+    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces)]
+    figures: list[Figure] = list(_merged(drawn))
+    graph = graph_figure(exercise, traces)
+    if graph is not None:
+        graphs = tuple(c.id for c in exercise.criteria if getattr(c.check, "shows_graph", False))
+        figures.append(replace(graph, criteria=graphs))
+    figures += _timelines(exercise, traces)
+    return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
+
+
+def _drawn(criterion: Criterion, traces: Mapping[str, Trace]) -> Iterable[Chart]:
+    maker, trace = getattr(criterion.check, "chart", None), traces.get(criterion.scenario)
+    try:
+        chart = maker(trace) if callable(maker) and trace else None
+    except Exception:  # a picture that cannot be drawn must not cost the report that it would be in
+        chart = None
+    if isinstance(chart, Chart):
+        yield replace(chart, id=f"{criterion.scenario} {chart.id}", criteria=(criterion.id,))
+
+
+def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
+    """Join charts of one id: two questions about the same thing make one picture."""
+    joined: dict[str, Chart] = {}
+    for chart in charts:
+        other = joined.get(chart.id)
+        joined[chart.id] = chart if other is None else _joined(other, chart)
+    return joined.values()
+
+
+def _joined(one: Chart, other: Chart) -> Chart:
+    return replace(
+        one,
+        about=" ".join(dict.fromkeys((one.about, other.about))),
+        criteria=tuple(dict.fromkeys((*one.criteria, *other.criteria))),
+        panels=tuple(dict.fromkeys((*one.panels, *other.panels))),
+    )
+
+
+def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Chart]:
+    recorded = [s for s in exercise.scenarios if s.id in traces]
+    charts = []
+    for scenario in recorded:
+        chart = timeline_chart(traces[scenario.id], scenario.processes)
+        title = f"{chart.title}: {scenario.id.replace('_', ' ')}" if len(recorded) > 1 else chart.title
+        charts.append(replace(chart, title=title))
+    return charts
+
+
+#: Lines shown before and after the one that is meant.
+AROUND = 3
+#: A line of a source may be a megabyte long.
+_LONGEST_LINE = 400
+_TAB = 4
+
+
+def excerpts_for(report: ExerciseReport, submission: Submission, sources: Mapping[str, str]) -> tuple[Excerpt, ...]:
+    """Return the source around each place that a verdict or a fault names, each once; unknown places have none."""
+    places = [v.location for v in report.verdicts if v.location is not None]
+    places += [Location(f.file, f.line) for f in report.faults if f.file and f.line > 0]
+    texts = {file.found: sources[wanted] for wanted, file in submission.files.items() if wanted in sources}
+    lines = {name: text.splitlines() for name, text in texts.items() if any(p.file == name for p in places)}
+    found = (_excerpt(place, lines.get(place.file, [])) for place in dict.fromkeys(places))
+    return tuple(excerpt for excerpt in found if excerpt is not None)
+
+
+def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
+    if not 1 <= place.line <= len(lines):
+        return None
+    first = max(1, place.line - AROUND)
+    shown = lines[first - 1 : place.line + AROUND]
+    return Excerpt(place.file, place.line, first, tuple(line[:_LONGEST_LINE].expandtabs(_TAB) for line in shown))
+
+
+def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:
+    """Return the graph in every situation that tells something new, or None if no node ever appeared."""
+    stages = [stage for s in exercise.scenarios if s.id in traces for stage in _stages(s, exercise, traces[s.id])]
+    told: dict[tuple[object, ...], Stage] = {}
+    for stage in stages:
+        told.setdefault((stage.graph.nodes, stage.graph.endpoints, stage.graph.services), stage)
+    distinct = [stage for stage in told.values() if stage.graph.nodes]
+    if not distinct:
+        return None
+    return GraphFigure("graph", "The live ROS graph", _told_graphs(distinct), (), tuple(distinct))
+
+
+def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]:
+    graphs = [_own(g) for g in trace.graphs() if g.t_ns <= trace.stop_ns]
+    if not graphs:
+        return []
+    if len(exercise.scenarios) > 1:
+        return [Stage(scenario.id.replace("_", " "), max(reversed(graphs), key=_size))]
+    if graphs[0] == graphs[-1]:
+        return [Stage("from the start to the end", graphs[0])]
+    return [Stage("at the start", graphs[0]), Stage("at the end", graphs[-1])]
+
+
+def _own(graph: GraphSnapshot) -> GraphSnapshot:
+    """Return the graph with what the student's nodes made themselves, at no particular time."""
+    return replace(graph, t_ns=0, endpoints=tuple(e for e in graph.endpoints if on_student_topic(e)))
+
+
+def _size(graph: GraphSnapshot) -> int:
+    return len(graph.endpoints) + len(graph.services)
+
+
+def _told_graphs(stages: list[Stage]) -> str:
+    return " ".join(f"{s.title.capitalize()}: {_said(s.graph)}." for s in stages)
+
+
+def _said(graph: GraphSnapshot) -> str:
+    publishers = [e for e in graph.endpoints if e.kind == "publisher"]
+    parts = []
+    for publisher in publishers:
+        takers = [e for e in graph.endpoints if e.kind == "subscription" and e.topic == publisher.topic]
+        parts += [f"{publisher.node} publishes {publisher.topic} to {t.node}" for t in takers]
+        parts += [] if takers else [f"{publisher.node} publishes {publisher.topic}"]
+    served = {p.topic for p in publishers}
+    unserved = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in served]
+    parts += [f"{e.node} subscribes to {e.topic}" for e in unserved]
+    visible = [e for e in graph.services if "/_" not in e.service]
+    parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {e.service}" for e in visible]
+    return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
+
+
+#: Lanes for services; a node's parameters and an action are several.
+MOST_SERVICES = 6
+_TONES = {"DEBUG": Tone.FAINT, "INFO": Tone.MAIN, "WARN": Tone.WARNING, "ERROR": Tone.BAD, "FATAL": Tone.BAD}
+
+
+def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
+    """Return the picture of a scenario; there is always one, a silent node included."""
+    lanes: list[str] = []
+    rows: list[Series] = []
+    for process in processes:
+        _logs(trace, process, lanes, rows)
+        _prints(trace, process, lanes, rows)
+    _exchanges(trace, lanes, rows)
+    _faults(trace, lanes, rows)
+    moments = [Moment(seconds(m.t_ns), f"{m.detail} begins") for m in trace.marks("stream_starts")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("stream_stops")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server appears") for m in trace.marks("server_starts")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server disappears") for m in trace.marks("server_stops")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail} starts") for m in trace.marks("process_starts")]
+    moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("exited")]
+    moments += [Moment(seconds(trace.stop_ns), "end")]
+    return time_chart(
+        "timeline",
+        "Logs and faults over time",
+        _about(trace, processes),
+        (Panel("", "", tuple(rows), lanes=tuple(lanes)),),
+        tuple(moments),
+    )
+
+
+def _logs(trace: Trace, process: str, lanes: list[str], rows: list[Series]) -> None:
+    records = [r for r in trace.records(process) if r.t_ns <= trace.stop_ns]
+    lanes.append(f"{process}: logged")
+    for severity, tone in _TONES.items():
+        some = [r for r in records if r.severity == severity]
+        if some:
+            rows.append(written_in_lane(severity, some, len(lanes) - 1, tone))
+
+
+def _prints(trace: Trace, process: str, lanes: list[str], rows: list[Series]) -> None:
+    lines = printed_lines(trace, process)
+    if lines:
+        lanes.append(f"{process}: printed")
+        rows.append(written_in_lane("printed", lines, len(lanes) - 1, Tone.SECOND))
+
+
+def _exchanges(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
+    """Add a lane for each service that was called: its requests and responses, with what they say."""
+    sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
+    exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
+    for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:
+        lanes.append(f"{service}: called")
+        for name, kind, tone in (("request", Request, Tone.SECOND), ("response", Response, Tone.MAIN)):
+            some = [o for o in exchanges if isinstance(o, kind) and o.service == service]
+            points = [(seconds(o.t_ns), float(len(lanes) - 1)) for o in some]
+            texts = [f"{name} {o.number} of the {o.sender}: {dict(o.value)}" for o in some]
+            if some:
+                rows.append(series(name, points, look=Look.DOTS, tone=tone, texts=texts))
+
+
+def _faults(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
+    faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    limits = trace.marks("limit")
+    if not faults and not limits:
+        return
+    lanes.append("faults")
+    said = [(seconds(f.t_ns), fault_sentence(f)) for f in faults] + [(seconds(m.t_ns), m.detail) for m in limits]
+    points = [(t, float(len(lanes) - 1)) for t, _ in said]
+    rows.append(series("fault", points, look=Look.DOTS, tone=Tone.BAD, texts=[text for _, text in said]))
+
+
+def _about(trace: Trace, processes: Sequence[str]) -> str:
+    parts = []
+    for process in processes:
+        records = [r for r in trace.records(process) if r.t_ns <= trace.stop_ns]
+        said = f"{process}: {counted(len(records), 'log record')}"
+        lines = printed_lines(trace, process)
+        parts.append(f"{said}, {counted(len(lines), 'printed line')}" if lines else said)
+    faults = [quote(fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    parts.append(f"faults: {'; '.join(faults[:3])}" if faults else "no fault")
+    return f"{'; '.join(parts)}; observed for {seconds(trace.stop_ns):.1f} s."

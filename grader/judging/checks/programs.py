@@ -1,0 +1,394 @@
+"""Checks on a program itself: its parameters, how it ends, and what its text uses."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding, Location
+from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.trace import FaultKind, Message, Trace
+from grader.judging.findings import (
+    explain_no_message,
+    fault_hint,
+    fault_sentence,
+    faulted,
+    faults_before_stop,
+    first_fault,
+    met,
+    not_met,
+)
+from grader.judging.service_calls import LATENESS_NS, Got, Set, asked_for, got, settings
+from grader.judging.source import Source, read, subtree
+from grader.judging.values import FieldRule, as_number, published, shown, value_at
+from grader.judging.wording import counted, listed, moment, number, quote, span
+
+_DECLARE_HINT = "declare it where the node is created: self.declare_parameter('{name}', ...)"
+_READ_HINT = "read the parameter each time it is used, self.get_parameter('{name}').value, or react to its change"
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterDeclared:
+    """A student's node has a parameter, with the value and of the type named; read before anybody sets it.
+
+    The scenario has to ask for it: `parameter` without `set`.
+
+    Attributes:
+        name: Name of the parameter.
+        node: Fully qualified name of the node; the one that was asked if left out.
+        value: Default value expected; free if left out.
+        tolerance: Largest difference from a number expected.
+        type: Type expected; a whole and a fractional number are alike if left out.
+    """
+
+    name: str
+    node: str | None = None
+    value: str | float | bool | None = None
+    tolerance: float = 1e-9
+    type: Literal["bool", "integer", "double", "string"] | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        kind = f" of type {self.type}" if self.type else ""
+        value = "" if self.value is None else f", by default {shown(self.value)}"
+        return f"the parameter {self.name}{kind}{value}"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if the first answer to the question for it fits."""
+        calls = asked_for(trace, self.name, self.node)
+        answers = [found for call in calls if (found := got(call, self.name)) is not None]
+        if not answers:
+            return _unanswered(trace, self.name, self.node, asked=bool(calls))
+        found = min(answers, key=lambda a: a.t_ns)
+        evidence = {"node": found.node, "name": self.name, "type": found.type, "value": found.value}
+        if not found.type:
+            reason = f"{quote(found.node)}: has no parameter {self.name}, expected {self.expected}"
+            return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name))
+        flaw = self._flaw(found)
+        said = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
+        return not_met(f"{said}, expected {flaw}", evidence) if flaw else met(said, evidence)
+
+    def _flaw(self, found: Got) -> str:
+        if self.type not in (None, found.type):
+            return f"type {self.type}"
+        if self.value is None or FieldRule(equals=self.value, tolerance=self.tolerance).allows(found.value):
+            return ""
+        return shown(self.value)
+
+
+def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Finding:
+    """Return no credit and why nobody told a parameter.
+
+    Raises:
+        HarnessError: Nobody asked a node that was there.
+    """
+    fault = first_fault(trace)
+    if fault is not None:
+        return faulted(fault, f"the parameter {name} could not be asked for")
+    nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
+    if node is not None and node not in nodes:
+        reason = f"{node}: not in the ROS graph, so it was not asked for {name}; found {listed(nodes) or 'no node'}"
+        return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name")
+    if asked:
+        who = node or "the node"
+        return not_met(f"{who}: no answer to the question for {name}", hint="spin the node: rclpy.spin(node)")
+    raise HarnessError(f"the recording does not ask for the parameter {name}")
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterTakesEffect:
+    """After a parameter was set, what the node publishes follows it: a field, a rate or a period.
+
+    The scenario has to set it: `parameter` with `set`. Each value that was set is looked at from the time allowed up to
+    the next one, and a value that the node refuses is a mistake.
+
+    Attributes:
+        name: Name of the parameter.
+        topic: Topic on which the effect shows.
+        effect: `field`: the field equals the value; `rate`: messages come at that many hertz; `period`: one comes in
+            that many seconds.
+        field: Path of the field.
+        tolerance: Largest difference; of a field in its unit, of a rate or period as a share of it.
+        within: How soon the effect must show.
+        node: Fully qualified name of the node; the one whose parameter was set if left out.
+    """
+
+    name: str
+    topic: str
+    effect: Literal["field", "rate", "period"] = "field"
+    field: str = "data"
+    tolerance: float = 0.05
+    within: DurationNs = NS_PER_S
+    node: str | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        what = self.field if self.effect == "field" else f"the {self.effect}"
+        return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if every value set took effect; the reason names the first that did not."""
+        tries = settings(trace, self.name, self.node)
+        if not any(s.answered for s in tries):
+            return _unanswered(trace, self.name, self.node, asked=bool(tries))
+        messages = published(trace, self.topic)
+        if not messages:
+            return explain_no_message(trace, self.topic)
+        stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
+        evidence: dict[str, Any] = {"set": [[seconds(s.t_ns), s.value, s.taken] for s in tries]}
+        for one, stop_ns in zip(tries, stops, strict=True):
+            flaw, hint = self._flaw(one, stop_ns, messages)
+            if flaw:
+                fault = first_fault(trace)
+                reason = f"{moment(one.t_ns)}, {self.name} = {shown(one.value)}: {flaw}"
+                if fault is not None and fault.t_ns <= stop_ns:
+                    return faulted(fault, reason, evidence, last=True)
+                return not_met(reason, evidence, hint=hint)
+        values = ", ".join(shown(s.value) for s in tries)
+        return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
+
+    def _flaw(self, one: Set, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
+        """Return what is wrong after one value was set, and a hint; empty if nothing is."""
+        if not one.answered:
+            return "no answer", "spin the node: rclpy.spin(node)"
+        if not one.taken:
+            return f"refused{': ' + quote(one.why, 80) if one.why else ''}", _DECLARE_HINT.format(name=self.name)
+        start_ns = one.t_ns + self.within
+        if start_ns >= stop_ns:
+            raise HarnessError(f"{self.name}: the next value, or the end, comes before the effect has to show")
+        after = [m for m in messages if start_ns <= m.t_ns < stop_ns]
+        hint = _READ_HINT.format(name=self.name)
+        if self.effect == "field":
+            return self._field_flaw(one, after), hint
+        return self._pace_flaw(one, after), hint
+
+    def _field_flaw(self, one: Set, after: Sequence[Message]) -> str:
+        if not after:
+            return f"no message on {self.topic} afterwards"
+        if isinstance(one.value, (list, tuple)):
+            rule = FieldRule(items=tuple(one.value), tolerance=self.tolerance)
+        else:
+            rule = FieldRule(equals=one.value, tolerance=self.tolerance)
+        wrong = next((m for m in after if not rule.allows(_held(m, self.field))), None)
+        if wrong is None:
+            return ""
+        return f"{self.field} is {shown(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
+
+    def _pace_flaw(self, one: Set, after: Sequence[Message]) -> str:
+        wanted = as_number(one.value)
+        if wanted is None or not wanted > 0:
+            raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")
+        rate = wanted if self.effect == "rate" else 1 / wanted
+        if len(after) < 3:
+            return f"{len(after)} messages on {self.topic} afterwards, expected {number(rate)} Hz"
+        measured = (len(after) - 1) / seconds(max(1, after[-1].t_ns - after[0].t_ns))
+        if within(measured, rate, self.tolerance * rate):
+            return ""
+        return f"{measured:.3f} Hz on {self.topic} afterwards, expected {number(rate)} Hz"
+
+
+def _held(message: Message, path: str) -> Any:
+    return value_at(message.value, path)
+
+
+_SHUTDOWN_HINT = "end on Ctrl-C: except KeyboardInterrupt: pass, then destroy the node and rclpy.try_shutdown()"
+
+
+@dataclass(frozen=True, slots=True)
+class NoFault:
+    """A process, or every one, lives through the recording: no exception, no early end, no hanging.
+
+    What happens after the stop signal is not asked about.
+
+    Attributes:
+        process: File name of the student process; all of them if left out.
+    """
+
+    process: str | None = None
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{self.process or 'every process'} runs to the end without an exception"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if there is no fault; the reason names the first."""
+        faults = faults_before_stop(trace, self.process)
+        if not faults:
+            return met(f"{self.process or 'every process'}: no fault in {span(trace.stop_ns)}", {"faults": 0})
+        first = first_fault(trace, self.process) or faults[0]
+        reason = f"{moment(first.t_ns)}: {fault_sentence(first)}"
+        more = f"; {counted(len(faults), 'fault')} in all" if len(faults) > 1 else ""
+        return not_met(reason + more, {"faults": len(faults)}, hint=fault_hint(first), fault=first)
+
+
+@dataclass(frozen=True, slots=True)
+class CleanShutdown:
+    """A process that is stopped with Ctrl-C (SIGINT) ends soon: with code 0 or by that very signal, by no other error.
+
+    The scenario has to stop it: `shutdown` in the rubric.
+
+    Attributes:
+        process: File name of the student process.
+        within: How long it may take.
+    """
+
+    process: str
+    within: DurationNs = 2 * NS_PER_S
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if it ended in time; the reason says what happened instead."""
+        signals = trace.marks("stop_signal", self.process)
+        faults = trace.faults(self.process)
+        if not signals:
+            if faults:
+                first = min(faults, key=lambda f: f.t_ns)
+                reason = f"{fault_sentence(first)}; it could not be stopped any more"
+                return not_met(reason, hint=fault_hint(first), fault=first)
+            ended = trace.marks("exited", self.process)
+            if ended:
+                return not_met(f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped")
+            raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so nobody stopped it")
+        asked_ns = signals[0].t_ns
+        stopped = [m for m in trace.marks("stopped", self.process) if m.t_ns >= asked_ns]
+        after = [f for f in faults if f.t_ns >= asked_ns]
+        if stopped and not after:
+            took = stopped[0].t_ns - asked_ns
+            reason = f"{self.process}: ended {seconds(took):.3f} s after Ctrl-C"
+            if took <= self.within + LATENESS_NS[trace.clock]:
+                return met(reason, {"took_s": seconds(took)})
+            return not_met(f"{reason}, expected within {number(seconds(self.within))} s", {"took_s": seconds(took)})
+        if after:
+            reason = f"{moment(after[0].t_ns)}, after Ctrl-C: {fault_sentence(after[0])}"
+            hint = "" if after[0].kind is FaultKind.EXCEPTION else _SHUTDOWN_HINT
+            return not_met(reason, hint=hint, fault=after[0])
+        reason = f"{self.process}: still running {span(self.within)} after Ctrl-C at {moment(asked_ns)}"
+        return not_met(reason, {"asked_s": seconds(asked_ns)}, hint=_SHUTDOWN_HINT)
+
+
+@dataclass(frozen=True, slots=True)
+class SourceUses:
+    """A student's file holds what is named: a class that derives from another, and calls of functions or methods.
+
+    It is read, not run: imports under other names are followed, and whether a line is ever reached is not asked.
+
+    Attributes:
+        process: File name of the student process.
+        derives_from: Classes of which one has to be a base, e.g. `rclpy.node.Node`; none if left out.
+        calls: What has to be called, each of them: a whole name such as `rclpy.spin`, or the name of a method such as
+            `create_timer`.
+    """
+
+    process: str
+    derives_from: tuple[str, ...] = ()
+    calls: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        parts = [f"a class that derives from {' or '.join(self.derives_from)}"] if self.derives_from else []
+        return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
+
+    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
+        """Raise: the recording alone does not hold the file."""
+        raise HarnessError(f"{self.process}: its text was not kept")
+
+    def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
+        """Return full credit if everything is there; the reason names what is not."""
+        source = _source(trace, sources, self.process)
+        if isinstance(source, Finding):
+            return source
+        classes = source.deriving(*self.derives_from) if self.derives_from else []
+        found = {name: source.calling(name) for name in self.calls}
+        evidence: dict[str, Any] = {
+            "classes": [c.name for c in classes][:20],
+            "calls": {name: [c.lineno for c in calls][:20] for name, calls in found.items()},
+        }
+        missing = [f"a call of {name}" for name, calls in found.items() if not calls]
+        if self.derives_from and not classes:
+            missing.insert(0, f"a class that derives from {' or '.join(self.derives_from)}")
+        if missing:
+            return not_met(f"{self.process}: expected {' and '.join(missing)}, found none", evidence)
+        told = [f"class {quote(c.name, 40)} in line {c.lineno}" for c in classes[:1]]
+        told += [f"{name} in line {calls[0].lineno}" for name, calls in found.items()]
+        return met(f"{self.process}: {', '.join(told) or 'nothing was asked'}", evidence)
+
+
+@dataclass(frozen=True, slots=True)
+class SourceAvoids:
+    """A file does not call what is named, anywhere or in callbacks, and writes to no global variable if that is asked.
+
+    It is read, not run: imports under other names are followed. A callback is what is handed to a timer, subscription,
+    service, action or future, with every function of the file that it calls.
+
+    Attributes:
+        process: File name of the student process.
+        calls: What must not be called: a whole name such as `time.sleep`, or the name of a method such as `sleep`.
+        where: `anywhere`, or `callbacks` only.
+        globals: Whether `global` must not be written either.
+    """
+
+    process: str
+    calls: tuple[str, ...] = ()
+    where: Literal["anywhere", "callbacks"] = "anywhere"
+    globals: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        parts = [f"no call of {name}" for name in self.calls] + ["no global"] * self.globals
+        return f"in {self.process}{' in callbacks' if self.where == 'callbacks' else ''} {' and '.join(parts)}"
+
+    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
+        """Raise: the recording alone does not hold the file."""
+        raise HarnessError(f"{self.process}: its text was not kept")
+
+    def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
+        """Return full credit if nothing of it is there; the reason names the first place."""
+        source = _source(trace, sources, self.process)
+        if isinstance(source, Finding):
+            return source
+        found = self._found(source)
+        evidence = {"found": [[name, line] for line, name in found][:20]}
+        if not found:
+            return met(f"{self.process}: {self.expected.partition(' ')[2].partition(' ')[2]}", evidence)
+        line, name = found[0]
+        inside = " in a callback" if self.where == "callbacks" else ""
+        reason = f"{self.process}:{line}: {name}{inside}, expected none; {counted(len(found), 'place')}"
+        hint = "a callback must return at once: use a timer instead of waiting" if "sleep" in name and inside else ""
+        return replace(not_met(reason, evidence, hint=hint), location=Location(self.process, line))
+
+    def _found(self, source: Source) -> list[tuple[int, str]]:
+        inside = {id(n) for f in source.called_back() for n in subtree(f)} if self.where == "callbacks" else None
+        calls = [(c, name) for name in self.calls for c in source.calling(name)]
+        places: Sequence[tuple[ast.stmt | ast.expr, str]] = calls
+        if self.globals:
+            places = [*calls, *((g, f"global {', '.join(g.names)[:60]}") for g in source.all(ast.Global))]
+        return sorted({(n.lineno, name) for n, name in places if inside is None or id(n) in inside})
+
+
+def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | Finding:
+    """Return a file with its names resolved, or no credit and why it cannot be read.
+
+    Raises:
+        HarnessError: It is not there, or too long to be read.
+    """
+    if process not in sources:
+        raise HarnessError(f"{process}: its text was not kept; there are {listed(sorted(sources)) or 'no texts'}")
+    source = read(process, sources[process])
+    if source.tree is not None:
+        return source
+    fault = first_fault(trace, process)
+    if fault is not None and fault.kind is FaultKind.SYNTAX_ERROR:
+        return faulted(fault, "the file cannot be read")
+    raise HarnessError(f"{process}: cannot be read as Python, or is too long")

@@ -1,0 +1,378 @@
+"""Checks on a node that logs what it receives: each number, or each message converted into one unit or several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from grader.core.chart import Chart, Look, Panel, Tone
+from grader.core.errors import HarnessError
+from grader.core.exercise import Finding
+from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.core.trace import Endpoint, Trace
+from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart, written_in_lane
+from grader.judging.checks.logs import LOGGER_HINT
+from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
+from grader.judging.output import (
+    Heard,
+    Output,
+    Sought,
+    crowd,
+    followed,
+    in_window,
+    numbers_in,
+    printed_lines,
+    shows_about,
+    standing,
+    student_records,
+    times,
+    wrong_conversion,
+)
+from grader.judging.texts import Printed
+from grader.judging.values import (
+    JITTER_NS,
+    Held,
+    carries_number,
+    delivered_numbers,
+    heard_from_ns,
+    held,
+    number_at,
+    student_endpoints,
+)
+from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
+
+#: How long after a message its log may come, where there are as many numbers as it takes.
+_LATE_NS = NS_PER_S
+#: A number tells something if its last digit is at most this share of the largest value.
+_FINE = 0.1
+_Logged = Callable[[Sequence[Output], Sequence[Sought]], frozenset[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Received:
+    """One message: its time, the time until which its log is its own, and its number."""
+
+    t_ns: int
+    stop_ns: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class LogsValues:
+    """A process logs what it receives: for each message all of its converted numbers, in one record or in several.
+
+    Numbers count to the precision printed, with their sign; a conversion may use a constant such as 3.14159. A number
+    whose last digit is more than a tenth of the largest value tells nothing, and neither does one that stands among so
+    many others that chance explains it. A log may come up to a second late, if
+    none is left out. Numbers that are printed instead are half of it.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that the messages are published on.
+        field: Path of the number.
+        unit_factors: What the number is multiplied by; all of the products must be logged.
+        share: Share of the messages that must be logged.
+    """
+
+    process: str
+    topic: str
+    field: str = "data"
+    unit_factors: tuple[float, ...] = (1.0,)
+    share: float = 1.0
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        products = " and ".join(map(times, self.unit_factors))
+        return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if enough messages are in log records, half if printed lines are needed."""
+        fault = first_fault(trace, self.process)
+        subscribed = student_endpoints(trace, "subscription", self.topic)
+        if not subscribed and fault is None:
+            return explain_no_subscription(trace, self.topic)
+        received = self._received(trace)
+        if not received:
+            return _nothing(trace, self.process, f"{self.topic}: no number {self.field} was published on it")
+        return self._judged(trace, received)
+
+    def _judged(self, trace: Trace, received: Sequence[_Received]) -> Finding:
+        fault = first_fault(trace, self.process)
+        records = student_records(trace, self.process)
+        unlogged = self._unlogged(received, records)
+        evidence = self._evidence(received, unlogged)
+        if self._enough(received, unlogged):
+            return met(f"{self._said(received, unlogged)} logged{self._example(received, records)}", evidence)
+        lines = printed_lines(trace, self.process)
+        if self._enough(received, self._unlogged(received, sorted([*records, *lines], key=lambda o: o.t_ns))):
+            return partly(f"{self._said(received, ())} printed, not all of them logged", evidence, hint=LOGGER_HINT)
+        absent = self._unlogged(received, records, standing)
+        hidden = self._enough(received, absent)
+        if fault is not None:
+            lost = f"{len(unlogged if hidden else absent)} of {len(received)} messages of {self.topic} were not logged"
+            return faulted(fault, lost, evidence)
+        if hidden:
+            first = unlogged[0]
+            among = crowd(records, self._sought([first], [first.stop_ns])[0])
+            share = f"{len(unlogged)} of {counted(len(received), 'message')}"
+            return _hidden(self, share, (first.value, first.t_ns), among, evidence)
+        outputs = records if any(numbers_in(r.text) for r in records) else lines
+        return self._explain(received, absent, outputs, self._evidence(received, absent))
+
+    def _received(self, trace: Trace) -> list[_Received]:
+        jitter_ns = JITTER_NS[trace.clock]
+        from_ns = heard_from_ns(trace, self.topic)
+        sent = [d for d in trace.deliveries(self.topic) if from_ns <= d.t_ns < trace.stop_ns - jitter_ns]
+        stops = [*(d.t_ns + jitter_ns for d in sent), trace.stop_ns][1:]
+        pairs = [(d, stop, number_at(d.value, self.field)) for d, stop in zip(sent, stops, strict=True)]
+        return [_Received(d.t_ns - jitter_ns, stop, value) for d, stop, value in pairs if value is not None]
+
+    def _enough(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> bool:
+        return len(received) - len(unlogged) >= self.share * len(received) - 1e-9
+
+    def _unlogged(
+        self, received: Sequence[_Received], outputs: Sequence[Output], logged: _Logged = followed
+    ) -> list[_Received]:
+        punctual = self._unshown(received, [r.stop_ns for r in received], outputs, logged)
+        written = sum(len(numbers_in(o.text)) for o in outputs if o.t_ns >= received[0].t_ns)
+        if not punctual or written < self.share * len(received) * len(self.unit_factors):
+            return punctual
+        late = self._unshown(received, [r.t_ns + _LATE_NS for r in received], outputs, logged)
+        return [r for r in punctual if r in late]
+
+    def _unshown(
+        self, received: Sequence[_Received], stops_ns: Sequence[int], outputs: Sequence[Output], logged: _Logged
+    ) -> list[_Received]:
+        found = logged(outputs, self._sought(received, stops_ns))
+        many = len(self.unit_factors)
+        return [r for k, r in enumerate(received) if not found >= set(range(k * many, (k + 1) * many))]
+
+    def _sought(self, received: Sequence[_Received], stops_ns: Sequence[int]) -> list[Sought]:
+        """Return what is to be logged: for each message one value a factor."""
+        largest = max(abs(r.value) for r in received)
+        return [
+            Sought(r.t_ns, stop_ns, f * r.value, abs(f) * largest, partial(_shows, f * r.value, abs(f) * largest))
+            for r, stop_ns in zip(received, stops_ns, strict=True)
+            for f in self.unit_factors
+        ]
+
+    def _evidence(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, Any]:
+        return {
+            "messages": len(received),
+            "logged": len(received) - len(unlogged),
+            "factors": list(self.unit_factors),
+            "first_missing": [[seconds(r.t_ns), r.value] for r in unlogged[:10]],
+        }
+
+    def _said(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> str:
+        logged = len(received) - len(unlogged)
+        return f"{self.process}: {logged} of {counted(len(received), 'message')} of {self.topic} are"
+
+    def _example(self, received: Sequence[_Received], outputs: Sequence[Output]) -> str:
+        for one in received:
+            found = in_window(outputs, one.t_ns, one.stop_ns)
+            if found:
+                return f", {number(one.value)} as: {quote(' / '.join(o.text for o in found), 80)}"
+        return ""
+
+    def _explain(
+        self,
+        received: Sequence[_Received],
+        unlogged: Sequence[_Received],
+        outputs: Sequence[Output],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        first = unlogged[0]
+        wanted = " and ".join(number(f * first.value) for f in self.unit_factors)
+        found = in_window(outputs, first.t_ns, first.stop_ns)
+        wrote = f"found {quote(' / '.join(o.text for o in found), 80)}" if found else "found no log"
+        reason = (
+            f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not logged "
+        )
+        reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
+        said, hint = self._cause(received, unlogged, outputs)
+        return not_met(f"{reason}; {said}" if said else reason, evidence, hint=hint)
+
+    def _cause(
+        self, received: Sequence[_Received], unlogged: Sequence[_Received], outputs: Sequence[Output]
+    ) -> tuple[str, str]:
+        silent = [r for r in unlogged if not in_window(outputs, r.t_ns, r.stop_ns)]
+        rule = f"log in the callback of the subscription to {self.topic}, once for each message"
+        if len(silent) == len(received):
+            return "", rule
+        if len(silent) > len(received) / 2:
+            return f"nothing is logged at {len(silent)} of the messages", rule
+        heard = [Heard(r.value, self._numbers(r, outputs)) for r in received]
+        largest = max(abs(r.value) for r in received)
+        right = [f for f in self.unit_factors if self._mostly(heard, f, _FINE * abs(f) * largest)]
+        for factor in (f for f in self.unit_factors if f not in right):
+            said, hint = wrong_conversion(heard, factor, right)
+            if said:
+                return f"{times(factor)}: {said}", hint
+            if right and all(len(h.numbers) <= len(right) for h in heard):
+                return f"{times(factor)} is not there, only {' and '.join(map(times, right))}", ""
+        return "", ""
+
+    def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Any, ...]:
+        return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
+
+    def _mostly(self, heard: Sequence[Heard], factor: float, coarsest: float) -> bool:
+        hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
+        return hits > 0.8 * len(heard)
+
+
+def _shows(value: float, largest: float, printed: Printed) -> bool:
+    return shows_about(printed, value, coarsest=_FINE * largest)
+
+
+#: A value that was there for less than this need not have been logged.
+_SHORTEST_NS = 1_200 * NS_PER_MS
+_PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
+
+
+@dataclass(frozen=True, slots=True)
+class LogsReceived:
+    """A process logs the numbers that are published to it, each at least once while it lasts or up to a second later.
+
+    Numbers count to the precision printed. One that stands among so many others that chance explains it shows nothing:
+    a place in the text must follow the values. Values that are printed instead of logged are half of it.
+
+    Attributes:
+        process: File name of the student process.
+        topic: Topic that the numbers are published on.
+    """
+
+    process: str
+    topic: str
+
+    @property
+    def expected(self) -> str:
+        """What is expected, in one phrase."""
+        return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
+
+    def judge(self, trace: Trace) -> Finding:
+        """Return full credit if every value is in a log record, half if printed lines are needed."""
+        fault = first_fault(trace, self.process)
+        values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
+        subscriptions = student_endpoints(trace, "subscription", self.topic)
+        if not subscriptions and fault is None:
+            return explain_no_subscription(trace, self.topic)
+        if not values or (subscriptions and not any(carries_number(e.type) for e in subscriptions)):
+            return self._no_values(trace, subscriptions)
+        return self._judged(trace, values, subscriptions)
+
+    def _judged(self, trace: Trace, values: Sequence[Held], subscriptions: Sequence[Endpoint]) -> Finding:
+        fault = first_fault(trace, self.process)
+        records = student_records(trace, self.process)
+        sought = self._sought(values, trace)
+        unlogged = _missing(values, followed(records, sought), trace)
+        evidence: dict[str, Any] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+        if not unlogged:
+            reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
+            return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
+        if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
+            reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
+            return partly(reason, evidence, hint=_PRINT_HINT)
+        absent = _missing(values, standing(records, sought), trace)
+        evidence["missing"] = [v.value for v in absent or unlogged]
+        if fault is not None:
+            lost = f"{len(absent or unlogged)} of {len(values)} values of {self.topic} were not logged"
+            return faulted(fault, lost, evidence)
+        if absent:
+            return self._unlogged(subscriptions, values, absent, evidence)
+        among = crowd(records, sought[values.index(unlogged[0])])
+        share = f"{len(unlogged)} of {len(values)} values"
+        return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
+
+    def _no_values(self, trace: Trace, subscriptions: Sequence[Endpoint]) -> Finding:
+        types = [e.type for e in subscriptions]
+        if types and not any(carries_number(t) for t in types):
+            reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
+            return not_met(reason, {"type": types[0]}, hint="use a numeric message type, e.g. std_msgs/msg/Float32")
+        return _nothing(trace, self.process, f"{self.topic}: no number was published on it")
+
+    def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
+        scale = max(abs(v.value) for v in values)
+        stops = [v.stop_ns + (_LATE_NS if v.stop_ns < trace.stop_ns else 1) for v in values]
+        return [
+            Sought(v.start_ns, stop_ns, v.value, scale, partial(_shows_exactly, v.value))
+            for v, stop_ns in zip(values, stops, strict=True)
+        ]
+
+    def _unlogged(
+        self,
+        subscriptions: Sequence[Endpoint],
+        values: Sequence[Held],
+        unlogged: Sequence[Held],
+        evidence: dict[str, Any],
+    ) -> Finding:
+        first = unlogged[0]
+        reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
+        reason += f"the first is {number(first.value)} at {moment(first.start_ns)}"
+        logged = {v.value for v in values} - {v.value for v in unlogged}
+        if logged and logged <= {0.0, 100.0}:
+            reason += "; only 0 and 100 are, so what is logged is not what was received"
+        if all(e.durability == "transient_local" for e in subscriptions):
+            reason += (
+                "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
+            )
+        hint = "log msg.data in the callback of the subscription to " + self.topic
+        return not_met(reason, evidence, hint=hint)
+
+    def chart(self, trace: Trace) -> Chart | None:
+        """Return the numbers given to a node and what it wrote meanwhile, or None if nothing was given."""
+        sent = delivered_numbers(trace, self.topic)
+        if not sent:
+            return None
+        records, lines = student_records(trace, self.process), printed_lines(trace, self.process)
+        lanes = ["logged"] + (["printed"] if lines else [])
+        rows = [written_in_lane("log record", records, 0, Tone.SECOND)]
+        rows += [written_in_lane("printed line", lines, 1, Tone.WARNING)] if lines else []
+        given = series(f"published on {self.topic}", points_of(sent), look=Look.STEP)
+        distinct = list(dict.fromkeys(number(r.value) for r in sent))
+        about = f"{counted(len(sent), 'message')} on {self.topic} ({', '.join(distinct[:8])}); meanwhile "
+        about += f"{counted(len(records), 'log record')} and {counted(len(lines), 'printed line')}."
+        return time_chart(
+            f"received {self.topic}",
+            f"What came on {self.topic} and what was logged",
+            about,
+            (
+                Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,)),
+                Panel("written", "", tuple(rows), lanes=tuple(lanes)),
+            ),
+            happenings(trace),
+        )
+
+
+def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
+    """Return the values that are not logged, but for one that came so late that it need not be."""
+    return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
+
+
+def _shows_exactly(value: float, printed: Printed) -> bool:
+    return printed.shows(value)
+
+
+def _hidden(
+    check: LogsValues | LogsReceived, share: str, first: tuple[float, int], among: str, evidence: dict[str, Any]
+) -> Finding:
+    """Return no credit for numbers that stand among others; `first` is the first of them and its time."""
+    value, t_ns = first
+    reason = f"{check.process}: {share} of {check.topic} are not told from other numbers, the first is {number(value)} "
+    hint = f"log the number that came on {check.topic}, and none that it might have been"
+    return not_met(f"{reason}at {moment(t_ns)}: {among}", evidence, hint=hint)
+
+
+def _nothing(trace: Trace, process: str, problem: str) -> Finding:
+    """Return no credit for a process that ended before anything came.
+
+    Raises:
+        HarnessError: It lived: `problem`.
+    """
+    found = explain_fault(trace, "nothing was logged after it", process=process)
+    if found is None:
+        raise HarnessError(problem)
+    return found

@@ -1,0 +1,211 @@
+"""Causes behind files that Python cannot read, and behind names and modules that are not there."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Sequence
+
+from grader.core.trace import Fault, FaultKind
+from grader.judging.diagnosis.names import MODULES, PACKAGES, PLAIN_MODULES, ROS_1, ROS_1_CALLS, closest, import_of
+from grader.judging.diagnosis.rules import Clue, Crash, crash_rule
+from grader.judging.source import Function, Source, chain, covers, last_name, parameters
+from grader.judging.wording import quote
+
+_PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
+_OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))
+#: What Python says, and what to do; the first that fits counts.
+_SAYINGS: Sequence[tuple[str, str]] = (
+    (r"^TabError", "indent every line with spaces only, four a level: this one mixes tabs and spaces with others"),
+    (r"expected ':'", "a colon is missing at the end of: {code}"),
+    (r"unindent does not match", "the line begins with {indent}: indent it exactly as the other lines of its block"),
+    (r"unexpected indent", "the line begins with {indent}, more than its block: indent it as the line above"),
+    (r"expected an indented block after", "indent what belongs to the line above, or write pass there"),
+    (r"'(.)' was never closed", "a bracket that is opened here is never closed: {code}"),
+    (r"unmatched '(.)'", "there is one closing bracket too many: {code}"),
+    (r"does not match opening parenthesis", "the brackets do not match: {code}"),
+    (
+        r"invalid character '.' \(U\+(2018|2019|201C|201D|00B4|201E)\)",
+        "these are typographic quotation marks; type them again as ' or \"",
+    ),
+    (r"invalid non-printable character", "an invisible character was copied along: type the line again"),
+    (r"unterminated (triple-quoted )?string literal", "the quotation mark at the end of the text is missing: {code}"),
+    (r"Maybe you meant '==' or ':=' instead|Maybe you meant '==' instead", "to compare, write == instead of ="),
+    (r"Perhaps you forgot a comma", "a comma is probably missing in: {code}"),
+    (r"'return' outside function", "return stands outside a function: indent it as the function's other lines"),
+)
+_MESSAGE_ENDINGS = ("_msgs", "_msg", "_interfaces", "_interface", "_srvs", "_srv", "_actions")
+
+
+@crash_rule("", FaultKind.SYNTAX_ERROR, in_file=False)
+def _syntax(crash: Crash) -> Clue | None:
+    fault, row = crash.fault, crash.case.source.line(crash.line)
+    return _python_2(fault, row) or _newer_f_string(fault, row) or _other_language(fault, row) or _said(fault, row)
+
+
+def _python_2(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("call to 'print'"):
+        return None
+    found = _PRINT.match(row[:200])
+    shown = f"print({found['what'].strip()})" if found else "print(...)"
+    return Clue(f"this is Python 2; in Python 3 print is a function: {quote(shown, 70)}", key="python_2")
+
+
+def _newer_f_string(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("f-string") or fault.python is None or fault.python >= (3, 12):
+        return None
+    nested = re.search(r"""[fF](['"])[^'"]*\{[^}'"]*\1""", row[:500])
+    if nested is None:
+        return None
+    other = '"' if nested[1] == "'" else "'"
+    hint = f"Python 3.{fault.python[1]}, which reads the file here, wants other quotation marks inside the braces"
+    return Clue(f"{hint} than around them: {other}")
+
+
+def _other_language(fault: Fault, row: str) -> Clue | None:
+    if not fault.said("invalid syntax"):
+        return None
+    right = next((word for pattern, word in _OPERATORS if re.search(pattern, row[:500])), None)
+    return Clue(f"in Python this is written {right}: {quote(row, 60)}") if right else None
+
+
+def _said(fault: Fault, row: str) -> Clue | None:
+    template = next((template for pattern, template in _SAYINGS if fault.said(pattern)), None)
+    if template is None or ("{code}" in template and not row.strip()):
+        return None
+    return Clue(template.format(code=quote(row, 60), indent=_indent(row)))
+
+
+def _indent(row: str) -> str:
+    blank = row[: len(row) - len(row.lstrip())]
+    tabs, spaces = blank.count("\t"), blank.count(" ")
+    parts = [f"{n} {word}{'s' if n != 1 else ''}" for n, word in ((tabs, "tab"), (spaces, "space")) if n]
+    return " and ".join(parts) or "no space"
+
+
+@crash_rule("encoding|codec can't decode", FaultKind.SYNTAX_ERROR, in_file=False)
+def _encoding(_: Crash) -> Clue | None:
+    return Clue("save the file as UTF-8")
+
+
+@crash_rule("null bytes", FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, in_file=False)
+def _null_bytes(_: Crash) -> Clue | None:
+    return Clue("the file holds bytes that are no text: save it as UTF-8 in a text editor")
+
+
+@crash_rule("^(?:ImportError|ModuleNotFoundError|AttributeError): .*", in_file=False)
+def _hidden_module(crash: Crash) -> Clue | None:
+    """A file of the submission is imported in place of the module that the error names."""
+    case = crash.case
+    hidden = [name for start in case.trace.starts if start.process == case.process for name in start.hidden]
+    words = re.findall(r"'([\w.]+)'", crash.found[0])
+    named = {word.partition(".")[0] for word in words}
+    name = next((name for name in hidden if name.removesuffix(".py") in named), None)
+    if name is None:
+        return None
+    return Clue(f"{name} has the name of a module and is imported in its place: rename it")
+
+
+@crash_rule("^ImportError: attempted relative import with no known parent package", in_file=False)
+def _no_package(crash: Crash) -> Clue | None:
+    written = [n for n in crash.case.source.all(ast.ImportFrom) if n.level and n.lineno == crash.line]
+    advice = "a relative import works in a package only, and this file is in none"
+    if not written or written[0].level > 1:
+        return Clue(f"{advice}: hand in the whole package, with its setup.py and __init__.py")
+    names = ", ".join(a.name + (f" as {a.asname}" if a.asname else "") for a in written[0].names)
+    plain = f"from {written[0].module} import {names}" if written[0].module else f"import {names}"
+    return Clue(f"{advice}: write {plain}, or hand in the whole package, with its setup.py and __init__.py")
+
+
+@crash_rule(r"No module named '([\w.]+)'", in_file=False)
+def _ros_1(crash: Crash) -> Clue | None:
+    module = crash.found[1].split(".")[0]
+    if module not in ROS_1:
+        return None
+    hint = f"{module} belongs to ROS 1; this is ROS 2: use {ROS_1[module]}"
+    if module == "rospy":
+        used = dict.fromkeys(
+            last_name(n) for n in crash.case.source.all(ast.Attribute) if chain(n).startswith("rospy.")
+        )
+        pairs = [f"rospy.{name} becomes {ROS_1_CALLS[name]}" for name in used if name in ROS_1_CALLS]
+        hint += f"; {', '.join(pairs[:3])}" if pairs else ""
+    return Clue(hint)
+
+
+@crash_rule(r"^ModuleNotFoundError: No module named '([\w.]+)'", in_file=False)
+def _missing_module(crash: Crash) -> Clue | None:
+    wanted = crash.found[1][:80]
+    known = [*MODULES, *PACKAGES, *PLAIN_MODULES, "numpy"]
+    near = closest(wanted, known, 0.8)
+    if near and near.count(".") == wanted.count("."):
+        return Clue(f"the module is called {near}, not {wanted}")
+    if wanted.startswith("rclpy."):
+        return (
+            Clue(f"there is no {wanted}; the class Node is in rclpy.node") if wanted.lower() == "rclpy.node" else None
+        )
+    if wanted.endswith(_MESSAGE_ENDINGS) or _gives_messages(crash.case.source, wanted):
+        listed = ", ".join(PACKAGES[:5])
+        return Clue(f"the package {wanted} is not here; use messages of the standard packages: {listed}, ...")
+    if "." in wanted:
+        return None
+    return Clue(f"{wanted} is neither in the submission nor installed here: hand it in, or do without it")
+
+
+def _gives_messages(source: Source, module: str) -> bool:
+    suffixes = tuple(f"{module}.{kind}" for kind in ("msg", "srv", "action"))
+    return any(n.module in suffixes for n in source.all(ast.ImportFrom))
+
+
+@crash_rule(r"^ImportError: cannot import name '(\w+)' from (partially initialized module )?'([\w.]+)'", in_file=False)
+def _cannot_import(crash: Crash) -> Clue | None:
+    name, partially, module = crash.found.groups()
+    if partially:
+        hint = f"the file that Python takes for {module} is not finished when it is asked: two files import each other"
+        return Clue(f"{hint}, or a file of yours has the name of a module")
+    near = closest(name, MODULES.get(module, ()), 0.7)
+    same = [n for n in MODULES.get(module, ()) if n.lower() == name.lower()]
+    if same:
+        return Clue(f"upper and lower case matter: from {module} import {same[0]}")
+    right = import_of(name)
+    if right and not right.startswith(f"from {module} "):
+        return Clue(f"{name} is elsewhere: {right}")
+    return Clue(f"from {module} import {near}, not {name}") if near else None
+
+
+@crash_rule(r"^(?:NameError|UnboundLocalError).*name '(\w+)' is not defined")
+def _undefined_name(crash: Crash) -> Clue | None:
+    name, source = crash.found[1], crash.source
+    inside = [f for f in source.functions() if covers(f, crash.line)]
+    if name == "self":
+        return _no_self(source, inside)
+    methods = [f for f in source.functions(name) if source.is_method(f)]
+    if methods and inside and len(methods) == len(source.functions(name)):
+        return Clue(f"{name} is a method: write self.{name}")
+    if import_of(name):
+        return Clue(f"the import is missing: {import_of(name)}")
+    if inside and source.stores(f"self.{name}"):
+        return Clue(f"{name} belongs to the object: write self.{name}")
+    near = closest(name, _defined(source), 0.8)
+    return Clue(f"{name} is not defined; the file has {near}") if near else None
+
+
+def _no_self(source: Source, inside: list[Function]) -> Clue | None:
+    lacking = next((f for f in reversed(inside) if source.is_method(f) and "self" not in parameters(f)), None)
+    if lacking is None:
+        return None
+    rest = "".join(f", {p}" for p in parameters(lacking))
+    return Clue(f"self is missing: def {lacking.name}(self{rest}):", source.place(lacking))
+
+
+def _defined(source: Source) -> list[str]:
+    names = [n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Store)]
+    names += [f.name for f in source.functions() if not source.is_method(f)]
+    names += [c.name for c in source.all(ast.ClassDef)]
+    names += [a.arg for a in source.all(ast.arg)]
+    return names + [(a.asname or a.name).split(".")[0] for a in source.all(ast.alias)]
+
+
+@crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False)
+def _shadowed_module(crash: Crash) -> Clue | None:
+    hint = f"a file of yours has the name of the module {crash.found[1]} and is imported in its place: rename the file"
+    return Clue(hint)

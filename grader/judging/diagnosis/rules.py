@@ -1,0 +1,258 @@
+"""What a rule of diagnosis is: which cases it may explain, as data, and how it finds hint and place."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from grader.core.exercise import Check, Criterion, Location, Outcome, ProblemKind
+from grader.core.report import Verdict
+from grader.core.trace import Fault, FaultKind, Trace
+from grader.judging.checks.fan import ThresholdResponse
+from grader.judging.checks.rate import TopicRate
+from grader.judging.checks.received import LogsReceived
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.checks.topics import Publishes, Subscribes
+from grader.judging.diagnosis.wiring import made_for
+from grader.judging.source import Source, first_line
+from grader.judging.values import published, student_endpoints
+
+_FRAME = re.compile(r"(?P<file>.*):(?P<line>\d+) in (?P<name>\S+)$")
+#: What stands for a file that is not there: nothing is found in it.
+NO_SOURCE = Source("")
+_ANYTHING = re.compile("")
+Given = TypeVar("Given")
+
+
+@dataclass(frozen=True, slots=True)
+class Clue:
+    """What is very likely the cause.
+
+    Attributes:
+        hint: One thing to do, in terms of the student's own code.
+        location: The line to look at; None leaves the one that the check gave.
+        key: What makes it the same cause as another clue; by default the rule and the location.
+    """
+
+    hint: str
+    location: Location | None = None
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One verdict that lost points, with all that may explain it.
+
+    Attributes:
+        criterion: What was asked.
+        verdict: What it came to.
+        trace: What was recorded.
+        sources: Wanted file name -> source, for the files of the scenario that were handed in.
+        fault: The fault that the verdict rests on, if it rests on one.
+        siblings: The checks of the exercise's other criteria.
+    """
+
+    criterion: Criterion
+    verdict: Verdict
+    trace: Trace
+    sources: Mapping[str, Source]
+    fault: Fault | None = None
+    siblings: tuple[Check, ...] = ()
+
+    @property
+    def check(self) -> Any:
+        """The check that was not met: one of those that the rule names."""
+        return self.criterion.check
+
+    @property
+    def process(self) -> str:
+        """The one file that the question is about; empty if it is about several."""
+        named = str(getattr(self.check, "process", ""))
+        if self.fault is not None:
+            return self.fault.process
+        return named or (next(iter(self.sources)) if len(self.sources) == 1 else "")
+
+    @property
+    def source(self) -> Source:
+        """The source of the one file that the question is about; an empty one if there is none."""
+        return self.sources.get(self.process, NO_SOURCE)
+
+    def is_about(self, kind: ProblemKind) -> bool:
+        """Return whether the check found a problem of a kind."""
+        return self.verdict.problem is not None and self.verdict.problem.kind is kind
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics that the problem is about."""
+        return self.verdict.problem.topics if self.verdict.problem is not None else ()
+
+    def evidence(self, key: str) -> object:
+        """Return a piece of the verdict's evidence, None if there is none of that name."""
+        return self.verdict.evidence.get(key)
+
+
+@dataclass(frozen=True, slots=True)
+class Crash:
+    """A fault that a verdict rests on, as a rule asked for it.
+
+    Attributes:
+        case: The verdict.
+        fault: The fault.
+        source: The file that it arose in; an empty one if that was not handed in.
+        found: How its text matches the rule's pattern.
+    """
+
+    case: Case
+    fault: Fault
+    source: Source
+    found: re.Match[str]
+
+    @property
+    def line(self) -> int:
+        """The line that it arose in."""
+        return self.fault.line
+
+    def said(self, pattern: str) -> re.Match[str] | None:
+        """Return how an exception's text matches a pattern."""
+        return self.fault.said(pattern) if self.fault.kind is FaultKind.EXCEPTION else None
+
+    def frames(self) -> list[tuple[int, str]]:
+        """Return line and function of the fault's frames in its own file, outermost first."""
+        matches = (_FRAME.match(frame) for frame in self.fault.frames)
+        return [(int(m["line"]), m["name"]) for m in matches if m and m["file"] == self.fault.file]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A mistake that people make.
+
+    Attributes:
+        id: Unique, for evidence and tests: the name of its function.
+        find: Returns the clue if this is very likely what happened, else None; asked only if all of the rest applies.
+        checks: Checks that it explains; any if empty.
+        problem: Problem that the check must have found; any or none if None.
+        outcome: Outcome that it explains; any if None.
+        fault: Whether the verdict must rest on a fault (True) or on none (False); either if None.
+    """
+
+    id: str
+    find: Callable[[Case], Clue | None]
+    checks: tuple[type, ...] = ()
+    problem: ProblemKind | None = None
+    outcome: Outcome | None = None
+    fault: bool | None = False
+
+    def clue(self, case: Case) -> Clue | None:
+        """Return what the rule has to say about a case; None if it does not apply."""
+        applies = (
+            (not self.checks or isinstance(case.check, self.checks))
+            and self.fault in (None, case.fault is not None)
+            and self.outcome in (None, case.verdict.outcome)
+            and (self.problem is None or case.is_about(self.problem))
+        )
+        return self.find(case) if applies else None
+
+
+Maker = Callable[[Callable[[Given], Clue | None]], Rule]
+
+
+def _case(case: Case) -> Case:
+    return case
+
+
+def rule(
+    *checks: type,
+    problem: ProblemKind | None = None,
+    outcome: Outcome | None = None,
+    fault: bool | None = False,
+    given: Callable[[Case], Given | None] = _case,  # type: ignore[assignment]
+) -> Maker[Given]:
+    """Make a rule of a function; the arguments are those of `Rule`.
+
+    Args:
+        checks: Checks that it explains; any if there are none.
+        problem: Problem that the check must have found.
+        outcome: Outcome that it explains.
+        fault: Whether the verdict must rest on a fault, or on none; None for either.
+        given: What the function is given: the case, or what this makes of it. The rule does not apply if that is None.
+    """
+
+    def make(find: Callable[[Given], Clue | None]) -> Rule:
+        def found(case: Case) -> Clue | None:
+            known = given(case)
+            return None if known is None else find(known)
+
+        return Rule(find.__name__.removeprefix("_"), found, checks, problem, outcome, fault)
+
+    return make
+
+
+def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
+    """Make a rule of a function that explains a fault.
+
+    Args:
+        text: Pattern that is found in what the fault says.
+        kinds: Kinds of faults that are meant; exceptions if there are none.
+        in_file: Whether it must have arisen in a file that was handed in.
+    """
+    return rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
+
+
+def _crash(text: str, kinds: tuple[FaultKind, ...], in_file: bool, case: Case) -> Crash | None:  # noqa: FBT001
+    fault, source = case.fault, case.source
+    if fault is None or fault.kind not in kinds:
+        return None
+    found = fault.said(text) if text else _ANYTHING.match("")
+    if fault.file not in ("", source.file):
+        source = NO_SOURCE
+    return None if found is None or (in_file and source is NO_SOURCE) else Crash(case, fault, source, found)
+
+
+def lines_of(node: ast.AST, *others: ast.AST) -> str:
+    """Return `line 7`, or `lines 7 and 9`, for text."""
+    numbers = sorted({first_line(n) for n in (node, *others)})
+    if len(numbers) == 1:
+        return f"line {numbers[0]}"
+    return f"lines {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
+
+
+def silent_topic(case: Case) -> str:
+    """Return the topic on which messages were asked for and none came; empty if that is not the matter."""
+    check = case.check
+    if isinstance(check, (Publishes, TopicRate)):
+        asked = [check.topic]
+    elif isinstance(check, ThresholdResponse):
+        asked = [check.output]
+    else:
+        asked = [check.input, check.output] if isinstance(check, AnswersTogether) else []
+    type_ = check.type if isinstance(check, Publishes) else None
+    silent = (t for t in asked if not any(type_ in (None, m.type) for m in published(case.trace, t)))
+    return next(silent, "")
+
+
+def unheard_topic(case: Case) -> str:
+    """Return the topic to which nothing fitting subscribes; empty if that is not the matter."""
+    check = case.check
+    if isinstance(check, ThresholdResponse):
+        topic = check.input if silent_topic(case) else ""
+    elif isinstance(check, AnswersTogether):
+        topic = check.input if silent_topic(case) == check.output else ""
+    else:
+        topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else ""
+    type_ = check.type if isinstance(check, Subscribes) else None
+    there = [e for e in student_endpoints(case.trace, "subscription", topic) if type_ in (None, e.type)]
+    return "" if there else topic
+
+
+def file_for(case: Case, kind: str, topic: str) -> Source:
+    """Return the file that is to make an endpoint: the only one, or the only one without the topic's other end."""
+    if case.process in case.sources:
+        return case.source
+    other = "subscription" if kind == "publisher" else "publisher"
+    files = list(case.sources.values())
+    chosen = files if len(files) == 1 else [s for s in files if made_for(s, other, topic) is None]
+    return chosen[0] if len(chosen) == 1 else NO_SOURCE

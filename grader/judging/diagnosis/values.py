@@ -1,0 +1,439 @@
+"""Causes behind wrong numbers in messages: fields, formulas and what is drawn at random."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from grader.core.exercise import ProblemKind
+from grader.core.trace import Message
+from grader.judging.checks.fields import FieldFunction, RandomInRange
+from grader.judging.checks.together import AnswersTogether
+from grader.judging.checks.topics import FieldValues
+from grader.judging.diagnosis.rules import Case, Clue, rule
+from grader.judging.diagnosis.wiring import Constant, constant, given_leaf, made, made_for, number_at, reached, roots
+from grader.judging.source import Source, chain, first_line, last_name
+from grader.judging.values import field, leaves, published, published_numbers
+from grader.judging.wording import moment, number
+
+_DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
+_DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
+_DRAWS += ("urandom", "getrandom", "randbytes", "token_bytes", "getrandbits", "randbits", "standard_normal")
+#: How deep an expression around a draw is followed.
+_DEEPEST = 12
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """One place that gives a field a value: the whole of it, the value, and the number where the text tells it."""
+
+    node: ast.AST
+    value: ast.expr
+    worth: Constant | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Wrong:
+    """The first message that differs, and its wrong fields with what is in them."""
+
+    case: Case
+    source: Source
+    message: Message
+    wanted: Mapping[str, float]
+    found: Mapping[str, float]
+
+
+def _wrong(case: Case) -> _Wrong | None:
+    check: FieldValues = case.check
+    for message in published(case.trace, check.topic):
+        got = {path: field(message.value, path) for path in check.values}
+        wrong = {p: g for p, g in got.items() if g is not None and not _is(g, check.values[p])}
+        if wrong:
+            return _Wrong(case, case.source, message, check.values, wrong)
+    return None
+
+
+def _is(got: float, want: float) -> bool:
+    return math.isclose(got, want, rel_tol=1e-6, abs_tol=1e-6)
+
+
+def _given_values(source: Source, path: str) -> list[_Given]:
+    """Return the places that give a field such as `linear.x` a value, assignments and keyword arguments."""
+    group, _, leaf = path.partition(".")
+    pairs = (p for s in source.all(ast.Assign) for p in _assigned(s))
+    found = [_Given(s, v, constant(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
+    for call in source.all(ast.Call):
+        around = source.parents.get(call)
+        outer = around.arg if isinstance(around, ast.keyword) else ""
+        whole = isinstance(around, ast.Assign) and any(chain(t).endswith(f".{group}") for t in around.targets)
+        own = [k for k in call.keywords if k.arg == leaf and (outer == group or whole)]
+        found += [_Given(k, k.value, constant(source, k.value)) for k in own]
+    return sorted(found, key=lambda g: first_line(g.node))
+
+
+def _assigned(statement: ast.Assign) -> Iterator[tuple[ast.Assign, ast.expr, ast.expr]]:
+    """Yield statement, target and value of an assignment; those of `a, b = 1, 2` one by one."""
+    for target in statement.targets:
+        value = statement.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+            yield from ((statement, t, v) for t, v in zip(target.elts, value.elts, strict=True))
+        else:
+            yield statement, target, value
+
+
+def _place_of(got: _Given) -> ast.AST:
+    """Return the node to point at: where the number is written down, if it has a name of its own."""
+    named = got.worth is not None and isinstance(got.value, (ast.Name, ast.Attribute))
+    return got.worth.origin if named and got.worth is not None else got.node
+
+
+def _first_values(case: Case) -> list[object]:
+    values = case.evidence("first_values")
+    return list(values) if isinstance(values, (list, tuple)) else []
+
+
+def draws(source: Source) -> list[ast.Call]:
+    """Return the calls that draw a number."""
+    return list(source.calls(*_DRAWS))
+
+
+@rule(FieldValues, given=_wrong)
+def _misplaced_field(wrong: _Wrong) -> Clue | None:
+    """The right numbers stand in the wrong fields."""
+    numbers = leaves(wrong.message.value)
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        there = [
+            p for p, v in numbers.items() if p != path and _is(v, want) and not _is(wrong.wanted.get(p, 0.0), want)
+        ]
+        if _is(want, 0.0) or len(there) != 1:
+            continue
+        places = [g for g in _given_values(wrong.source, there[0]) if g.worth is None or _is(g.worth.value, want)]
+        mine = [g for g in _given_values(wrong.source, path) if g.worth is None or _is(g.worth.value, value)]
+        # a number that is both here and elsewhere was exchanged; else it went astray
+        chosen = mine if mine and not _is(value, 0.0) else places
+        if len(chosen) != 1:
+            continue
+        if chosen is mine and numbers.get(there[0]) is not None and _exchanged(wrong.case, path, there[0], value):
+            hint = f"{path} and {there[0]} are exchanged: {wrong.source.code(chosen[0].node)} must get {number(want)}"
+            return Clue(hint, wrong.source.place(chosen[0].node), key="exchanged")
+        if chosen is not places:
+            return None
+        hint = f"{wrong.source.code(chosen[0].node)} puts {number(want)} into {there[0]}: it belongs in {path}"
+        return Clue(hint, wrong.source.place(chosen[0].node), key=f"astray:{first_line(chosen[0].node)}")
+    return None
+
+
+def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
+    """Return whether the value found in one field is the one that the exercise wants in the other."""
+    return any(
+        other in check.values and _is(check.values[other], value)
+        for check in case.siblings
+        if isinstance(check, FieldValues) and path not in check.values
+    ) or _is(case.check.values.get(other, math.nan), value)
+
+
+@rule(FieldValues, given=_wrong)
+def _strayed_value(wrong: _Wrong) -> Clue | None:
+    """A field that must be zero holds what the exercise wants in another."""
+    numbers = leaves(wrong.message.value)
+    others = {p: v for check in wrong.case.siblings if isinstance(check, FieldValues) for p, v in check.values.items()}
+    for path, value in wrong.found.items():
+        homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]
+        places = [g for g in _given_values(wrong.source, path) if g.worth is not None and _is(g.worth.value, value)]
+        if _is(wrong.wanted[path], 0.0) and len(homes) == 1 and len(places) == 1:
+            hint = f"{wrong.source.code(places[0].node)} puts {number(value)} into {path}: it belongs in {homes[0]}"
+            return Clue(hint, wrong.source.place(places[0].node), key=f"astray:{first_line(places[0].node)}")
+    return None
+
+
+@rule(FieldValues, given=_wrong)
+def _not_every_message(wrong: _Wrong) -> Clue | None:
+    """The field gets the right number, but not for every message."""
+    source = wrong.source
+    for path, want in wrong.wanted.items():
+        places = _given_values(source, path)
+        if (
+            path not in wrong.found
+            or len(places) != 1
+            or places[0].worth is None
+            or not _is(places[0].worth.value, want)
+        ):
+            continue
+        code = source.code(places[0].node)
+        test = next((n for n in source.around(places[0].node) if isinstance(n, ast.If)), None)
+        sends = list(source.calls("publish"))
+        beyond = any(test not in set(source.around(c)) for c in sends)
+        if test is not None and source.function_of(test) is not None and beyond:
+            hint = f"{code} runs only under 'if {source.code(test.test, 40)}': every message needs it"
+            return Clue(hint, source.place(places[0].node), key=f"sometimes:{first_line(test)}")
+        function = source.function_of(places[0].node)
+        here = [c for c in sends if function is not None and source.function_of(c) is function]
+        if here and all(first_line(c) < first_line(places[0].node) for c in here):
+            hint = f"{code} comes after {source.code(here[0])}: set the fields before the message is sent"
+            return Clue(hint, source.place(places[0].node), key=f"late:{first_line(here[0])}")
+    return None
+
+
+@rule(FieldValues, given=_wrong)
+def _field_never_set(wrong: _Wrong) -> Clue | None:
+    """A field that the exercise asks for is not set at all."""
+    for path, value in wrong.found.items():
+        want = wrong.wanted[path]
+        if _is(want, 0.0) or value != 0.0 or _given_values(wrong.source, path) or _touched(wrong.source, path):
+            continue
+        item = made_for(wrong.source, "publisher", wrong.case.check.topic)
+        makers = list(wrong.source.calls(item.type)) if item is not None and item.type else []
+        if len(makers) == 1:
+            name = _message_name(wrong.source, makers[0])
+            hint = f"{path} is never set and stays 0.0: add {name}.{path} = {number(want)}"
+            return Clue(hint, wrong.source.place(makers[0]))
+    return None
+
+
+def _touched(source: Source, path: str) -> bool:
+    """Return whether the text may set a field in a way that is not followed here."""
+    group, _, leaf = path.partition(".")
+    wholes = any(isinstance(n.ctx, ast.Store) and n.attr == group for n in source.all(ast.Attribute))
+    aliases = any(last_name(s.value) == group for s in source.all(ast.Assign))
+    keywords = any(k.arg in (group, leaf) for k in source.all(ast.keyword))
+    return wholes or aliases or keywords or bool(list(source.calls("setattr", "deepcopy", "copy")))
+
+
+def _message_name(source: Source, call: ast.Call) -> str:
+    statement = source.parents.get(call)
+    targets = statement.targets if isinstance(statement, ast.Assign) else []
+    return (chain(targets[0]) if len(targets) == 1 else "") or "msg"
+
+
+@rule(FieldValues, given=_wrong)
+def _wrong_number(wrong: _Wrong) -> Clue | None:
+    """The one assignment of the field gives another number."""
+    # the field that should hold something first, then the ones that should be zero
+    for path in sorted(wrong.found, key=lambda p: _is(wrong.wanted[p], 0.0)):
+        places = _given_values(wrong.source, path)
+        value, want = wrong.found[path], wrong.wanted[path]
+        known = [g for g in places if g.worth is not None and _is(g.worth.value, value)]
+        if len(known) == 1:
+            return _number_clue(wrong.source, known[0], path, value, want)
+        if len(places) == 1 and places[0].worth is None:
+            hint = f"{wrong.source.code(places[0].node)} gives {number(value)} at {moment(wrong.message.t_ns)}"
+            hint += f": {path} must be {number(want)} in every message"
+            return Clue(hint, wrong.source.place(places[0].node))
+    return None
+
+
+def _number_clue(source: Source, got: _Given, path: str, value: float, want: float) -> Clue:
+    place = _place_of(got)
+    code = source.code(got.node)
+    around = source.parents.get(place)
+    if place is not got.node and isinstance(around, (ast.Assign, ast.AnnAssign)):
+        code = source.code(around)
+    if _is(value, -want):
+        hint = f"{code} has the wrong sign: {path} is {number(want)}"
+    elif "degrees" in source.code(got.value, 200):
+        hint = f"{code} gives degrees: {path} is in rad/s, write {number(want)}"
+    else:
+        hint = f"{code} makes {path} {number(value)}: it must be {number(want)}"
+    return Clue(hint, source.place(place))
+
+
+@rule(FieldFunction)
+def _set_after_publishing(case: Case) -> Clue | None:
+    """The field is place its value after the message has been published."""
+    source, values = case.source, _first_values(case)
+    if len(values) < 2 or any(value != 0 for value in values):
+        return None
+    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
+        function = source.function_of(place)
+        name = _message_of(place)
+        early = [c for c in source.calls("publish") if source.function_of(c) is function and _publishes(c, name)]
+        if function is not None and early and all(first_line(c) < first_line(place) for c in early):
+            hint = f"{source.code(place)} comes after {source.code(early[0])}: set the field first, then publish"
+            return Clue(hint, source.place(place))
+    return None
+
+
+def _message_of(place: ast.AST) -> str:
+    targets = place.targets if isinstance(place, ast.Assign) else []
+    return next((chain(t.value) for t in targets if isinstance(t, ast.Attribute)), "")
+
+
+def _publishes(call: ast.Call, name: str) -> bool:
+    return bool(name) and any(chain(argument) == name for argument in call.args)
+
+
+@rule(FieldFunction)
+def _counter_never_changes(case: Case) -> Clue | None:
+    """What is counted never changes."""
+    values = _first_values(case)
+    if len(values) < 2 or len(set(map(repr, values))) > 1:
+        return None
+    for counter in _counters(case):
+        stores = [s for s in case.source.stores(counter) if _name_of(case.source.function_of(s)) != "__init__"]
+        if not stores:
+            return Clue(f"{counter} never changes: write {counter} += 1 after each message")
+    return None
+
+
+@rule(FieldFunction, problem=ProblemKind.COUNT_START)
+def _count_starts_elsewhere(case: Case) -> Clue | None:
+    """The count starts at another number than 0, or is raised before it is used."""
+    source, problem = case.source, case.verdict.problem
+    start = str(problem.start if problem is not None else None)
+    for counter in _counters(case):
+        for store in source.stores(counter):
+            statement = source.parents.get(store)
+            value = getattr(statement, "value", None)
+            if isinstance(statement, ast.Assign) and isinstance(value, ast.Constant) and str(value.value) == start:
+                hint = f"{source.code(statement)} starts the count at {start}: the first message is n = 0"
+                return Clue(hint, source.place(statement))
+            if isinstance(statement, ast.AugAssign) and start == "1" and _used_later(source, statement, counter):
+                hint = f"{source.code(statement)} comes before the value is computed: count after it"
+                return Clue(hint, source.place(statement))
+    return None
+
+
+def _used_later(source: Source, statement: ast.AST, counter: str) -> bool:
+    function = source.function_of(statement)
+    loads = [n for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load) and chain(n) == counter]
+    lines = [first_line(n) for n in loads if source.function_of(n) is function]
+    return bool(lines) and min(lines) > first_line(statement)
+
+
+def _counters(case: Case) -> Iterator[str]:
+    """Yield the attributes of the node that a field's value is computed from, also by way of one local name."""
+    source = case.source
+    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
+        value = getattr(place, "value", None)
+        if not isinstance(value, ast.expr):
+            continue
+        yield from _attributes(value)
+        for local in [n.id for n in ast.walk(value) if isinstance(n, ast.Name)]:
+            for statement in source.all(ast.Assign):
+                same = source.function_of(statement) is source.function_of(place)
+                if same and any(chain(target) == local for target in statement.targets):
+                    yield from _attributes(statement.value)
+
+
+def _attributes(value: ast.expr) -> Iterator[str]:
+    for node in ast.walk(value):
+        if isinstance(node, ast.Attribute) and chain(node).startswith("self.") and chain(node).count(".") == 1:
+            yield chain(node)
+
+
+def _name_of(function: object) -> str:
+    return str(getattr(function, "name", ""))
+
+
+@rule(RandomInRange)
+def _draw_limits(case: Case) -> Clue | None:
+    """The limits of what is drawn are not those asked for."""
+    source, check = case.source, case.check
+    calls = draws(source)
+    if case.evidence("outside") is None or len(calls) != 1:
+        return None
+    call, low, high = calls[0], number(check.low), number(check.high)
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
+        return Clue(
+            f"{source.code(call)} has no limits, some values lie far out: {right}", source.place(call), key="draw"
+        )
+    limits = [number_at(source, a) for a in call.args]
+    if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
+        if limits == [check.low, check.high]:
+            return None
+        right = right if last_name(call.func) == "uniform" else f"{chain(call.func)}({low}, {high})"
+        return Clue(f"{source.code(call)} draws outside {low} to {high}: {right}", source.place(call), key="draw")
+    return _scaled_draw(source, check, call)
+
+
+def _scaled_draw(source: Source, check: RandomInRange, call: ast.Call) -> Clue | None:
+    """`random.random() * 10`: a draw from 0 to 1 that is stretched to other limits."""
+    whole: ast.AST = call
+    while isinstance(source.parents.get(whole), ast.BinOp):
+        whole = source.parents[whole]
+    ends = [_with(source, whole, call, drawn) for drawn in (0.0, 1.0)]
+    known = [end for end in ends if end is not None]
+    plain = last_name(call.func) in ("random", "rand", "random_sample") and not call.args
+    if not plain or len(known) < 2 or (check.low <= min(known) and max(known) <= check.high):
+        return None
+    hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
+    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    return Clue(f"{hint}: {right}", source.place(whole), key="draw")
+
+
+def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
+    """Return what an expression is worth if a call gives this number."""
+    if node is call:
+        return drawn
+    if not isinstance(node, ast.BinOp) or depth > _DEEPEST:
+        return number_at(source, node)
+    left = _with(source, node.left, call, drawn, depth + 1)
+    right = _with(source, node.right, call, drawn, depth + 1)
+    if left is None or right is None:
+        return None
+    if isinstance(node.op, ast.Add):
+        return left + right
+    if isinstance(node.op, ast.Sub):
+        return left - right
+    return left * right if isinstance(node.op, ast.Mult) else None
+
+
+@rule(RandomInRange, problem=ProblemKind.CONSTANT)
+def _drawn_once(case: Case) -> Clue | None:
+    """The value is drawn when the node starts and never again, or the seed is set each time."""
+    source = case.source
+    for timer in made(source, "timer"):
+        inside = list(reached(source, roots(source, timer.callback)))
+        seeds = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "seed"]
+        if seeds:
+            hint = f"{source.code(seeds[0])} in the callback starts the same draw each time: take it out"
+            return Clue(hint, source.place(seeds[0]), key="draw")
+        drawn = [c for c in draws(source) if c in inside]
+        early = [c for c in draws(source) if c not in inside and _at_start(source, c)]
+        if not drawn and len(early) == 1 and len(made(source, "timer")) == 1:
+            name = last_name(timer.callback) or "the callback"
+            hint = f"{source.code(early[0])} is drawn once, when the node starts: draw it in {name}"
+            return Clue(hint, source.place(early[0]), key="draw")
+    return None
+
+
+def _at_start(source: Source, call: ast.AST) -> bool:
+    function = source.function_of(call)
+    return function is None or function.name in ("__init__", "main")
+
+
+@rule(RandomInRange)
+def _not_drawn(case: Case) -> Clue | None:
+    """Nothing in the file draws anything."""
+    source, check = case.source, case.check
+    if case.evidence("pattern") is None or draws(source):
+        return None
+    values = published_numbers(case.trace, check.topic)
+    places = [g for leaf in ("data", "temperature") for g in given_leaf(source, leaf)]
+    if len(places) != 1 or not values:
+        return None
+    code = source.code(places[0])
+    hint = f"{code} draws nothing: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
+    return Clue(hint, source.place(places[0]))
+
+
+@rule(AnswersTogether, problem=ProblemKind.NEVER_CHANGES)
+def _never_crosses(case: Case) -> Clue | None:
+    """What is drawn lies on one side of the controller's threshold."""
+    check: AnswersTogether = case.check
+    owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
+    calls = draws(owners[0]) if len(owners) == 1 else []
+    if len(calls) != 1 or last_name(calls[0].func) not in ("uniform", "randint") or len(calls[0].args) != 2:
+        return None
+    limits = [number_at(owners[0], a) for a in calls[0].args]
+    known = [limit for limit in limits if limit is not None]
+    if len(known) < 2 or min(known) <= check.threshold < max(known):
+        return None
+    hint = f"{owners[0].code(calls[0])} stays on one side of {number(check.threshold)}"
+    asked = next((c for c in case.siblings if isinstance(c, RandomInRange) and c.topic == check.input), None)
+    hint += f": the values go from {number(asked.low)} to {number(asked.high)}" if asked is not None else ""
+    return Clue(hint, owners[0].place(calls[0]), key="draw")

@@ -1,1 +1,0 @@
-"""Turns traces into figures of what the checks looked at; pure functions over plain data."""

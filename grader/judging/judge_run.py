@@ -1,0 +1,393 @@
+"""Judges a run: checks become verdicts, verdicts a report; and sums a trace up that nobody judges."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import statistics
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
+from grader.core.quantities import NS_PER_S, seconds
+from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.submission import Run, Submission
+from grader.core.summary import Pace, Summary, TopicSummary
+from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
+from grader.judging.charts import illustrated
+from grader.judging.diagnosis import diagnose, placed
+from grader.judging.findings import FAULT_KEY
+from grader.judging.run_check import Answer, check_name, run_check
+from grader.judging.values import on_student_topic
+from grader.judging.wording import listed, quote
+
+
+def judge_run(
+    exercises: Sequence[Exercise], run: Run, *, pictures: bool = True, pending: Collection[str] = ()
+) -> Report:
+    """Return the report of a run; pure, so the same run and the same exercises give the same report.
+
+    Args:
+        exercises: What is asked, in the order of the report.
+        run: What was recorded for them.
+        pictures: Whether to draw figures as well, which takes about as long as judging and only some formats show.
+        pending: Ids of the exercises that are still being recorded; the report is then a partial one.
+    """
+    return Report(
+        name=run.submission.name,
+        path=run.submission.path,
+        digest=run.submission.digest,
+        environment=run.environment,
+        seed=run.seed,
+        exercises=tuple(
+            not_graded_yet(exercise) if exercise.id in pending else _exercise_report(exercise, run, pictures=pictures)
+            for exercise in exercises
+        ),
+        duration_s=run.duration_s,
+        notes=run.notes,
+        reproduce=run.reproduce,
+        pending=tuple(exercise.id for exercise in exercises if exercise.id in pending),
+    )
+
+
+def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> ExerciseReport:
+    own: Mapping[str, Trace] = {
+        scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id
+    }
+    report = judge_exercise(exercise, own, run.submission, run.sources)
+    return illustrated(report, exercise, own, run.submission, run.sources) if pictures else report
+
+
+def judge_exercise(
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None = None,
+) -> ExerciseReport:
+    """Return the report of one exercise; pure.
+
+    Args:
+        exercise: What is asked.
+        traces: Scenario id -> what was recorded; scenarios with a missing file have none.
+        submission: Says which files were found, and what was found instead.
+        sources: Wanted file name -> its text, to find the causes of lost points in; None leaves them unexplained.
+
+    One cause costs one criterion: a criterion that fails for a file, a fault or another criterion that has been named
+    before is blocked by it, not lost once more. A check that raises, and a recording that failed, leave a criterion
+    undecided.
+    """
+    answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}
+    builder = VerdictBuilder(exercise, answers, submission)
+    recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
+    reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
+    return ExerciseReport(
+        id=exercise.id,
+        number=exercise.number,
+        title=exercise.title,
+        required=exercise.required,
+        clock=ClockKind.WALL if reasons else ClockKind.VIRTUAL,
+        clock_reason=next((r for r in reasons if r), ""),
+        verdicts=_explained(builder.verdicts(), exercise, traces, submission, sources),
+        faults=_faults(recorded),
+        notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources)),
+        graph=_graph(exercise, traces),
+        feedback={c.id: c.feedback for c in exercise.criteria},
+        situations={c.id: c.scenario for c in exercise.criteria},
+        variant=exercise.variant,
+        starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
+    )
+
+
+def _explained(
+    verdicts: tuple[Verdict, ...],
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None,
+) -> tuple[Verdict, ...]:
+    return verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources)
+
+
+def _notes(
+    recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
+) -> tuple[str, ...]:
+    said = (note for _, t in recorded for note in (*started(t), *t.notes))
+    notes = tuple(dict.fromkeys(said))
+    return notes if sources is None else placed(notes, submission, sources)
+
+
+def started(trace: Trace) -> tuple[str, ...]:
+    """Return which files were started in another way than `python3 FILE`, and in which."""
+    return tuple(f"{s.file}: run {s.words}" for s in trace.starts if s.way is not StartWay.SCRIPT)
+
+
+def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
+    """Return the faults of all scenarios; the same one in several scenarios once."""
+    first: dict[tuple[str, str, str, int, str], tuple[str, Fault]] = {}
+    for scenario, trace in recorded:
+        for fault in trace.faults():
+            key = (fault.process, fault.kind.value, fault.file, fault.line, fault.text)
+            first.setdefault(key, (scenario, fault))
+    return tuple(
+        ReportedFault(f.kind.value, f.file or f.process, f.line, f.text, f.t_ns, scenario, f.frames)
+        for scenario, f in first.values()
+    )
+
+
+def _graph(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphSnapshot | None:
+    """Return the fullest graph, the last of equals, of the last scenario in which all files ran."""
+    whole = [s for s in exercise.scenarios if set(s.processes) == set(exercise.files) and s.id in traces]
+    graphs = traces[whole[-1].id].graphs() if whole else ()
+    return max(reversed(graphs), key=_edge_count, default=None)
+
+
+def _edge_count(graph: GraphSnapshot) -> int:
+    ends = [e for e in graph.endpoints if on_student_topic(e)]
+    publishers = [e for e in ends if e.kind == "publisher"]
+    subscriptions = [e for e in ends if e.kind == "subscription"]
+    return sum((p.topic, p.type) == (s.topic, s.type) for p in publishers for s in subscriptions)
+
+
+_EARNED = (Outcome.MET, Outcome.PARTLY)
+_SAID = {
+    Outcome.NOT_MET: "not met",
+    Outcome.BLOCKED: "not judged",
+    Outcome.UNDECIDED: "undecided",
+}
+
+
+@dataclass(slots=True)
+class VerdictBuilder:
+    """Goes through one exercise's answers in rubric order and remembers which causes were named already."""
+
+    exercise: Exercise
+    answers: Mapping[str, Answer]
+    submission: Submission
+    done: dict[str, Verdict] = field(default_factory=dict)
+    missing_owner: dict[str, str] = field(default_factory=dict)
+    fault_owner: dict[tuple[Any, ...], str] = field(default_factory=dict)
+
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Return one verdict for each criterion, in rubric order."""
+        for criterion in self.exercise.criteria:
+            self.done[criterion.id] = self._verdict(criterion)
+        return tuple(self.done[c.id] for c in self.exercise.criteria)
+
+    def _verdict(self, criterion: Criterion) -> Verdict:
+        answer = self.answers[criterion.id]
+        if answer.missing:
+            return self._missing(criterion, answer.missing)
+        needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
+        known = answer.finding is not None
+        # A question that could not be answered waits for what it needs, if that is known to be the student's to mend.
+        if needed is not None and (known or self._outcome(needed) is not Outcome.UNDECIDED):
+            return self._blocked(criterion, needed, self._outcome(needed))
+        if answer.finding is None:
+            evidence = {"error": answer.error} if answer.error else {}
+            problem, hint = answer.problem, answer.hint
+            return _without_points(criterion, Outcome.UNDECIDED, problem, hint=hint, evidence=evidence)
+        return self._found(criterion, answer.finding)
+
+    def _found(self, criterion: Criterion, finding: Finding) -> Verdict:
+        if finding.credit > 0:
+            return _earned(criterion, finding)
+        blocker = self._blocker(criterion, finding)
+        if blocker is not None:
+            return self._blocked(criterion, blocker, self._outcome(blocker))
+        cause = _fault_of(finding)
+        owner = self.fault_owner.get(cause, "") if cause else ""
+        if owner:
+            return self._blocked(criterion, owner, Outcome.NOT_MET)
+        if cause:
+            self.fault_owner[cause] = criterion.id
+        return _earned(criterion, finding)
+
+    def _outcome(self, id_: str) -> Outcome:
+        """Return what a criterion came to, or by its own finding will come to if it is still ahead."""
+        if id_ in self.done:
+            return self.done[id_].outcome
+        answer = self.answers.get(id_)
+        if answer is None:
+            return Outcome.MET
+        if answer.finding is None:
+            return Outcome.NOT_MET if answer.missing else Outcome.UNDECIDED
+        return _outcome_of(answer.finding)
+
+    def _blocker(self, criterion: Criterion, finding: Finding) -> str | None:
+        """Return the criterion that a finding waits for, unless that one is met, is unknown, or waits for this one."""
+        if finding.blocked_by is None:
+            return None
+        target = self._named(criterion, finding.blocked_by)
+        if target is None or target.id == criterion.id or self._outcome(target.id) in _EARNED:
+            return None
+        theirs = self.answers[target.id].finding
+        back = self._named(target, theirs.blocked_by) if theirs is not None and theirs.blocked_by else None
+        ahead = target.id not in self.done
+        return None if ahead and back is not None and back.id == criterion.id else target.id
+
+    def _named(self, criterion: Criterion, name: str) -> Criterion | None:
+        """Return the criterion of that id, else the first whose check has that name, nearest scenarios first.
+
+        These are the criterion's own, and then those in which the same processes run.
+        """
+        criteria = self.exercise.criteria
+        by_id = next((c for c in criteria if c.id == name), None)
+        named = [c for c in criteria if check_name(c) == name]
+        same = [c for c in named if c.scenario == criterion.scenario]
+        alike = [c for c in named if self._processes(c) == self._processes(criterion)]
+        return by_id or next(iter([*same, *alike]), None)
+
+    def _processes(self, criterion: Criterion) -> tuple[str, ...]:
+        return next((s.processes for s in self.exercise.scenarios if s.id == criterion.scenario), ())
+
+    def _blocked(self, criterion: Criterion, needed: str, outcome: Outcome) -> Verdict:
+        reason = f"{NOT_JUDGED}needs {needed} ({_SAID.get(outcome, 'not met')})"
+        kind = Outcome.UNDECIDED if outcome is Outcome.UNDECIDED else Outcome.BLOCKED
+        return replace(_without_points(criterion, kind, reason), blocked_by=needed)
+
+    def _missing(self, criterion: Criterion, files: tuple[str, ...]) -> Verdict:
+        unnamed = next((f for f in files if f not in self.missing_owner), None)
+        if unnamed is None:
+            file = files[0]
+            verdict = _without_points(criterion, Outcome.BLOCKED, f"{NOT_JUDGED}needs {file}, which is missing")
+            return replace(verdict, blocked_by=self.missing_owner[file], missing_file=file)
+        self.missing_owner[unnamed] = criterion.id
+        similar = self.submission.files[unnamed].similar
+        reason = f"{unnamed}: not in the submission"
+        reason += f"; found {listed(similar)} instead" if similar else ""
+        hint = f"rename {quote(similar[0], 80)} to {unnamed}" if similar else f"hand in a file named {unnamed}"
+        evidence = {"missing": unnamed, "similar": list(similar)}
+        return _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
+
+
+def _outcome_of(finding: Finding) -> Outcome:
+    if finding.credit == 1:
+        return Outcome.MET
+    return Outcome.PARTLY if finding.credit > 0 else Outcome.NOT_MET
+
+
+def _earned(criterion: Criterion, finding: Finding) -> Verdict:
+    outcome = _outcome_of(finding)
+    # a fault is its own cause: what the rubric supposes is then beside the point
+    supposed = "" if FAULT_KEY in finding.evidence else criterion.hint
+    hint = "" if outcome is Outcome.MET else finding.hint or supposed
+    return Verdict(
+        id=criterion.id,
+        title=criterion.title,
+        outcome=outcome,
+        score=finding.credit * criterion.points,
+        max_score=criterion.points,
+        reason=finding.reason,
+        hint=hint,
+        location=finding.location,
+        evidence=finding.evidence,
+        problem=finding.problem,
+    )
+
+
+def _without_points(
+    criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, Any] | None = None
+) -> Verdict:
+    points = criterion.points
+    known = evidence or {}
+    return Verdict(criterion.id, criterion.title, outcome, Fraction(0), points, reason, hint=hint, evidence=known)
+
+
+def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
+    """Return what makes a fault the same one in another scenario, or None if the finding rests on none."""
+    fault = finding.evidence.get(FAULT_KEY)
+    if not isinstance(fault, Mapping):
+        return None
+    return tuple(fault[key] for key in ("process", "kind", "text", "file", "line"))
+
+
+def not_graded_yet(exercise: Exercise) -> ExerciseReport:
+    """Return a report in which every criterion is undecided, so that no part of it is taken for a result."""
+    verdicts = (
+        Verdict(c.id, c.title, Outcome.UNDECIDED, Fraction(0), c.points, "not graded yet") for c in exercise.criteria
+    )
+    return ExerciseReport(
+        id=exercise.id,
+        number=exercise.number,
+        title=exercise.title,
+        required=exercise.required,
+        clock=ClockKind.VIRTUAL,
+        clock_reason="",
+        verdicts=tuple(verdicts),
+        feedback={c.id: c.feedback for c in exercise.criteria},
+        situations={c.id: c.scenario for c in exercise.criteria},
+        notes=variant_notes(exercise.variant),
+        variant=exercise.variant,
+    )
+
+
+def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
+    """Return what the nodes of a trace did.
+
+    Args:
+        trace: What was recorded.
+        processes: Names of the files that ran.
+        isolation: The sandbox tier.
+    """
+    graphs = trace.graphs()
+    names = {e.topic for g in graphs for e in g.endpoints}
+    return Summary(
+        processes=tuple(processes),
+        clock=trace.clock,
+        clock_reason=trace.clock_reason,
+        duration_s=seconds(trace.stop_ns),
+        nodes=tuple(sorted({node for g in graphs for node in g.nodes})),
+        topics=tuple(_topic(trace, name) for name in sorted(names)),
+        offers=tuple(o for o in trace.observations if isinstance(o, Offer)),
+        records=trace.records(),
+        lines=trace.lines(),
+        faults=trace.faults(),
+        notes=(*started(trace), *trace.notes),
+        starts=trace.starts,
+        graph=max(graphs, key=lambda g: len(g.endpoints), default=None),
+        isolation=isolation,
+    )
+
+
+def _topic(trace: Trace, name: str) -> TopicSummary:
+    messages = trace.messages(name)
+    publishers, subscriptions = trace.endpoints("publisher", name), trace.endpoints("subscription", name)
+    return TopicSummary(
+        name=name,
+        types=tuple(dict.fromkeys(e.type for e in (*publishers, *subscriptions))),
+        publishers=publishers,
+        subscriptions=subscriptions,
+        messages=len(messages),
+        first_s=seconds(messages[0].t_ns) if messages else None,
+        pace=_pace(messages),
+        ranges=_ranges(messages),
+    )
+
+
+def _pace(messages: Sequence[Message]) -> Pace | None:
+    times = [m.t_ns for m in messages]
+    if len(times) < 2 or times[-1] == times[0]:
+        return None
+    gaps = [(later - earlier) / NS_PER_S for earlier, later in itertools.pairwise(times)]
+    # n - 1 gaps, not n: counting messages overstates a short window
+    return Pace(len(gaps) * NS_PER_S / (times[-1] - times[0]), min(gaps), max(gaps), statistics.pstdev(gaps))
+
+
+def _ranges(messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
+    ranges: dict[str, tuple[float, float]] = {}
+    for message in messages:
+        for name, value in _numbers(message.value, ""):
+            low, high = ranges.get(name, (value, value))
+            ranges[name] = (min(low, value), max(high, value))
+    return ranges
+
+
+def _numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:
+    """Yield the finite numbers of a message by their dotted names; lists are left out, they have no names."""
+    if isinstance(value, Mapping):
+        for key, field in value.items():
+            yield from _numbers(field, f"{name}.{key}" if name else key)
+    elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        yield name, float(value)

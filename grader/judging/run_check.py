@@ -1,0 +1,170 @@
+"""Runs the check of one criterion on its trace, and says why where it cannot be run."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from grader.core.errors import HarnessError
+from grader.core.exercise import Check, Criterion, Exercise, Finding, Location, Problem, SourceCheck
+from grader.core.scenario import Scenario
+from grader.core.submission import Submission
+from grader.core.trace import Fault, FaultKind, Request, Response, Trace
+from grader.judging.checks import CHECKS
+from grader.judging.findings import faulted, first_fault
+from grader.judging.values import student_endpoints
+from grader.judging.wording import quote
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of asking; exactly one attribute is set.
+
+    Attributes:
+        finding: What the check found.
+        missing: Files of the scenario that the submission lacks.
+        problem: Why nobody knows: our side's or the machine's failure.
+        error: Class and text of an exception in a check, for whoever mends it; goes with `problem`.
+        hint: One thing to do about the problem; empty if nothing is very likely right.
+    """
+
+    finding: Finding | None = None
+    missing: tuple[str, ...] = ()
+    problem: str = ""
+    error: str = ""
+    hint: str = ""
+
+
+def check_name(criterion: Criterion) -> str:
+    """Return the name of a criterion's check in rubrics."""
+    known = (name for name, kind in CHECKS.items() if type(criterion.check) is kind)
+    return criterion.check_name or next(known, type(criterion.check).__name__)
+
+
+def run_check(
+    criterion: Criterion,
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None = None,
+) -> Answer:
+    """Return what the criterion's check finds in the trace of its scenario, or in the text of its files."""
+    scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
+    missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
+    if missing:
+        return Answer(missing=missing)
+    trace = traces.get(scenario.id)
+    if trace is None:
+        return Answer(problem=f"the scenario {scenario.id} was not recorded")
+    if trace.harness_problem:
+        return Answer(problem=trace.harness_problem)
+    answer = _judged(criterion, scenario, trace, sources)
+    if answer.finding is None or not isinstance(criterion.check, SourceCheck):
+        return answer
+    return replace(answer, finding=_placed(answer.finding, submission))
+
+
+def _placed(finding: Finding, submission: Submission) -> Finding:
+    """Return the finding with the path under which its file was found."""
+    place = finding.location
+    found = submission.files[place.file].found if place is not None and place.file in submission.files else None
+    return finding if place is None or not found else replace(finding, location=replace(place, file=found))
+
+
+def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
+    """Return the finding of a check, which may want to see the students' files too."""
+    if sources is not None and isinstance(check, SourceCheck):
+        return check.judge_sources(trace, sources)
+    return check.judge(trace)
+
+
+def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None) -> Answer:
+    name = check_name(criterion)
+    try:
+        finding = _put(criterion.check, trace, sources)
+    except HarnessError as error:
+        return Answer(problem=f"{name} cannot be judged: {error.message}")
+    except (Exception, SystemExit) as error:  # a check that fails must cost no points and must not end the report
+        problem = f"the check {name} failed on this recording through no fault of the submission"
+        said = f"{type(error).__name__}: {quote(str(error))}"
+        if not criterion.check_name or name in CHECKS:
+            return Answer(problem=problem, error=said)
+        said = f"{_place(error)}{said}"
+        return Answer(problem=problem, error=said, hint=f"mend the check that the rubric brings: {said}")
+    if name in CHECKS and 0 <= finding.credit <= 1:
+        return Answer(finding=_start_failure_first(finding, scenario, trace))
+    wrong = breach(finding)
+    if wrong:
+        return Answer(problem=f"the check {name} {wrong}", hint="mend the check that the rubric brings")
+    finding = replace(finding, credit=Fraction(finding.credit))
+    return Answer(finding=_start_failure_first(finding, scenario, trace))
+
+
+def _place(error: BaseException) -> str:
+    """Return where an error arose, as `file:line: ` without the file's folder, for whoever mends the check."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{frames[-1].filename.rsplit('/', 1)[-1]}:{frames[-1].lineno}: " if frames else ""
+
+
+def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> Finding:
+    """Return the finding; where a file could not even start and nothing was earned, that is the reason."""
+    fault = start_failure(scenario, trace)
+    if fault is None or finding.credit > 0:
+        return finding
+    if fault.kind is FaultKind.SYNTAX_ERROR:
+        consequence = "the file cannot run"
+    else:
+        consequence = "the node had sent and received nothing by then"
+    return faulted(fault, consequence, finding.evidence)
+
+
+def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
+    """Return the fault that kept a file of the scenario from creating any endpoint, or None if all of them started."""
+    faults = [fault for process in scenario.processes if (fault := first_fault(trace, process)) is not None]
+    if not faults:
+        return None
+    few = _started(trace) < len(scenario.processes)
+    return next((fault for fault in faults if few or fault.kind is FaultKind.SYNTAX_ERROR), None)
+
+
+def _started(trace: Trace) -> int:
+    """Return how many processes came so far that they had a part in the ROS graph, or said something over it."""
+    endpoints = student_endpoints(trace)
+    ends = (*trace.service_ends("service"), *trace.service_ends("client"))
+    only_services = {e.node for e in ends} - {e.node for e in endpoints}
+    known = len({e.participant for e in endpoints}) + len(only_services)
+    said: tuple[Request | Response, ...] = (*trace.of(Request), *trace.of(Response))
+    return known or int(bool(trace.messages()) or any(r.sender == "student" for r in said))
+
+
+#: Deepest nesting of evidence.
+_DEEPEST = 12
+
+
+def breach(finding: object) -> str:
+    """Return what is wrong with what a check returned, as the end of a sentence; empty if it is a good finding."""
+    if not isinstance(finding, Finding):
+        return f"returned a {type(finding).__name__}, expected a Finding"
+    if isinstance(finding.credit, bool) or not isinstance(finding.credit, (int, Fraction)):
+        return f"gave a credit of type {type(finding.credit).__name__}, expected a Fraction"
+    if not 0 <= finding.credit <= 1:
+        return f"gave a credit of {finding.credit}, expected 0 to 1"
+    texts = (finding.reason, finding.hint, finding.blocked_by or "")
+    if not all(isinstance(text, str) for text in texts) or not isinstance(finding.location, (Location, type(None))):
+        return "gave a reason, hint or location of another type than a Finding has"
+    if not isinstance(finding.problem, (Problem, type(None))):
+        return f"gave a problem of type {type(finding.problem).__name__}, expected a Problem"
+    plain = isinstance(finding.evidence, Mapping) and _is_plain(finding.evidence, _DEEPEST)
+    return "" if plain else "gave evidence that holds more than plain JSON values"
+
+
+def _is_plain(value: object, depth: int) -> bool:
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return True
+    if depth == 0:
+        return False
+    if isinstance(value, Mapping):
+        return all(isinstance(key, str) and _is_plain(inner, depth - 1) for key, inner in value.items())
+    return isinstance(value, (list, tuple)) and all(_is_plain(inner, depth - 1) for inner in value)

@@ -1,0 +1,416 @@
+"""What a series of numbers follows: a formula, another one instead, an earlier input, or chance."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import statistics
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import pairwise
+from types import MappingProxyType
+
+from grader.core.quantities import NS_PER_MS, NS_PER_S, within
+from grader.judging.values import Reading
+from grader.judging.wording import counted, number
+
+#: The letters a formula may use: the number of a message from 0, and its time in seconds.
+VARIABLES = ("n", "t")
+_MOST_CHARACTERS = 200
+_CONSTANTS = MappingProxyType({"pi": math.pi})
+_FUNCTIONS: Mapping[str, Callable[[float], float]] = MappingProxyType(
+    {
+        "sin": math.sin,
+        "cos": math.cos,
+        "tan": math.tan,
+        "exp": math.exp,
+        "sqrt": math.sqrt,
+        "abs": abs,
+        "floor": math.floor,
+    }
+)
+_BINARY: Mapping[type[ast.operator], Callable[[float, float], float]] = MappingProxyType(
+    {
+        ast.Add: operator.add,
+        ast.Sub: operator.sub,
+        ast.Mult: operator.mul,
+        ast.Div: operator.truediv,
+        ast.Pow: math.pow,
+        ast.Mod: operator.mod,
+    }
+)
+_UNARY: Mapping[type[ast.unaryop], Callable[[float], float]] = MappingProxyType(
+    {ast.UAdd: operator.pos, ast.USub: operator.neg}
+)
+#: Functions that are taken for each other.
+_MISTAKEN = MappingProxyType({"sin": "cos", "cos": "sin"})
+
+
+class FormulaError(ValueError):
+    """A text is no formula; says what is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A formula that can be asked for its value.
+
+    Attributes:
+        text: As the rubric has it.
+        tree: Its whitelisted syntax tree.
+    """
+
+    text: str
+    tree: ast.expr
+
+    def at(self, n: float, t: float = 0.0) -> float:
+        """Return the value at `n` and `t`; NaN where there is none, as for a root of -1."""
+        try:
+            return _value(self.tree, {"n": n, "t": t})
+        except (ArithmeticError, ValueError):
+            return math.nan
+
+    @property
+    def mistaken(self) -> Curve | None:
+        """The formula with sine and cosine taken for each other, or None if it has neither."""
+        tree = ast.parse(self.text, mode="eval").body
+        found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in _MISTAKEN]
+        for node in found:
+            node.id = _MISTAKEN[node.id]
+        return Curve(ast.unparse(tree), tree) if found else None
+
+
+@lru_cache(maxsize=64)
+def curve(text: str) -> Curve:
+    """Return the formula that a text says.
+
+    Raises:
+        FormulaError: It says none.
+    """
+    if len(text) > _MOST_CHARACTERS:
+        raise FormulaError(f"at most {_MOST_CHARACTERS} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise FormulaError("a formula such as sin(0.1 * n)") from None
+    _check(tree)
+    return Curve(text.strip(), tree)
+
+
+def _check(node: ast.expr) -> None:
+    """Raise unless every part is known."""
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        _check(node.left)
+        _check(node.right)
+    elif isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+        _check(node.operand)
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
+        if len(node.args) != 1 or node.keywords or isinstance(node.args[0], ast.Starred):
+            raise FormulaError(f"one number in the brackets of {node.func.id}")
+        _check(node.args[0])
+    elif isinstance(node, ast.Name):
+        if node.id not in VARIABLES and node.id not in _CONSTANTS:
+            raise FormulaError(f"n, t, pi or one of {', '.join(_FUNCTIONS)} with its brackets, found {node.id[:40]}")
+    elif not (isinstance(node, ast.Constant) and type(node.value) in (int, float)):
+        raise FormulaError(f"numbers, n, t, pi, + - * / % ** and {', '.join(_FUNCTIONS)}")
+
+
+def _value(node: ast.expr, known: Mapping[str, float]) -> float:
+    if isinstance(node, ast.BinOp):
+        return _BINARY[type(node.op)](_value(node.left, known), _value(node.right, known))
+    if isinstance(node, ast.UnaryOp):
+        return _UNARY[type(node.op)](_value(node.operand, known))
+    if isinstance(node, ast.Call):
+        assert isinstance(node.func, ast.Name)
+        return float(_FUNCTIONS[node.func.id](_value(node.args[0], known)))
+    if isinstance(node, ast.Name):
+        return known[node.id] if node.id in known else _CONSTANTS[node.id]
+    assert isinstance(node, ast.Constant)
+    return float(node.value)  # type: ignore[arg-type]  # only numbers come through the whitelist
+
+
+#: Share of the values that another formula must give for it to be named as what they follow.
+_SURE = 0.97
+#: Fewer values than this follow something by chance.
+_FEWEST = 5
+#: Counters are tried to begin at most this far from 0.
+_FURTHEST_START = 20
+_DEGREES = 180 / math.pi
+#: By what a counter may have been multiplied or divided by mistake.
+_PACES = (10.0, 2.0, 5.0, 100.0, 20.0, 4.0, 3.0, 50.0, 1.1, 1.5)
+_REPEATS = (2, 3, 5, 10)
+_MOST_DECIMALS = 5
+_COUNT_HINT = "count the messages: n grows by 1 with each"
+_FIRST_HINT = "publish first and count afterwards: the first message is n = 0"
+_PACE_HINT = "compare the factor of n with the one asked for"
+_RADIAN_HINT = "sine and cosine take radians here: convert nothing"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One message: its number from 0, its time since the first one, and what its field holds."""
+
+    n: int
+    t_s: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Instead:
+    """What the values follow, as a clause, and what to do about it; both may be empty.
+
+    Attributes:
+        said: The clause.
+        hint: What to do.
+        start: The number that the count starts at, if that is all that differs.
+    """
+
+    said: str = ""
+    hint: str = ""
+    start: int | None = None
+
+
+_Wanted = Callable[[Sample], float]
+
+
+def followed_instead(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead:
+    """Return what a series that differs from a formula follows, if that is plain.
+
+    Args:
+        wanted: The formula.
+        samples: The series, in order.
+        tolerance: Largest difference.
+    """
+    if len(samples) < _FEWEST:
+        return Instead()
+    if not all(math.isfinite(s.value) for s in samples):
+        return Instead()
+    if len({s.value for s in samples}) == 1:
+        return Instead(f"it is {number(samples[0].value)} in every message", _COUNT_HINT)
+    scaled = _scaled(wanted, samples, tolerance)
+    if scaled is not None:
+        return scaled
+    ways = (way for way, other in _ways(wanted) if _follow(samples, other, tolerance))
+    return next(ways, Instead())
+
+
+def _follow(samples: Sequence[Sample], other: _Wanted, tolerance: float) -> bool:
+    fitting = sum(within(s.value, other(s), max(tolerance, 1e-6)) for s in samples)
+    return fitting >= _SURE * len(samples)
+
+
+def _at(wanted: Curve, sample: Sample, *, start: int = 0, pace: float = 1.0, repeats: int = 1) -> float:
+    return wanted.at(pace * (sample.n // repeats + start), pace * sample.t_s)
+
+
+def _rounded(wanted: Curve, sample: Sample, *, decimals: int) -> float:
+    value = wanted.at(sample.n, sample.t_s)
+    return round(value, decimals) if math.isfinite(value) else value
+
+
+def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
+    """Yield what students do instead, the commonest first."""
+    for start in (s for near in range(1, _FURTHEST_START + 1) for s in (near, -near)):
+        said = f"the values are right for a count that starts at {start}"
+        yield Instead(said, _FIRST_HINT if start == 1 else "", start), partial(_at, wanted, start=start)
+    for degrees in (_DEGREES, 1 / _DEGREES):
+        said = "the angle is converted between degrees and radians before the formula"
+        yield Instead(said, _RADIAN_HINT), partial(_at, wanted, pace=degrees)
+    for factor in _PACES:
+        fast, slow = (f"the values go through {wanted.text} {number(factor)} times too {w}" for w in ("fast", "slowly"))
+        yield Instead(fast, _PACE_HINT), partial(_at, wanted, pace=factor)
+        yield Instead(slow, _PACE_HINT), partial(_at, wanted, pace=1 / factor)
+    for repeats in _REPEATS:
+        yield Instead(f"each value comes {repeats} times", _COUNT_HINT), partial(_at, wanted, repeats=repeats)
+    if wanted.mistaken is not None:
+        hint = "sine and cosine are taken for each other"
+        yield Instead(f"the values follow {wanted.mistaken.text}", hint), partial(_at, wanted.mistaken)
+    for decimals in range(_MOST_DECIMALS + 1):
+        said = f"the values are rounded to {counted(decimals, 'decimal')}"
+        yield Instead(said, "publish the value as it is"), partial(_rounded, wanted, decimals=decimals)
+
+
+def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead | None:
+    pairs = [(s.value, wanted.at(s.n, s.t_s)) for s in samples]
+    ratios = [got / want for got, want in pairs if abs(want) > 1e-3 and math.isfinite(got)]
+    factor = statistics.median(ratios) if ratios else 1.0
+    if math.isclose(factor, 1.0, rel_tol=1e-6) or abs(factor) < 1e-9:
+        return None
+    unscaled = [replace(s, value=s.value / factor) for s in samples]
+    if not _follow(unscaled, partial(_at, wanted), tolerance):
+        return None
+    said = f"each value is {number(factor)} times the one expected"
+    if math.isclose(factor, -1.0, rel_tol=1e-6):
+        return Instead(said, "the sign is the wrong way round")
+    if any(math.isclose(factor, f, rel_tol=1e-3) for f in (_DEGREES, 1 / _DEGREES)):
+        return Instead(said, "that is the factor between degrees and radians: publish the value unconverted")
+    return Instead(said)
+
+
+#: Lags are tried in these steps, up to the longest.
+_STEP_NS = 100 * NS_PER_MS
+_LONGEST_NS = 8 * NS_PER_S
+#: So many inputs an answer may lie behind.
+_FURTHEST_BEHIND = 25
+#: Share of the answers that must fit for it to be named.
+_SURE_BEHIND = 0.97
+#: Fewer answers than this fit something by chance.
+_FEWEST_ANSWERS = 10
+Right = Callable[[float, float], bool]
+
+
+def lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int | None:
+    """Return by how much the answers lag behind the inputs that they are right for, if they all do.
+
+    Args:
+        inputs: The numbers in order, each with the time from which on it was there.
+        answers: The answers in order.
+        right: Whether an answer (first) is right for an input (second).
+
+    Returns:
+        A whole number of tenths of a second above 0, or None if there is no lag or none explains the answers.
+    """
+    found: int | None = None
+    for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
+        fits = _fits(inputs, answers, right, lag)
+        if fits and lag == 0:
+            return None
+        if fits:
+            found = lag
+        elif found is not None:
+            break
+    return found
+
+
+def _fits(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right, lag: int) -> bool:
+    times = [r.t_ns for r in inputs]
+    asked = [
+        (a.value, inputs[bisect_right(times, a.t_ns - lag) - 1].value) for a in answers if a.t_ns - lag >= times[0]
+    ]
+    changes = len({got for got, _ in asked}) > 1
+    return len(asked) >= _FEWEST_ANSWERS and changes and all(right(got, value) for got, value in asked)
+
+
+def steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int:
+    """Return how many inputs before the newest the one lies that nearly every answer is right for; 0 if none does.
+
+    Args:
+        inputs: The numbers in order; they change from one to the next.
+        answers: The answers in order, about one to each input.
+        right: Whether an answer (first) is right for an input (second).
+    """
+    times = [r.t_ns for r in inputs]
+    newest = [(a.value, bisect_right(times, a.t_ns) - 1) for a in answers]
+    for behind in range(_FURTHEST_BEHIND + 1):
+        asked = [(got, inputs[place - behind].value) for got, place in newest if place >= behind]
+        if len(asked) < _FEWEST_ANSWERS or len({got for got, _ in asked}) < 2:
+            return 0
+        if sum(right(got, value) for got, value in asked) >= _SURE_BEHIND * len(asked):
+            return behind
+    return 0
+
+
+#: Fewer values than this say nothing but whether they differ.
+FEW = 10
+#: A pattern that chance gives more often than exp(-14), about one in a million, is no evidence.
+_EVIDENCE = 14.0
+#: Fewest steps for the patterns that a short random series may show by chance.
+_ENOUGH = 16
+#: Share of the variance of the steps that the two steps before leave unexplained in a smooth curve, at most.
+_REST = 0.05
+#: The same for few steps, where a fit comes out well by chance.
+_REST_OF_FEW = 0.001
+_MANY = 40
+
+
+def pattern_of(values: Sequence[float]) -> str | None:
+    """Return how the values follow from each other, as a phrase; None if they may have been drawn.
+
+    Every generator passes: uniform, whole or rounded numbers, a clipped normal distribution, a choice of a few values,
+    a random walk. Fewer than `FEW` values are only asked whether they differ.
+
+    Args:
+        values: Finite numbers in order of publishing.
+    """
+    if len(values) > 1 and len(set(values)) == 1:
+        return "constant"
+    if len(values) < FEW:
+        return None
+    period = _cycle(values)
+    return _pattern(values) if period is None else f"the same {period} values over and over"
+
+
+def _pattern(values: Sequence[float]) -> str | None:
+    steps = [b - a for a, b in pairwise(values)]
+    if _one_way(steps):
+        return "a ramp: it only rises" if values[-1] > values[0] else "a ramp: it only falls"
+    if _sawtooth(values, steps):
+        return "a sawtooth"
+    if _few_turns(steps) or _predictable(steps):
+        return "a smooth curve"
+    return None
+
+
+def _cycle(values: Sequence[float]) -> int | None:
+    """Return the period of a repeating series, if chance does not explain it."""
+    shares = Counter(values)
+    log_chance = -math.log(sum((n / len(values)) ** 2 for n in shares.values()))
+    for period in range(2, len(values) // 2 + 1):
+        compared = len(values) - period
+        if compared * log_chance < _EVIDENCE:
+            return None
+        if all(math.isclose(a, b, abs_tol=1e-6) for a, b in zip(values, values[period:], strict=False)):
+            return period
+    return None
+
+
+def _one_way(steps: Sequence[float]) -> bool:
+    rising, falling = all(s >= 0 for s in steps), all(s <= 0 for s in steps)
+    moving = sum(s != 0 for s in steps)
+    even = all(math.isclose(s, steps[0], rel_tol=1e-3, abs_tol=1e-6) for s in steps)
+    return (rising or falling) and (moving >= _ENOUGH or (even and moving > FEW))
+
+
+def _sawtooth(values: Sequence[float], steps: Sequence[float]) -> bool:
+    """Return whether there is one small step and one jump back, the jump exactly where the step would go too far."""
+    kinds = Counter(round(s, 4) for s in steps).most_common(2)
+    if len(steps) < _ENOUGH or len(kinds) < 2 or sum(n for _, n in kinds) < len(steps) - 1:
+        return False
+    usual, jump = kinds[0][0], kinds[1][0]
+    if usual * jump >= 0 or math.isclose(usual, -jump, rel_tol=0.05):
+        return False
+    before_usual = [v for v, s in zip(values, steps, strict=False) if s * usual > 0]
+    before_jump = [v for v, s in zip(values, steps, strict=False) if s * jump > 0]
+    if usual > 0:
+        return max(before_usual) < min(before_jump) + 1e-6
+    return min(before_usual) > max(before_jump) - 1e-6
+
+
+def _few_turns(steps: Sequence[float]) -> bool:
+    """Return whether the series turns round far more seldom than independent steps would: by five deviations."""
+    signs = [s > 0 for s in steps if s != 0]
+    turns = sum(a != b for a, b in pairwise(signs))
+    pairs = len(signs) - 1
+    return pairs >= _ENOUGH and turns < pairs / 2 - 2.5 * math.sqrt(pairs)
+
+
+def _predictable(steps: Sequence[float]) -> bool:
+    """Return whether each step is a fixed combination of the two before it, as in any sampled sine."""
+    if len(steps) < _ENOUGH:
+        return False
+    mean = sum(steps) / len(steps)
+    d = [s - mean for s in steps]
+    rows = list(zip(d[2:], d[1:], d, strict=False))
+    total = sum(y * y for y, _, _ in rows)
+    aa, bb = sum(a * a for _, a, _ in rows), sum(b * b for _, _, b in rows)
+    ab = sum(a * b for _, a, b in rows)
+    ya, yb = sum(y * a for y, a, _ in rows), sum(y * b for y, _, b in rows)
+    det = aa * bb - ab * ab
+    if total <= 0.0 or det <= 1e-9 * aa * bb:
+        return False
+    p, q = (ya * bb - yb * ab) / det, (yb * aa - ya * ab) / det
+    rest = sum((y - p * a - q * b) ** 2 for y, a, b in rows)
+    return rest <= (_REST if len(steps) >= _MANY else _REST_OF_FEW) * total

@@ -1,0 +1,268 @@
+"""Calls of services: requests with their responses, calls about parameters, and what a client wrote after each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+from typing import Any
+
+from grader.core.quantities import NS_PER_MS
+from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
+from grader.judging.output import Output, number_in, shape_of, written
+from grader.judging.values import JITTER_NS, number_at, text_at, value_at
+
+#: How much later than asked something may come where the machine's load shows.
+LATENESS_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One call of a service; without a response if none came."""
+
+    request: Request
+    response: Response | None
+
+
+def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
+    """Return the calls of a service by `grader` or `student` in the order asked, each with its response."""
+    answerer = "grader" if asker == "student" else "student"
+    responses: dict[int, Response] = {}
+    for response in trace.responses(service, answerer):
+        if response.t_ns < trace.stop_ns:
+            responses.setdefault(response.number, response)
+    asked = [r for r in trace.requests(service, asker) if r.t_ns < trace.stop_ns]
+    return tuple(Call(r, responses.get(r.number)) for r in asked)
+
+
+#: Number of a type -> the field of rcl_interfaces/msg/ParameterValue that holds it, and what it is called.
+_TYPES: Mapping[int, tuple[str, str]] = {
+    1: ("bool_value", "bool"),
+    2: ("integer_value", "integer"),
+    3: ("double_value", "double"),
+    4: ("string_value", "string"),
+    5: ("byte_array_value", "byte_array"),
+    6: ("bool_array_value", "bool_array"),
+    7: ("integer_array_value", "integer_array"),
+    8: ("double_array_value", "double_array"),
+    9: ("string_array_value", "string_array"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Got:
+    """One parameter as a node told it.
+
+    Attributes:
+        t_ns: When it did.
+        node: The node's fully qualified name.
+        type: `bool`, `integer`, `double`, `string` or one of these with `_array`; empty if it has no such parameter.
+        value: What it holds.
+    """
+
+    t_ns: int
+    node: str
+    type: str
+    value: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """One try to set a parameter.
+
+    Attributes:
+        t_ns: When the node answered, or was asked if it did not.
+        node: The node's fully qualified name.
+        value: What it should hold then.
+        answered: Whether there was an answer.
+        taken: Whether the node took it.
+        why: What it said where it did not.
+    """
+
+    t_ns: int
+    node: str
+    value: Any
+    answered: bool
+    taken: bool
+    why: str
+
+
+def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]:
+    """Return the grader's calls of a node's own service; of every node if none is named."""
+    asked = (r.service for r in trace.of(Request) if r.sender == "grader" and r.service.endswith(f"/{service}"))
+    names = [name for name in dict.fromkeys(asked) if node in (None, name.rpartition("/")[0])]
+    return [call for name in names for call in calls_of(trace, name, "grader")]
+
+
+def asked_for(trace: Trace, name: str, node: str | None = None) -> list[Call]:
+    """Return the calls in which a parameter was asked for."""
+    return [c for c in _parameter_calls(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
+
+
+def got(call: Call, name: str) -> Got | None:
+    """Return what a node told of a parameter; None if it did not answer."""
+    if call.response is None:
+        return None
+    node = call.request.service.rpartition("/")[0]
+    values = _list(call.response.value, "values")
+    place = _list(call.request.value, "names").index(name)
+    found = values[place] if place < len(values) else None
+    type_, value = _typed(found)
+    return Got(call.response.t_ns, node, type_, value)
+
+
+def settings(trace: Trace, name: str, node: str | None = None) -> list[Set]:
+    """Return the tries to set a parameter, in order."""
+    found = []
+    for call in _parameter_calls(trace, node, "set_parameters"):
+        for place, parameter in enumerate(_list(call.request.value, "parameters")):
+            if isinstance(parameter, Mapping) and parameter.get("name") == name:
+                found.append(_set(call, place, parameter))
+    return sorted(found, key=lambda s: s.t_ns)
+
+
+def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> Set:
+    node = call.request.service.rpartition("/")[0]
+    value = _typed(parameter.get("value"))[1]
+    if call.response is None:
+        return Set(call.request.t_ns, node, value, answered=False, taken=False, why="")
+    results = _list(call.response.value, "results")
+    result = results[place] if place < len(results) else {}
+    taken = isinstance(result, Mapping) and result.get("successful") is True
+    why = str(result.get("reason", "")) if isinstance(result, Mapping) else ""
+    return Set(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
+
+
+def _typed(value: object) -> tuple[str, Any]:
+    if not isinstance(value, Mapping):
+        return "", None
+    number = value.get("type")
+    field, name = _TYPES.get(number, ("", "")) if isinstance(number, int) else ("", "")
+    return name, value.get(field)
+
+
+def _list(value: Mapping[str, Any], name: str) -> list[Any]:
+    found = value.get(name)
+    return list(found) if isinstance(found, (list, tuple)) else []
+
+
+_COMPLAINTS = ("WARN", "ERROR", "FATAL")
+
+
+class Kind(str, Enum):
+    """What a response said."""
+
+    GOOD = "good"  # a number above the limit
+    LOW = "low"  # a number at or below it
+    FAILED = "failed"  # no success
+    UNREADABLE = "unreadable"  # no number in it
+    UNANSWERED = "unanswered"  # there was none
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseReader:
+    """How responses are read.
+
+    Attributes:
+        field: Path of the number, or of the text that holds it.
+        success: Path of the truth value that says whether the number counts; empty if there is none.
+        pattern: What finds the number in a text; None for its first one.
+        threshold: Numbers above it are good.
+    """
+
+    field: str
+    success: str
+    pattern: str | None
+    threshold: float
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One call, and the time up to the next one.
+
+    Attributes:
+        place: Number of the call, from 1.
+        kind: What the response said.
+        number: The number in it, if there is one.
+        text: The text it was read from; empty if the field is a number.
+        asked_ns: When the request came.
+        start_ns: When the response came, or the request if none did.
+        stop_ns: When the next request came, or the recording ended.
+        until_ns: The same, less the clock's jitter.
+        outputs: What was written in [start_ns, stop_ns], in order; both ends widened by the clock's jitter.
+        awaiting: What was written between the request and its response, in order.
+    """
+
+    place: int
+    kind: Kind
+    number: float | None
+    text: str
+    asked_ns: int
+    start_ns: int
+    stop_ns: int
+    until_ns: int
+    outputs: tuple[Output, ...]
+    awaiting: tuple[Output, ...]
+
+    @property
+    def sure(self) -> tuple[Output, ...]:
+        """What cannot belong to the call before or after: what came from the response on, before the next request."""
+        return tuple(o for o in self.outputs if self.start_ns <= o.t_ns < self.until_ns)
+
+    @property
+    def shapes(self) -> frozenset[str]:
+        """The shapes of what was written."""
+        return frozenset(shape_of(o.text) for o in self.outputs)
+
+
+def episodes_of(trace: Trace, process: str, service: str, reading: ResponseReader) -> tuple[Episode, ...]:
+    """Return the calls of a student's client, each with what the process wrote after it."""
+    calls = calls_of(trace, service, "student")
+    stops = [*(b.request.t_ns for _, b in pairwise(calls)), trace.stop_ns]
+    outputs = sorted(written(trace, process), key=lambda o: o.t_ns)
+    jitter_ns = JITTER_NS[trace.clock]
+    found = []
+    for place, (call, stop_ns) in enumerate(zip(calls, stops, strict=False), 1):
+        kind, number, text = _read(call.response, reading)
+        asked_ns = call.request.t_ns
+        start_ns = asked_ns if call.response is None else call.response.t_ns
+        until_ns = stop_ns if place == len(calls) else stop_ns - jitter_ns
+        during = tuple(o for o in outputs if start_ns - jitter_ns <= o.t_ns <= stop_ns + jitter_ns)
+        before = tuple(o for o in outputs if asked_ns <= o.t_ns < start_ns)
+        found.append(Episode(place, kind, number, text, asked_ns, start_ns, stop_ns, until_ns, during, before))
+    return tuple(found)
+
+
+def complaints(outputs: Sequence[Output]) -> list[LogRecord]:
+    """Return the records of severity WARN or higher."""
+    return [o for o in outputs if isinstance(o, LogRecord) and o.severity in _COMPLAINTS]
+
+
+def _read(response: Response | None, reading: ResponseReader) -> tuple[Kind, float | None, str]:
+    if response is None:
+        return Kind.UNANSWERED, None, ""
+    text = text_at(response.value, reading.field)
+    number = number_in(text, reading.pattern) if text is not None else number_at(response.value, reading.field)
+    if reading.success and not value_at(response.value, reading.success):
+        return Kind.FAILED, number, text or ""
+    if number is None or not math.isfinite(number):
+        return Kind.UNREADABLE, None, text or ""
+    return (Kind.GOOD if number > reading.threshold else Kind.LOW), number, text or ""
+
+
+def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
+    """Return the shapes of what a process wrote before its first response.
+
+    Args:
+        trace: What was observed.
+        process: File name of the client.
+        service: Service name as on the wire.
+        cautious: Whether what came at the instant of a response without delay may have come before it.
+    """
+    first = next((c for c in calls_of(trace, service, "student") if c.response is not None), None)
+    if first is None or first.response is None:
+        return frozenset()
+    until_ns = first.response.t_ns + (cautious and first.response.t_ns == first.request.t_ns)
+    return frozenset(shape_of(o.text) for o in written(trace, process) if o.t_ns < until_ns)
