@@ -288,7 +288,7 @@ def with_batch():
         click.echo(f"batch {folder}")
         return 1
 
-    app = main.CommandLine(main.app.everyday, name="grade", context_settings=main.app.context_settings)
+    app = main.CommandLine(main.app.default, name="grade", context_settings=main.app.context_settings)
     app.add_command(batch)
     return app
 

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from grader.app.exit_codes import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
-from grader.classroom.cluster.worker_pool import require_dask
-from grader.cli.options import PATH, drawn_with, parse_share, time_budget_option
+from grader.cli.options import PATH, drawn_with, parse_share, require, time_budget_option
 from grader.core.checkup import TIERS
 from grader.reporting.escape import encoded, shown
-from grader.similarity.library import require_library
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
@@ -109,9 +107,9 @@ def command(  # noqa: PLR0913  one parameter an option
     used, 3 something failed or was undecided through no fault of a student, 130 interrupted.
     """
     if scheduler is not None:
-        require_dask()
+        require("--scheduler", "distributed", "dask")
     if similarity:
-        require_library()
+        require("--similarity", "copydetect", "similarity")
     from grader.app.request import Request  # noqa: PLC0415  as above
     from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
     from grader.classroom.outputs import platforms  # noqa: PLC0415  as above

@@ -40,49 +40,41 @@ _EPILOG = (
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
-# Stands for "no subcommand was named"; no argument of a process can hold a NUL.
-_EVERYDAY = "\0"
+# The name of the command that runs when no subcommand is named; no argument of a process can hold a NUL.
+_DEFAULT = "\0"
 
 
 class CommandLine(click.Group):
-    """Subcommands, and the everyday command that runs when the first argument names none of them."""
+    """Subcommands, and a default command that runs when the first argument names none of them."""
 
-    def __init__(self, everyday: click.Command, **attributes: Any) -> None:
+    def __init__(self, default: click.Command, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.everyday = everyday
+        self.default = default
+        self.add_command(default, _DEFAULT)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Mark the arguments that no subcommand claims."""
-        named = bool(args) and args[0] in self.commands
-        return super().parse_args(ctx, args if named else [_EVERYDAY, *args])
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command to run, its name and its arguments."""
-        if args[0] == _EVERYDAY:
-            return None, self.everyday, args[1:]
-        return super().resolve_command(ctx, args)
+        """Name the default command unless a subcommand is named."""
+        return super().parse_args(ctx, args if args and args[0] in self.commands else [_DEFAULT, *args])
 
     def invoke(self, ctx: click.Context) -> None:
         """Run the command and leave with its exit code; every problem becomes a line on standard error."""
         ctx.exit(_guarded(lambda: super(CommandLine, self).invoke(ctx)))
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Describe the everyday command, then the others."""
+        """Describe the default command, then the others."""
         formatter.write_usage(ctx.command_path, "[OPTIONS] SUBMISSION")
-        self.everyday.format_help_text(ctx, formatter)
-        self.everyday.format_options(ctx, formatter)
+        self.default.format_help_text(ctx, formatter)
+        self.default.format_options(ctx, formatter)
         self.format_commands(ctx, formatter)
-        self.everyday.format_epilog(ctx, formatter)
+        self.default.format_epilog(ctx, formatter)
 
 
-class _Everyday(click.Command):
+class _Default(click.Command):
     def get_help(self, ctx: click.Context) -> str:
         return ctx.parent.get_help() if ctx.parent else super().get_help(ctx)
 
 
-@click.command(cls=_Everyday, epilog=_EPILOG)
+@click.command(cls=_Default, epilog=_EPILOG, hidden=True)
 @click.argument("submission")
 @click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this exercise; repeatable.")
 @click.option("--all", "every", is_flag=True, help="Grade every exercise and project of which there is a file.")

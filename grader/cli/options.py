@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib.util
 from collections.abc import Callable, Sequence
 from datetime import date
 from fractions import Fraction
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from grader.core.errors import EnvironmentFault
 from grader.core.exercise import Audience
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.audience import Readers
@@ -86,6 +88,13 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
     from grader.app.seeds import seed_key  # noqa: PLC0415  reading, which --help does not need
 
     return seed_key(path)
+
+
+def require(what: str, library: str, extra: str) -> None:
+    """Make sure that the library of an optional extra is installed; raises EnvironmentFault with what to install."""
+    if importlib.util.find_spec(library) is None:
+        message = f"{what}: expected the package {library}, found none"
+        raise EnvironmentFault(message, f"pip install 'rclpy-grader[{extra}]'")
 
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

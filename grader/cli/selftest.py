@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
 import click
 
 from grader.app.exit_codes import ALL_MET, NOT_ALL_MET
 from grader.app.progress import shown_progress
-from grader.cli.options import PATH
+from grader.cli.options import PATH, require
 from grader.core.checkup import TIERS
-from grader.core.errors import EnvironmentFault
 from grader.reporting.delivery import show
 
 
@@ -48,8 +46,7 @@ def command(  # noqa: PLR0913  one parameter an option
     Exit codes: 0 no unexplained survivor, every criterion noticed something and nothing right was marked down, 1 not,
     2 the command or something it was given cannot be used.
     """
-    if importlib.util.find_spec("libcst") is None:
-        raise EnvironmentFault("grade selftest: expected libcst, found none", "pip install 'rclpy-grader[authors]'")
+    require("grade selftest", "libcst", "authors")
     from grader.mutation.running import Options, selftest  # noqa: PLC0415  as above
     from grader.mutation.showing import render_results, results_to_json  # noqa: PLC0415  as above
     from grader.rubrics.loader import NOTES  # noqa: PLC0415  the rest of the grader, and libcst

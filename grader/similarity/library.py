@@ -8,11 +8,8 @@ import threading
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.util import find_spec
 from types import FrameType
 from typing import Any
-
-from grader.core.errors import EnvironmentFault
 
 #: Line numbers, from 1 on, in order.
 Lines = tuple[int, ...]
@@ -147,16 +144,6 @@ class Similar:
     threshold: float = 0.0
     least_share: float = 0.0
     given_files: tuple[str, ...] = ()
-
-
-LIBRARY = "copydetect"
-
-
-def require_library() -> None:
-    """Make sure that programs can be compared; raises EnvironmentFault with what to install."""
-    if find_spec(LIBRARY) is None:
-        message = f"--similarity: expected the package {LIBRARY}, found none"
-        raise EnvironmentFault(message, "pip install 'rclpy-grader[similarity]'")
 
 
 #: Signs that a piece must have to count, with all names cut to one sign.

@@ -11,7 +11,7 @@ from class_samples import course
 from grader.classroom.class_run import grade_class
 from grader.classroom.local import Attempt
 from grader.classroom.store import Standing, State
-from grader.classroom.watching import SilentWatcher
+from grader.classroom.watching import Watcher
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
 from grader.submissions.submission import stage_submission
@@ -93,5 +93,5 @@ def make_class(folder, count, **changes):
     roster.write_text(f"name,username,email\n{rows}Zoë Missing,zm,zm@example.org\n", encoding="utf-8")
     grading = course(folder / "homework", folder / "results", roster=roster, adjustments=adjustments, **changes)
     wanted = replace(grading, grading=replace(grading.grading, exercises=()))
-    grade_class(wanted, SilentWatcher(), lambda line: None, MadeUp())
+    grade_class(wanted, Watcher(lambda line: None), lambda line: None, MadeUp())
     return folder / "results"

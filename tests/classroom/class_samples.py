@@ -9,7 +9,7 @@ from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt
 from grader.classroom.request import Course
 from grader.classroom.store import Standing, State
-from grader.classroom.watching import SilentWatcher
+from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
 from grader.submissions.submission import stage_submission
 
@@ -94,7 +94,7 @@ def grade(wanted, scheduler=None, watcher=None):
     """Grade a class with the fake scheduler, or another one."""
     from grader.classroom.class_run import grade_class
 
-    return grade_class(wanted, watcher or SilentWatcher(), lambda line: None, scheduler or FakeScheduler())
+    return grade_class(wanted, watcher or Watcher(lambda line: None), lambda line: None, scheduler or FakeScheduler())
 
 
 def scores(graded):

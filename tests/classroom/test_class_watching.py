@@ -1,9 +1,14 @@
 """What is shown while a class is graded: count, rate, time left, what is running; never control characters."""
 
+import io
+import re
+
 import pytest
+from rich.console import Console
+from rich.progress import MofNCompleteColumn, Progress, TextColumn
 
 from grader.classroom.store import Standing, State
-from grader.classroom.watching import Pace, PlainWatcher, clock_time, outcome_words
+from grader.classroom.watching import LiveWatcher, Watcher, clock_time, outcome_words
 
 
 class Clock:
@@ -21,7 +26,7 @@ def standing(state=State.GRADED, problem=""):
 def test_each_one_is_a_line_with_rate_and_time_left():
     """The rate is that of this run, what was done before does not count."""
     clock, lines = Clock(), []
-    watcher = PlainWatcher(lines.append, clock)
+    watcher = Watcher(lines.append, clock)
     watcher.begin(60, 7)
     for name in ("ada", "bob", "cleo"):
         watcher.step(name, "grading")
@@ -37,10 +42,25 @@ def test_each_one_is_a_line_with_rate_and_time_left():
 
 def test_many_that_run_are_counted():
     """A line stays a line on a machine with many processors."""
-    pace = Pace(Clock())
-    pace.begin(9)
-    pace.running.update(dict.fromkeys("abcdefg", ""))
-    assert pace.words() == "0.0/min, ? left; running: a, b, c, d and 3 more"
+    watcher = Watcher([].append, Clock())
+    watcher.begin(9, 0)
+    for name in "abcdefg":
+        watcher.step(name, "grading")
+    assert watcher.pace() == "0.0/min, ? left; running: a, b, c, d and 3 more"
+
+
+def test_a_terminal_shows_a_bar_under_the_lines():
+    """What was done before is said once, and lines leave the count to the bar."""
+    out = io.StringIO()
+    words = TextColumn("{task.fields[words]}", markup=False)
+    with Progress(MofNCompleteColumn(), words, console=Console(file=out, width=120), auto_refresh=False) as bar:
+        watcher = LiveWatcher(bar)
+        watcher.begin(2, 5)
+        watcher.step("ada", "grading")
+        watcher.step("bob", "grading")
+        watcher.done("ada", standing())
+    assert out.getvalue().splitlines()[:2] == ["done before: 5", "ada: 87.5/100 in 2.1 s"]
+    assert re.fullmatch(r"1/2 \d+\.\d/min, \d+:\d\d left; running: bob", out.getvalue().splitlines()[-1].rstrip())
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0, "0:00"), (59.6, "1:00"), (3599, "59:59"), (3661, "1:01:01")])

@@ -5,7 +5,6 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from grader.classroom.cluster import worker_pool
 from grader.classroom.cluster.dispatcher import address_of, connected
 from grader.cli.main import app
 from grader.core.errors import EnvironmentFault
@@ -13,7 +12,7 @@ from grader.core.errors import EnvironmentFault
 
 def test_without_the_library_nothing_begins(tmp_path, monkeypatch):
     """Exit code 2 and what to install, before the class is looked at."""
-    monkeypatch.setattr(worker_pool, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     done = CliRunner().invoke(
         app, ["batch", str(tmp_path / "none"), "-o", str(tmp_path / "o"), "--scheduler", "tcp://x:1"]
     )

@@ -9,7 +9,6 @@ from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
 
 from grader.cli.main import app
-from grader.similarity import library
 
 CORRECT = Path(__file__).resolve().parent.parent / "submissions" / "correct"
 
@@ -91,7 +90,7 @@ def test_people_of_the_same_name_are_told_apart(source):
 
 def test_without_the_library_nothing_begins(source, monkeypatch):
     """Exit code 2 and what to install, before anybody is graded."""
-    monkeypatch.setattr(library, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), "--similarity"])
     assert done.exit_code == 2
     assert done.stderr.splitlines() == [

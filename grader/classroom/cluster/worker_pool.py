@@ -1,10 +1,9 @@
-"""The workers of a Dask cluster: how to reach them, which can grade, and how many submissions at a time."""
+"""The workers of a cluster: who can grade, who cannot and why, and how many gradings they can do at a time."""
 
 from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Callable, Collection, Mapping, Sequence
-from importlib.util import find_spec
 from typing import Any
 
 from distributed import Client
@@ -12,16 +11,6 @@ from distributed import Client
 from grader.classroom.cluster import jobs
 from grader.classroom.messages import Fitness, unpack
 from grader.core.errors import EnvironmentFault, HarnessError
-
-LIBRARY = "distributed"
-
-
-def require_dask() -> None:
-    """Make sure that a cluster can be spoken to; raises EnvironmentFault with what to install."""
-    if find_spec(LIBRARY) is None:
-        message = f"--scheduler: expected the package {LIBRARY}, found none"
-        raise EnvironmentFault(message, "pip install 'rclpy-grader[dask]'")
-
 
 PACKAGE = "rclpy-grader"
 
@@ -103,20 +92,14 @@ class Fleet:
         fitness = self._known.get(address)
         return fitness is None or not fitness.unfit
 
-    def _threads(self) -> dict[str, int]:
+    def _threads(self, tries: int = 2) -> dict[str, int]:
         try:
             return dict(self._client.nthreads())
         except (OSError, TimeoutError):
-            if self._client.status != "running":
+            if tries == 1 or self._client.status != "running":
                 raise lost() from None
         # One connection of several was closed, perhaps with what a worker that ended had to do with it.
-        return self._threads_once_more()
-
-    def _threads_once_more(self) -> dict[str, int]:
-        try:
-            return dict(self._client.nthreads())
-        except (OSError, TimeoutError):
-            raise lost() from None
+        return self._threads(tries - 1)
 
     def _check_scheduler(self) -> None:
         """Make sure that the scheduler can read what it is sent: it looks into it before it hands it on."""

@@ -10,6 +10,7 @@ from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from grader.core.errors import EnvironmentFault
 from grader.reporting.escape import shown
 
 
@@ -26,9 +27,9 @@ def page_environment(package: str) -> Environment:
     return templates
 
 
-_LIBRARIES = "vendor/echarts-6.1.0.common.min.js", "vendor/dagre-3.1.3.min.js"
+_LIBRARIES = "vendor/echarts/dist/echarts.common.min.js", "vendor/@dagrejs/dagre/dist/dagre.min.js"
 #: Libraries whose file does not hold its licence; it goes wherever they go.
-_LICENCES = "vendor/echarts.LICENSE-d3", "vendor/dagre.LICENSE"
+_LICENCES = "vendor/echarts/licenses/LICENSE-d3", "vendor/@dagrejs/dagre/LICENSE"
 _OWN = ("assets/charts.js", "assets/graphs.js", "assets/page.js")
 
 
@@ -75,7 +76,11 @@ def shared_assets() -> dict[str, bytes]:
 
 
 def _read(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    try:
+        return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        text = f"grader/reporting/html/{name}: expected what installing the grader fetches, found no file"
+        raise EnvironmentFault(text, "python3 -m pip install . in the checkout of the grader") from None
 
 
 def policy_digest(text: str) -> str:

