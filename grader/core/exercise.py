@@ -7,27 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
-from typing import Annotated, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from grader.core.scenario import Scenario
 from grader.core.trace import Trace
-
-
-@dataclass(frozen=True, slots=True)
-class Language:
-    """Marks an annotated text as one that is written by the rules of some language."""
-
-    name: str
-
-
-#: A service type such as `std_srvs/srv/Trigger`.
-ServiceType = Annotated[str, Language("service type")]
-#: An action type such as `example_interfaces/action/Fibonacci`.
-ActionType = Annotated[str, Language("action type")]
-#: A formula of `n` and `t` such as `sin(0.1 * n)`.
-Formula = Annotated[str, Language("formula")]
-#: A regular expression.
-Pattern = Annotated[str, Language("pattern")]
 
 
 class ProblemKind(Enum):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from grader.core.quantities import GIB, KIB, MIB, NS_PER_S, duration, size
+from grader.core.quantities import GIB, KIB, MIB, NS_PER_S, Bytes, DurationNs, Least, duration, size
 
 #: Real time, in seconds, that all recordings of one submission may take together unless told otherwise; those of an
 #: ordinary submission take 3 to 10 s.
@@ -16,11 +17,12 @@ ADDRESS_SPACE_BEYOND = 3 * GIB // 2
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one scenario may use. Reaching a limit is told to the student, and what was recorded before is judged.
+    """What each student process may use with everything it starts, and how much of what it does is looked at.
 
-    The first group is of each student process with everything it starts, the second of each file or folder, the third
-    of the scenario. The defaults leave room above what any of the 170 right programs of our test set needed, in
-    brackets: each by itself, for ten seconds of virtual time, on two processors.
+    Reaching a limit is told to the student, and what was recorded before is judged. The first group is of each student
+    process with everything it starts, the second of each file or folder, the third of the scenario. The defaults leave
+    room above what any of the 170 right programs of our test set needed, in brackets: each by itself, for ten seconds
+    of virtual time, on two processors. A rubric may set each to no less than a node that does nothing needs.
 
     Attributes:
         memory_bytes: Memory filled, without what is read from files such as libraries (45 MiB).
@@ -38,21 +40,21 @@ class Limits:
         participants: DDS participants, of which a process has one for each ROS context; more end the recording.
     """
 
-    memory_bytes: int = 512 * MIB
-    processor_ns: int = 120 * NS_PER_S
-    processes: int = 64
-    output_bytes: int = 4 * MIB
-    lines: int = 50_000
+    memory_bytes: Annotated[Bytes, Least(128 * MIB), "memory filled, as in 512 MiB"] = 512 * MIB
+    processor_ns: Annotated[DurationNs, Least(10 * NS_PER_S), "of all threads together"] = 120 * NS_PER_S
+    processes: Annotated[int, Least(32), "processes and threads"] = 64
+    output_bytes: Annotated[Bytes, Least(KIB), "kept of each output stream"] = 4 * MIB
+    lines: Annotated[int, Least(1), "log records and lines that are kept"] = 50_000
 
-    open_files: int = 256
-    file_bytes: int = 32 * MIB
-    scratch_bytes: int = 16 * MIB
+    open_files: Annotated[int, Least(64), "descriptors of one process"] = 256
+    file_bytes: Annotated[Bytes, Least(KIB), "of one file"] = 32 * MIB
+    scratch_bytes: Annotated[Bytes, Least(MIB), "of all files in a folder"] = 16 * MIB
 
-    wall_ns: int = 150 * NS_PER_S
-    messages: int = 20_000
-    message_bytes: int = 64 * KIB
-    traffic_bytes: int = 16 * MIB
-    participants: int = 16
+    wall_ns: Annotated[DurationNs, Least(10 * NS_PER_S), "of one scenario, on either clock"] = 150 * NS_PER_S
+    messages: Annotated[int, Least(1), "on one topic"] = 20_000
+    message_bytes: Annotated[Bytes, Least(64), "of a message that is read"] = 64 * KIB
+    traffic_bytes: Annotated[Bytes, Least(KIB), "of all messages that are kept"] = 16 * MIB
+    participants: Annotated[int, Least(1), "DDS participants of the scenario"] = 16
 
     @property
     def processor_s(self) -> int:

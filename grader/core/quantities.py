@@ -47,6 +47,13 @@ class Unit:
     symbol: str
 
 
+@dataclass(frozen=True, slots=True)
+class Least:
+    """Marks an annotated number with the least that a rubric may set it to."""
+
+    value: int
+
+
 #: A number of bytes; written in rubrics as `512 MiB`.
 Bytes = Annotated[int, Unit("B")]
 #: A duration as whole nanoseconds; written in rubrics as `10 s`, `200 ms` or `2 min`.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from grader.core.limits import Limits
+from grader.core.names import ActionType, Kind, MessageType, ServiceType, Topic
 from grader.core.quantities import NS_PER_S
 
 
@@ -26,8 +27,16 @@ class CountBetween:
     high: int
 
 
-Time = int | TimeBetween
-Count = int | CountBetween
+Time = Annotated[int | TimeBetween, Kind("time")]
+#: One that is above 0.
+LongTime = Annotated[int | TimeBetween, Kind("time above 0")]
+#: Nanoseconds that are never drawn, above 0.
+FixedTime = Annotated[int, Kind("fixed time above 0")]
+#: The same, or 0 for never.
+TimeOrNever = Annotated[int, Kind("fixed time above 0, or nothing")]
+Count = Annotated[int | CountBetween, Kind("count")]
+#: One that may be 0 for never.
+CountOrNever = Annotated[int | CountBetween, Kind("count, or nothing")]
 
 
 def shortest(time: Time) -> int:
@@ -94,9 +103,9 @@ class Span:
         wait_at_most_ns: How long that first message is waited for.
     """
 
-    duration_ns: Time
-    after_first_message_on: str | None = None
-    wait_at_most_ns: int = 60 * NS_PER_S
+    duration_ns: LongTime
+    after_first_message_on: Topic | None = None
+    wait_at_most_ns: FixedTime = 60 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +137,9 @@ NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
 
 @dataclass(frozen=True, slots=True)
 class NumberStream:
-    """A stimulus: numbers published on a topic, each held for a while, in the type that the student's node takes.
+    """A stimulus: numbers published on a topic, each held for a while.
+
+    They are published in the type that the student's node takes.
 
     Attributes:
         topic: Topic name, absolute.
@@ -140,17 +151,19 @@ class NumberStream:
         start_ns: Time of the first message since scenario start.
     """
 
-    topic: str
-    type: str
-    values: tuple[NumberItem, ...]
-    period_ns: int
-    hold_ns: Time
+    topic: Topic
+    type: MessageType
+    values: Annotated[tuple[NumberItem, ...], Kind("numbers")]
+    period_ns: FixedTime
+    hold_ns: LongTime
     start_ns: Time
 
 
 @dataclass(frozen=True, slots=True)
 class OdometryStream:
-    """A stimulus: the recorded odometry, played with its own timing by a publisher that then disappears.
+    """A stimulus: the recorded odometry.
+
+    It is played with its own timing by a publisher that then disappears.
 
     Attributes:
         topic: Topic name, absolute.
@@ -158,9 +171,9 @@ class OdometryStream:
         duration_ns: How much of the recording is played; which part is drawn from the seed.
     """
 
-    topic: str
+    topic: Topic
     start_ns: Time
-    duration_ns: Time
+    duration_ns: LongTime
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,18 +201,19 @@ class Written:
 #: What a field of a planned message may hold; mappings are nested messages, tuples are sequences. Mappings have no
 #: hash: stimuli that differ in nothing else share theirs, and are told apart by comparing them.
 FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
+Fields = Annotated[Mapping[str, FieldSpec], Kind("fields")]
 #: The fields of one message, or of several in an order of their own.
 FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
 
 
 @dataclass(frozen=True, slots=True)
 class MessageStream:
-    """A stimulus: messages of one type with given fields, one a period, by a publisher that may disappear again.
+    """A stimulus: messages of one type, one a period; fields left out keep their defaults.
 
     Attributes:
         topic: Topic name, absolute.
         type: e.g. `std_msgs/msg/String`; fixed, unlike a number stream's.
-        values: Fields of each message; fields left out keep the type's defaults.
+        values: Fields of each message.
         period_ns: Time between two messages.
         start_ns: Time of the first message.
         repeats: How often each is sent, one a period; where that is drawn, for each anew.
@@ -208,25 +222,25 @@ class MessageStream:
         latched: Whether it offers transient local.
     """
 
-    topic: str
-    type: str
-    values: tuple[FieldsItem, ...] = field(hash=False)
-    period_ns: int
+    topic: Topic
+    type: MessageType
+    values: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)
+    period_ns: FixedTime
     start_ns: Time = 0
     repeats: Count = 1
-    stop_ns: int = 0
+    stop_ns: TimeOrNever = 0
     best_effort: bool = False
     latched: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceServer:
-    """A stimulus: a reference server that answers a student's client.
+    """A stimulus: a server that answers the student's client; without responses it never answers.
 
     Attributes:
         service: Absolute name.
         type: e.g. `std_srvs/srv/Trigger`.
-        responses: Fields of each response in order; an empty tuple never answers.
+        responses: Fields of each response in order.
         start_ns: When it appears.
         stop_ns: When it disappears; 0 for never.
         delay_ns: Time from a request to its response.
@@ -234,19 +248,19 @@ class ServiceServer:
         answers: After so many responses it takes one more request, and disappears without a response; 0 for never.
     """
 
-    service: str
-    type: str
-    responses: tuple[FieldsItem, ...] = field(hash=False)
+    service: Topic
+    type: ServiceType
+    responses: Annotated[tuple[FieldsItem, ...], Kind("messages, or none")] = field(hash=False)
     start_ns: Time = 0
-    stop_ns: int = 0
+    stop_ns: TimeOrNever = 0
     delay_ns: Time = 0
     cycle: bool = False
-    answers: Count = 0
+    answers: CountOrNever = 0
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceCalls:
-    """A stimulus: reference clients that call a student's server.
+    """A stimulus: clients that call the student's server; a call waits for the server to be there.
 
     Attributes:
         service: Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions
@@ -256,21 +270,21 @@ class ServiceCalls:
         calls: How many requests each client sends.
         clients: How many clients there are; the k-th call of all of them is sent at the same instant.
         period_ns: Time between two calls of a client; it does not wait for the response.
-        start_ns: When the clients appear and call first; a request waits for the server as a real client would.
+        start_ns: When the clients appear and call first.
     """
 
-    service: str
-    type: str
-    requests: tuple[FieldsItem, ...] = field(hash=False)
+    service: Topic
+    type: ServiceType
+    requests: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)
     calls: Count = 1
-    clients: int = 1
-    period_ns: int = NS_PER_S
+    clients: Annotated[int, Kind("clients")] = 1
+    period_ns: FixedTime = NS_PER_S
     start_ns: Time = 0
 
 
 @dataclass(frozen=True, slots=True)
 class ActionGoal:
-    """A stimulus: a reference client that sends one goal to a student's action server.
+    """A stimulus: a goal for the student's action server, which may be cancelled after a while.
 
     In the trace its parts are calls of the services behind an action, `/NAME/_action/send_goal`, `get_result` and
     `cancel_goal`; what the server publishes are messages on `/NAME/_action/feedback` and `status`.
@@ -283,11 +297,11 @@ class ActionGoal:
         cancel_after_ns: Time from the goal's acceptance until it asks to cancel it; 0 for never.
     """
 
-    action: str
-    type: str
-    goal: Mapping[str, FieldSpec] = field(hash=False)
+    action: Topic
+    type: ActionType
+    goal: Fields = field(hash=False)
     start_ns: Time = 0
-    cancel_after_ns: int = 0
+    cancel_after_ns: TimeOrNever = 0
 
 
 Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal

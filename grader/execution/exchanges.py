@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -59,7 +60,7 @@ def _blocks(item: Any, draw: random.Random) -> list[list[Any]]:
     return [[item]]
 
 
-Planned = TypeVar("Planned", bound="PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal")
+Planned = TypeVar("Planned")
 Fields = Mapping[str, Any]
 
 
@@ -164,28 +165,17 @@ def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages
     planned = [drawn_fields(value, draw) for value in values]
     if each:
         planned = [fields for fields, (_, times) in zip(planned, each, strict=True) for _ in range(times)]
-    return PlannedMessages(
-        topic=stream.topic,
-        type=stream.type,
-        start_ns=start_ns,
-        stop_ns=stream.stop_ns,
-        period_ns=stream.period_ns,
-        repeats=1 if isinstance(repeats, CountBetween) else repeats,
-        best_effort=stream.best_effort,
-        latched=stream.latched,
-        values=tuple(planned),
-    )
+    times = 1 if isinstance(repeats, CountBetween) else repeats
+    return _planned(PlannedMessages, stream, start_ns=start_ns, repeats=times, values=tuple(planned))
 
 
 def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
     """Return a server with every response drawn, each once: one that is given again is the same again."""
-    return PlannedServer(
-        service=server.service,
-        type=server.type,
+    return _planned(
+        PlannedServer,
+        server,
         start_ns=drawn_time(server.start_ns, draw),
-        stop_ns=server.stop_ns,
         delay_ns=drawn_time(server.delay_ns, draw),
-        cycle=server.cycle,
         answers=drawn_count(server.answers, draw),
         responses=tuple(drawn_fields(response, draw) for response in in_drawn_order(server.responses, draw)),
     )
@@ -196,26 +186,20 @@ def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
     start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
     requests = in_drawn_order(calls.requests, draw)
     wanted = [requests[call % len(requests)] for call in range(count) for _ in range(calls.clients)]
-    return PlannedCalls(
-        service=calls.service,
-        type=calls.type,
-        start_ns=start_ns,
-        period_ns=calls.period_ns,
-        clients=calls.clients,
-        requests=tuple(drawn_fields(request, draw) for request in wanted),
-    )
+    asked = tuple(drawn_fields(request, draw) for request in wanted)
+    return _planned(PlannedCalls, calls, start_ns=start_ns, requests=asked)
 
 
 def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
     """Return a goal with every field drawn."""
-    return PlannedGoal(
-        action=goal.action,
-        type=goal.type,
-        start_ns=drawn_time(goal.start_ns, draw),
-        cancel_after_ns=goal.cancel_after_ns,
-        goal=drawn_fields(goal.goal, draw),
-        uuid=tuple(draw.randbytes(16)),
-    )
+    start_ns, asked = drawn_time(goal.start_ns, draw), drawn_fields(goal.goal, draw)
+    return _planned(PlannedGoal, goal, start_ns=start_ns, goal=asked, uuid=tuple(draw.randbytes(16)))
+
+
+def _planned(kind: Callable[..., Planned], stimulus: Any, **drawn: Any) -> Planned:
+    """Return a stimulus with what was drawn; all else is as the scenario has it."""
+    same = {name: getattr(stimulus, name) for name in inspect.signature(kind).parameters if name not in drawn}
+    return kind(**same, **drawn)
 
 
 def drawn_fields(fields: Mapping[str, FieldSpec], draw: random.Random) -> Fields:
@@ -242,14 +226,3 @@ def drawn_number(spec: Between, draw: random.Random) -> int | float:
         return draw.randint(int(spec.low), int(spec.high))
     decimals = max(2, 2 - math.floor(math.log10(spec.high - spec.low)))
     return round(draw.uniform(spec.low, spec.high), decimals)
-
-
-def to_json(planned: PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal) -> dict[str, Any]:
-    """Return a planned stimulus as plain JSON values."""
-    return {name: getattr(planned, name) for name in type(planned).__slots__}
-
-
-def from_json(kind: Callable[..., Planned], data: Mapping[str, Any]) -> Planned:
-    """Return the planned stimulus that `to_json` was given; the supervisor's word is trusted."""
-    fields: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
-    return kind(**fields)

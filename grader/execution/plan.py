@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,13 +32,11 @@ from grader.execution.exchanges import (
     PlannedMessages,
     PlannedServer,
     drawn_time,
-    from_json,
     in_drawn_order,
     plan_calls,
     plan_goal,
     plan_messages,
     plan_server,
-    to_json,
 )
 
 #: A number to publish, or the limit it lies just above (1) or just below (-1) in the student's own type.
@@ -119,15 +116,6 @@ class Plan:
     shutdown_ns: int = 0
     bare: bool = False
     first_node_ns: int = 0
-
-
-#: The stimuli that are written the same way over the line, by their names in a plan.
-_EXCHANGES: Mapping[str, type[PlannedMessages | PlannedServer | PlannedCalls | PlannedGoal]] = {
-    "messages": PlannedMessages,
-    "servers": PlannedServer,
-    "calls": PlannedCalls,
-    "goals": PlannedGoal,
-}
 
 
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
@@ -228,48 +216,3 @@ def _recording(stream: OdometryStream, odometry: Odometry, seed: int, own: rando
         stop_ns=kept[-1][0] + 1 if kept else start_ns,
         messages=kept,
     )
-
-
-def plan_to_json(plan: Plan) -> dict[str, Any]:
-    """Return a plan as plain JSON values."""
-    data: dict[str, Any] = {
-        name: getattr(plan, name)
-        for name in Plan.__slots__
-        if name not in ("numbers", "recordings", "limits", *_EXCHANGES)
-    }
-    data |= {name: [to_json(planned) for planned in getattr(plan, name)] for name in _EXCHANGES}
-    data["limits"] = {name: getattr(plan.limits, name) for name in Limits.__slots__}
-    data["numbers"] = [{name: getattr(n, name) for name in PlannedNumbers.__slots__} for n in plan.numbers]
-    data["recordings"] = [
-        {
-            "topic": r.topic,
-            "type": r.type,
-            "start_ns": r.start_ns,
-            "stop_ns": r.stop_ns,
-            "messages": [[t, base64.b64encode(cdr).decode(), value] for t, cdr, value in r.messages],
-        }
-        for r in plan.recordings
-    ]
-    return data
-
-
-def plan_from_json(data: Mapping[str, Any]) -> Plan:
-    """Return the plan that `plan_to_json` was given; the supervisor's word is trusted."""
-    fields = dict(data)
-    fields["processes"] = tuple((str(name), str(file)) for name, file in data["processes"])
-    fields["limits"] = Limits(**data["limits"])
-    fields["numbers"] = tuple(
-        PlannedNumbers(**{**n, "numbers": tuple((float(value), int(side)) for value, side in n["numbers"])})
-        for n in data["numbers"]
-    )
-    fields["recordings"] = tuple(
-        PlannedRecording(**{**r, "messages": _messages(r["messages"])}) for r in data["recordings"]
-    )
-    fields |= {name: tuple(from_json(kind, one) for one in data[name]) for name, kind in _EXCHANGES.items()}
-    fields["starts_ns"] = tuple((str(name), int(t_ns)) for name, t_ns in data["starts_ns"])
-    fields["may_exit"] = tuple(data["may_exit"])
-    return Plan(**fields)
-
-
-def _messages(rows: Sequence[Sequence[Any]]) -> tuple[tuple[int, bytes, Mapping[str, Any]], ...]:
-    return tuple((int(t), base64.b64decode(cdr), value) for t, cdr, value in rows)

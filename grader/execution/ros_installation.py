@@ -13,7 +13,7 @@ import sysconfig
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.errors import EnvironmentFault
 from grader.core.releases import DEFAULT
@@ -36,28 +36,6 @@ class PythonRuntime:
     library_paths: tuple[Path, ...]
     python_paths: tuple[Path, ...]
     environment: Mapping[str, str]
-
-
-def runtime_to_json(runtime: PythonRuntime) -> dict[str, Any]:
-    """Return a runtime as JSON values."""
-    return {
-        "executable": str(runtime.executable),
-        "read_paths": [str(path) for path in runtime.read_paths],
-        "library_paths": [str(path) for path in runtime.library_paths],
-        "python_paths": [str(path) for path in runtime.python_paths],
-        "environment": dict(runtime.environment),
-    }
-
-
-def runtime_from_json(values: Mapping[str, Any]) -> PythonRuntime:
-    """Return a runtime from JSON values."""
-    return PythonRuntime(
-        executable=Path(values["executable"]),
-        read_paths=tuple(map(Path, values["read_paths"])),
-        library_paths=tuple(map(Path, values["library_paths"])),
-        python_paths=tuple(map(Path, values["python_paths"])),
-        environment=values["environment"],
-    )
 
 
 MESSAGE_PACKAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")

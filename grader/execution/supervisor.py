@@ -25,9 +25,10 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S, size
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.execution.codec import trace_from_json
-from grader.execution.plan import Plan, plan_to_json
-from grader.execution.ros_installation import PythonRuntime, runtime_to_json
+from grader.execution.codec import to_json
+from grader.execution.evidence.packed import trace_from_json
+from grader.execution.plan import Plan
+from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.protocol import Isolation
@@ -82,7 +83,7 @@ class WorkerProcess:
         self._executable = os.fsencode(runtime.executable)
         self._pid = 0
         self._line, theirs = socket.socketpair()
-        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": runtime_to_json(runtime)}
+        request = {"isolation": isolation.name, "line": theirs.fileno(), "runtime": to_json(runtime)}
         argv = [str(runtime.executable), "-s", "-u", "-m", MODULE.decode(), json.dumps(request)]
         command = isolation.worker_command(
             argv, _environment(runtime, scratch), (theirs.fileno(),), worker_view(runtime, scratch)
@@ -104,7 +105,7 @@ class WorkerProcess:
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it is no more."""
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
-        request = json.dumps({"plan": plan_to_json(plan), **own}) + "\n"
+        request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         try:
             self._line.settimeout(MARGIN_S)  # a plan with a recording in it is more than the line holds at once

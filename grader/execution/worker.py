@@ -23,12 +23,12 @@ from grader.core.quantities import GIB, MIB, NS_PER_S, duration
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
 from grader.execution.bare_runner import BareStudent
 from grader.execution.bare_start import bare_arguments
-from grader.execution.codec import trace_to_json
+from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.notes import Places
-from grader.execution.plan import Plan, plan_from_json
+from grader.execution.plan import Plan
 from grader.execution.resource_monitor import Budget, Guard
-from grader.execution.ros_installation import PythonRuntime, runtime_from_json
+from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.tiers import isolation_from_name
@@ -274,11 +274,11 @@ def main() -> None:
     line = socket.socket(fileno=request["line"])
     commands, answers = line.makefile("r"), line.makefile("w")
     limit_memory()
-    worker = Worker(isolation_from_name(request["isolation"]), runtime_from_json(request["runtime"]))
+    worker = Worker(isolation_from_name(request["isolation"]), from_json(PythonRuntime, request["runtime"]))
     for command in commands:
         data = json.loads(command)
         try:
-            plan = plan_from_json(data["plan"])
+            plan: Plan = from_json(Plan, data["plan"])
             answer: dict[str, Any] = worker.run(plan, data["domain"], data["left_ns"], data["budget"])
         except HarnessError as error:
             answer = {"problem": error.message}

@@ -1,35 +1,49 @@
-"""The parameters of a check in a rubric: pydantic models read off the check's dataclass, and back."""
+"""Dataclasses read by their annotations: pydantic models of the parameters of checks, of stimuli and of limits."""
 
 from __future__ import annotations
 
 import dataclasses
 import types
 from collections.abc import Mapping
-from functools import lru_cache
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from functools import lru_cache, partial
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
-from typing_extensions import Self
+from pydantic import AfterValidator, Field, create_model
 
 from grader.core import exercise
-from grader.core.quantities import DurationNs, Hertz
+from grader.core.quantities import DurationNs, Hertz, Least, Unit
+from grader.rubrics.drawing import Fields, SomeLongTime, SomeTime
+from grader.rubrics.stimuli import (
+    Calls,
+    CallsOrNever,
+    Clients,
+    MessageCases,
+    MessageCasesOrNone,
+    NumberCases,
+    TimeOrNever,
+)
 from grader.rubrics.types import (
     ActionType,
+    Choice,
     Duration,
     FormulaText,
     Frequency,
+    LongDuration,
     MessageType,
     PatternText,
     PythonFile,
+    Quantity,
     Real,
     ServiceType,
+    Shape,
     Text,
     Topic,
     Whole,
     YesNo,
+    build,
     wrong,
 )
-from grader.submissions.collected import listed
+from grader.rubrics.units import format_quantity
 
 T = TypeVar("T")
 
@@ -48,60 +62,98 @@ _BY_NAME: Mapping[str, Any] = {
 _BY_ANNOTATION: tuple[tuple[Any, Any], ...] = (
     (DurationNs, Duration),
     (Hertz, Frequency),
-    (exercise.ServiceType, ServiceType),
-    (exercise.ActionType, ActionType),
-    (exercise.Formula, FormulaText),
-    (exercise.Pattern, PatternText),
     (float, Real),
     (int, Whole),
     (bool, YesNo),
 )
 
+_BY_KIND: Mapping[str, Any] = {
+    "topic": Topic,
+    "message type": MessageType,
+    "service type": ServiceType,
+    "action type": ActionType,
+    "formula": FormulaText,
+    "pattern": PatternText,
+    "time": SomeTime,
+    "time above 0": SomeLongTime,
+    "fixed time above 0": LongDuration,
+    "fixed time above 0, or nothing": TimeOrNever,
+    "count": Calls,
+    "count, or nothing": CallsOrNever,
+    "clients": Clients,
+    "numbers": NumberCases,
+    "messages": MessageCases,
+    "messages, or none": MessageCasesOrNone,
+    "fields": Fields,
+}
 
-class Shape(BaseModel):
-    """A mapping with fixed keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, loc_by_alias=True, protected_namespaces=())
-
-
-class Choice(Shape):
-    """A mapping with exactly one of several keys: the kind of thing it is, and its parameters."""
-
-    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> Self:
-        if len(self.model_fields_set) != 1:
-            names = [info.alias or name for name, info in type(self).model_fields.items()]
-            raise wrong(f"exactly one of {listed(names)}")
-        return self
-
-    @property
-    def chosen(self) -> tuple[str, Any]:
-        """The one key, as written, and its value."""
-        (name,) = self.model_fields_set
-        return type(self).model_fields[name].alias or name, getattr(self, name)
+_ALIKE: Mapping[str, str] = {}
 
 
-def choice_model(name: str, summary: str, options: Mapping[str, type]) -> type[Choice]:
-    """Return the model of a mapping whose one key names a dataclass and whose value holds its parameters."""
-    fields: dict[str, Any] = {
-        f"{_PREFIX}{key}": (_parameters(cls), Field(default=None, alias=key)) for key, cls in options.items()
-    }
+class _Parameters(Shape):
+    """The fields of a frozen dataclass."""
+
+    made: ClassVar[type]
+
+    def built(self) -> Any:
+        """Return the dataclass that the mapping describes; what the rubric leaves out keeps its default.
+
+        Raises:
+            ValueError: The dataclass itself refuses the values.
+        """
+        fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
+        return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
+
+    def _is_given(self, field: dataclasses.Field[Any]) -> bool:
+        return _is_required(field) or _PREFIX + field.name in self.model_fields_set
+
+
+def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Choice]:
+    """Return the model of a mapping whose one key names a dataclass or a shape, and whose value is described by it."""
+    shapes: dict[str, Any] = {k: cls if issubclass(cls, Shape) else _parameters(cls) for k, cls in options.items()}
+    fields: dict[str, Any] = {f"{_PREFIX}{key}": (shapes[key], Field(default=None, alias=key)) for key in options}
     return create_model(name, __base__=Choice, __doc__=summary, **fields)
 
 
 @lru_cache(maxsize=256)
-def _parameters(cls: type) -> type[Shape]:
-    """Return the model of a frozen dataclass's fields."""
+def _parameters(cls: Any) -> type[Shape]:
+    """Return the model of a check: a rubric calls the fields of the dataclass what they are called in Python."""
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
         default = ... if _is_required(field) else None
         accepted = _accepted(hints[field.name], field.name)
         fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name))
-    summary = (cls.__doc__ or "").strip().split("\n\n")[0]
-    return create_model(cls.__name__, __base__=Shape, __doc__=" ".join(summary.split()), **fields)
+    return _model(cls, cls.__name__, fields)
+
+
+def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usual: Any) -> type[Shape]:
+    """Return the model of a dataclass that is part of a scenario: a rubric leaves out the units in names of fields.
+
+    Args:
+        cls: The dataclass.
+        name: What the model is called in the JSON Schema.
+        aliases: What a rubric calls a field, where it is not that.
+        usual: What the JSON Schema says of a field that a rubric leaves out, where it is not what the dataclass says;
+            a field that the dataclass requires has this value.
+    """
+    hints = get_type_hints(cls, include_extras=True)
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(cls):
+        key = aliases.get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
+        default = usual.get(key, ... if _is_required(field) else field.default)
+        words, least = _mark(hints[field.name], str), _mark(hints[field.name], Least)
+        minimum: Any = {"minimum": least.value} if least and not _mark(hints[field.name], Unit) else None
+        info = Field(default, alias=key, description=words, json_schema_extra=minimum)
+        fields[f"{_PREFIX}{field.name}"] = (_accepted(hints[field.name]), info)
+    return _model(cls, name, fields)
+
+
+def _model(cls: type, name: str, fields: dict[str, Any]) -> type[Shape]:
+    summary = " ".join((cls.__doc__ or "").strip().split("\n\n")[0].split())
+    model = create_model(name, __base__=_Parameters, __doc__=summary, **fields)
+    model.made = cls
+    return model
 
 
 def _is_required(field: dataclasses.Field[Any]) -> bool:
@@ -115,6 +167,12 @@ def _accepted(annotation: object, name: str = "") -> object:
     for known, accepted in _BY_ANNOTATION:
         if annotation == known:
             return accepted
+    if kind := _mark(annotation, exercise.Kind):
+        return _BY_KIND[kind.name]
+    if least := _mark(annotation, Least):
+        unit = _mark(annotation, Unit)
+        number = Annotated[int, Quantity(unit, above_zero=True)] if unit else Whole
+        return Annotated[number, AfterValidator(partial(_at_least, least.value, unit))]
     if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
         return _parameters(annotation)
     return _accepted_generic(annotation, name)
@@ -133,34 +191,13 @@ def _accepted_generic(annotation: object, name: str) -> object:
     raise TypeError(f"no rubric syntax for a parameter annotated {annotation!r}")
 
 
-def build(cls: type[T], parameters: Shape) -> T:
-    """Return the dataclass that a validated mapping describes; what the rubric leaves out keeps its default.
-
-    Raises:
-        ValueError: The dataclass itself refuses the values.
-    """
-    hints = get_type_hints(cls, include_extras=True)
-    given = {
-        name.removeprefix(_PREFIX): _built(hints[name.removeprefix(_PREFIX)], getattr(parameters, name))
-        for name in type(parameters).model_fields
-        if name in parameters.model_fields_set
-    }
-    return cls(**given)
+def _mark(annotation: object, kind: type[T]) -> T | None:
+    """Return the mark of a kind that an annotation carries."""
+    return next((mark for mark in getattr(annotation, "__metadata__", ()) if isinstance(mark, kind)), None)
 
 
-def _built(annotation: object, value: object) -> object:
-    if isinstance(value, Shape):
-        classes = [a for a in (annotation, *get_args(annotation)) if dataclasses.is_dataclass(a)]
-        return build(classes[0], value)  # type: ignore[arg-type]
-    if isinstance(value, tuple):
-        inner = get_args(_member(annotation, tuple))
-        return tuple(_built(inner[0] if ... in inner else inner[i], item) for i, item in enumerate(value))
-    if isinstance(value, dict):
-        return {key: _built(get_args(_member(annotation, Mapping))[1], item) for key, item in value.items()}
+def _at_least(least: int, unit: Unit | None, value: int) -> int:
+    if value < least:
+        words = format_quantity(least, unit) if unit else f"{least}"
+        raise wrong(f"at least {words}, which a node that does nothing needs")
     return value
-
-
-def _member(annotation: object, kind: type) -> object:
-    """Return an annotation, or that part of a union, whose values are of a kind."""
-    parts = (annotation, *get_args(annotation))
-    return next(p for p in parts if isinstance(get_origin(p), type) and issubclass(get_origin(p), kind))

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import Self, TypeAliasType
 
-from grader.core.scenario import (
-    AnyOrder,
-    Between,
-    Choose,
-    CountBetween,
-    FieldSpec,
-    InOrder,
-    SomeOf,
-    TimeBetween,
-    Written,
-)
-from grader.rubrics.check_parameters import Shape
-from grader.rubrics.types import Duration, LongDuration, Matching, Real, Text, Whole, YesNo, wrong
+from grader.core.scenario import AnyOrder, Between, Choose, CountBetween, InOrder, SomeOf, TimeBetween, Written
+from grader.rubrics.types import Duration, LongDuration, Matching, Real, Shape, Text, Whole, YesNo, build, wrong
 
 #: Most decimals that a text shows of a drawn number.
 DECIMALS = 9
@@ -68,6 +57,13 @@ class DrawnFieldShape(Shape):
             raise wrong("a text that holds {} once, where the number goes")
         return self
 
+    def built(self) -> Between | Choose | Written:
+        """Return what is drawn."""
+        if self.choose is not None:
+            return Choose(self.choose)
+        between = Between(*(self.between or (0.0, 1.0)))
+        return between if self.text is None else Written(self.text, between, self.decimals)
+
 
 def _kind(value: object) -> str:
     """Return the tag of what was written; tags are no names of fields, so that places stay right."""
@@ -94,27 +90,6 @@ else:
         ],
     )
 Fields = dict[FieldName, FieldValue]
-
-
-def fields_of(written: Mapping[str, Any]) -> Mapping[str, FieldSpec]:
-    """Return the fields of one message as a scenario holds them."""
-    return {name: field_of(value) for name, value in written.items()}
-
-
-def field_of(value: Any) -> FieldSpec:
-    """Return one field as a scenario holds it."""
-    if isinstance(value, DrawnFieldShape):
-        return _drawn(value)
-    if isinstance(value, Mapping):
-        return fields_of(value)
-    return tuple(field_of(item) for item in value) if isinstance(value, tuple) else value
-
-
-def _drawn(value: DrawnFieldShape) -> FieldSpec:
-    if value.choose is not None:
-        return Choose(value.choose)
-    low, high = value.between or (0.0, 1.0)
-    return Between(low, high) if value.text is None else Written(value.text, Between(low, high), value.decimals)
 
 
 #: Most cases of one list, and most times that one of them comes.
@@ -144,8 +119,12 @@ class DrawnTimeShape(Shape):
 
     between: Annotated[tuple[Duration, Duration], AfterValidator(_rising)]
 
+    def built(self) -> TimeBetween:
+        """Return the time as a scenario holds it."""
+        return TimeBetween(*self.between)
 
-class DrawnLongTimeShape(Shape):
+
+class DrawnLongTimeShape(DrawnTimeShape):
     """A time above 0 that is drawn from the seed."""
 
     between: Annotated[tuple[LongDuration, LongDuration], AfterValidator(_rising)]
@@ -155,6 +134,10 @@ class DrawnCountShape(Shape):
     """A count that is drawn from the seed."""
 
     between: Annotated[tuple[Whole, Whole], AfterValidator(_some)]
+
+    def built(self) -> CountBetween:
+        """Return the count as a scenario holds it."""
+        return CountBetween(*self.between)
 
 
 def drawn_or_not(value: object) -> str:
@@ -180,6 +163,10 @@ class InOrderShape(Shape):
 
     in_order: Any
 
+    def built(self) -> InOrder:
+        """Return the cases as a scenario holds them."""
+        return InOrder(build(self.in_order))
+
 
 class SomeOfShape(Shape):
     """A number of cases, each one of those listed, drawn from the seed."""
@@ -187,11 +174,19 @@ class SomeOfShape(Shape):
     some_of: Any
     count: SomeCount
 
+    def built(self) -> SomeOf:
+        """Return the cases as a scenario holds them."""
+        return SomeOf(build(self.some_of), build(self.count))
+
 
 class AnyOrderShape(Shape):
     """Cases that all come, in an order drawn from the seed."""
 
     any_order: Any
+
+    def built(self) -> AnyOrder:
+        """Return the cases as a scenario holds them."""
+        return AnyOrder(build(self.any_order))
 
 
 _LISTS = ("any_order", "in_order", "some_of")
@@ -219,11 +214,11 @@ def cases_model(case: Any, name: str) -> Any:
         case: What one case may be.
         name: What the shapes are called in the JSON Schema.
     """
-    listed = (_list_of(case), Field(min_length=1))
+    listed = (list_of(case), Field(min_length=1))
     in_order = create_model(f"{name}InOrder", __base__=InOrderShape, __doc__=InOrderShape.__doc__, in_order=listed)
     some_of = create_model(f"Some{name}", __base__=SomeOfShape, __doc__=SomeOfShape.__doc__, some_of=listed)
     inner = {"<case>": case, "<in_order>": in_order, "<some_of>": some_of}
-    mixed = (_list_of(_one_of(inner)), Field(min_length=1))
+    mixed = (list_of(_one_of(inner)), Field(min_length=1))
     any_order = create_model(
         f"{name}InAnyOrder", __base__=AnyOrderShape, __doc__=AnyOrderShape.__doc__, any_order=mixed
     )
@@ -235,35 +230,6 @@ def _one_of(kinds: Mapping[str, Any]) -> Any:
     return Annotated[Union[tagged], Discriminator(_kind_of_case), BeforeValidator(_spelt)]  # noqa: UP007
 
 
-def _list_of(case: Any) -> Any:
+def list_of(case: Any) -> Any:
+    """Return the type of a list of cases."""
     return tuple[case, ...]
-
-
-def cases_of(written: tuple[Any, ...], one: Callable[[Any], Any]) -> tuple[Any, ...]:
-    """Return a list of cases as a scenario holds it.
-
-    Args:
-        written: The entries.
-        one: Returns one case as a scenario holds it.
-    """
-    return tuple(_case(entry, one) for entry in written)
-
-
-def _case(entry: Any, one: Callable[[Any], Any]) -> Any:
-    if isinstance(entry, AnyOrderShape):
-        return AnyOrder(cases_of(entry.any_order, one))
-    if isinstance(entry, InOrderShape):
-        return InOrder(cases_of(entry.in_order, one))
-    if isinstance(entry, SomeOfShape):
-        return SomeOf(cases_of(entry.some_of, one), count_of(entry.count))
-    return one(entry)
-
-
-def time_of(written: int | DrawnTimeShape | DrawnLongTimeShape) -> int | TimeBetween:
-    """Return a time as a scenario holds it."""
-    return written if isinstance(written, int) else TimeBetween(*written.between)
-
-
-def count_of(written: int | DrawnCountShape) -> int | CountBetween:
-    """Return a count as a scenario holds it."""
-    return written if isinstance(written, int) else CountBetween(*written.between)

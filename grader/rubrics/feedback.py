@@ -9,9 +9,8 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, 
 from typing_extensions import Self
 
 from grader.core.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
-from grader.rubrics.check_parameters import Shape
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.types import wrong
+from grader.rubrics.types import Shape, wrong
 from grader.submissions.collected import listed
 
 _EVENTS = (DUE_DATE, PUBLISHED)

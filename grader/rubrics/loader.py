@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -15,16 +15,24 @@ from grader.core.errors import RubricError
 from grader.core.exercise import Check, Criterion, Exercise, Feedback, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
-from grader.core.scenario import Scenario, Span, Stimulus, TimeBetween, is_open, longest, longest_course_ns, shortest
+from grader.core.scenario import (
+    NumberStream,
+    Scenario,
+    Span,
+    Stimulus,
+    Time,
+    TimeBetween,
+    is_open,
+    longest,
+    longest_course_ns,
+    shortest,
+)
 from grader.judging.checks import CHECKS
-from grader.rubrics.check_parameters import build
-from grader.rubrics.drawing import DrawnLongTimeShape, DrawnTimeShape, time_of
 from grader.rubrics.feedback import feedback_of
 from grader.rubrics.mistakes import mistakes_of, nearest
-from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, limits_of, rubric_model
+from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, rubric_model
 from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
-from grader.rubrics.stimuli import stimulus_of
-from grader.rubrics.types import CHECK_FILE
+from grader.rubrics.types import CHECK_FILE, build
 from grader.rubrics.variants import (
     Draw,
     First,
@@ -81,13 +89,14 @@ def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree
     yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
     for number, process in enumerate(scenario.may_exit):
         yield from _unknown(process, scenario.processes, "one of `processes`", (*path, "may_exit", number), tree)
-    for process, start_ns in scenario.start.items():
+    observed: Span = build(scenario.observe)
+    for process, start in scenario.start.items():
         yield from _key_unknown(process, scenario.processes, (*path, "start", process), tree)
-        yield from _too_late(start_ns, scenario, (*path, "start", process), tree)
-    for number, stimulus in enumerate(scenario.stimuli):
-        kind, parameters = stimulus.chosen
-        yield from _in_stimulus(kind, parameters, scenario, (*path, "stimuli", number, kind), tree)
-        yield from _cut_off(stimulus_of(stimulus), scenario, (*path, "observe", "duration"), tree)
+        yield from _too_late(build(start), observed, (*path, "start", process), tree)
+    for number, shape in enumerate(scenario.stimuli):
+        stimulus = build(shape)
+        yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
+        yield from _cut_off(stimulus, observed, (*path, "observe", "duration"), tree)
 
 
 def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -96,35 +105,26 @@ def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree
         yield tree.keys.get(path, TOP).mistake(text, nearest(name, known))
 
 
-def _too_late(
-    start: int | DrawnTimeShape | DrawnLongTimeShape, scenario: ScenarioShape, path: TreePath, tree: YamlTree
-) -> Iterator[Mistake]:
-    if (
-        longest(time_of(start)) >= shortest(time_of(scenario.observe.duration))
-        and scenario.observe.after_first_message_on is None
-    ):
+def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    if longest(start) >= shortest(observed.duration_ns) and observed.after_first_message_on is None:
         yield tree.values.get(path, TOP).mistake("expected a start before the end of `observe`")
 
 
-def _in_stimulus(
-    kind: str, parameters: Any, scenario: ScenarioShape, path: TreePath, tree: YamlTree
-) -> Iterator[Mistake]:
-    yield from _too_late(parameters.start, scenario, (*path, "start"), tree)
-    if kind == "numbers" and shortest(time_of(parameters.hold)) < parameters.period:
+def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    yield from _too_late(stimulus.start_ns, observed, (*path, "start"), tree)
+    if isinstance(stimulus, NumberStream) and shortest(stimulus.hold_ns) < stimulus.period_ns:
         text = "expected each number to be held for at least one period, found a shorter `hold`"
         yield tree.values.get((*path, "hold"), TOP).mistake(text)
-    stop_ns = getattr(parameters, "stop", None)
-    if stop_ns is not None and stop_ns <= longest(time_of(parameters.start)):
+    if 0 < getattr(stimulus, "stop_ns", 0) <= longest(stimulus.start_ns):
         yield tree.values.get((*path, "stop"), TOP).mistake("expected a stop after the start")
 
 
-def _cut_off(stimulus: Stimulus, scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     """Yield the mistake that some draw leaves out a case, because the observation ends before it."""
-    observed = time_of(scenario.observe.duration)
-    needed_ns = longest_course_ns(stimulus)
-    if (isinstance(observed, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(observed):
+    time, needed_ns = observed.duration_ns, longest_course_ns(stimulus)
+    if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
-        text += f"{'as little as ' if isinstance(observed, TimeBetween) else ''}{duration(shortest(observed))}"
+        text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
         yield tree.values.get(path, TOP).mistake(text)
 
 
@@ -244,10 +244,10 @@ def _variant(path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[O
 def _exercise(path: Path, tree: YamlTree, checks: Mapping[str, type], digest: str) -> Exercise:
     rubric = _validated(path, tree, rubric_model(tuple(checks.items())))
     mistakes = [*tree.mistakes, *broken_links(rubric, tree)]
-    criteria = tuple(_criteria(rubric, checks, tree, mistakes))
+    criteria = tuple(_criteria(rubric, tree, mistakes))
     if mistakes:
         _refuse(path, mistakes)
-    limits = limits_of(rubric.limits)
+    limits = build(rubric.limits)
     return Exercise(
         id=rubric.exercise.id,
         number=rubric.exercise.number,
@@ -334,14 +334,12 @@ def _validated(path: Path, tree: YamlTree, model: type[_Model]) -> _Model:
         _refuse(path, [*tree.mistakes, *others])
 
 
-def _criteria(
-    rubric: RubricShape, checks: Mapping[str, type], tree: YamlTree, mistakes: list[Mistake]
-) -> Iterator[Criterion]:
+def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> Iterator[Criterion]:
     """Yield the criteria; one whose check refuses its parameters becomes a mistake."""
     for index, shape in enumerate(rubric.criteria):
         name, parameters = shape.check.chosen
         try:
-            check: Check = build(checks[name], parameters)
+            check: Check = build(parameters)
         except ValueError as error:
             where = tree.keys[("criteria", index, "check", name)]
             mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
@@ -365,18 +363,13 @@ def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Crite
 
 
 def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:
-    span = Span(
-        duration_ns=time_of(shape.observe.duration),
-        after_first_message_on=shape.observe.after_first_message_on,
-        wait_at_most_ns=shape.observe.wait_at_most,
-    )
     return Scenario(
         id=shape.id,
         processes=shape.processes,
-        span=span,
-        stimuli=tuple(stimulus_of(stimulus) for stimulus in shape.stimuli),
+        span=build(shape.observe),
+        stimuli=build(shape.stimuli),
         limits=limits,
-        starts_ns=tuple((name, time_of(shape.start[name])) for name in shape.processes if name in shape.start),
+        starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
         shutdown_ns=shape.shutdown or 0,
     )

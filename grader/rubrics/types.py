@@ -7,17 +7,70 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
 
-from pydantic import AllowInfNan, BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, Strict
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Strict,
+    model_validator,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from typing_extensions import Self
 
 from grader.core.quantities import Unit
 from grader.judging.series import FormulaError, curve
 from grader.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
+from grader.submissions.collected import listed
 
 
 def wrong(expected: str, hint: str = "") -> PydanticCustomError:
     """Return the error that says what should stand at a place in a rubric."""
     return PydanticCustomError("rubric", "{expected}", {"expected": expected, "hint": hint})
+
+
+class Shape(BaseModel):
+    """A mapping with fixed keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, loc_by_alias=True, protected_namespaces=())
+
+    def built(self) -> Any:
+        """Return what the mapping stands for in an exercise."""
+        raise NotImplementedError
+
+
+class Choice(Shape):
+    """A mapping with exactly one of several keys: the kind of thing it is, and its parameters."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> Self:
+        if len(self.model_fields_set) != 1:
+            names = [info.alias or name for name, info in type(self).model_fields.items()]
+            raise wrong(f"exactly one of {listed(names)}")
+        return self
+
+    @property
+    def chosen(self) -> tuple[str, Any]:
+        """The one key, as written, and its value."""
+        (name,) = self.model_fields_set
+        return type(self).model_fields[name].alias or name, getattr(self, name)
+
+    def built(self) -> Any:
+        """Return what the value of the one key stands for."""
+        return build(self.chosen[1])
+
+
+def build(value: Any) -> Any:
+    """Return what a validated value stands for in an exercise, and everything inside it."""
+    if isinstance(value, Shape):
+        return value.built()
+    if isinstance(value, dict):
+        return {key: build(item) for key, item in value.items()}
+    return tuple(map(build, value)) if isinstance(value, tuple) else value
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,8 @@ from pydantic import AfterValidator, ConfigDict, WithJsonSchema, model_validator
 from typing_extensions import Self
 
 from grader.core.exercise import Drawn, Value, Variant
-from grader.rubrics.check_parameters import Shape
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.types import Id, wrong
+from grader.rubrics.types import Id, Shape, wrong
 from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
 

@@ -15,7 +15,7 @@ import pytest
 
 from grader.judging.checks import CHECKS
 from grader.rubrics.manuals import manual_of
-from grader.rubrics.stimuli import StimulusShape
+from grader.rubrics.model import StimulusShape
 
 GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "authors.md"
 FILE = re.compile(r"^`([\w/.]+)`:\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -32,10 +32,10 @@ def checks_table():
 def stimuli_table():
     """Return the table of all stimuli, from the docstrings of their shapes."""
     rows = []
-    for name, field in StimulusShape.model_fields.items():
+    for field in StimulusShape.model_fields.values():
         text = " ".join(inspect.cleandoc(field.annotation.__doc__).split("\n\n")[0].split())
         text = text.removeprefix("A stimulus: ").replace("|", "/")
-        rows.append(f"| `{name}` | {text} |\n")
+        rows.append(f"| `{field.alias}` | {text} |\n")
     return "".join(rows)
 
 

@@ -31,8 +31,8 @@ from grader.core.trace import (
     StartWay,
     Trace,
 )
-from grader.execution.codec import observation_to_json, trace_from_json, trace_to_json
-from grader.execution.evidence.packed import pack, unpack
+from grader.execution.codec import observation_to_json, trace_to_json
+from grader.execution.evidence.packed import pack, trace_from_json, unpack
 
 TIMES = st.integers(min_value=-(2**70), max_value=2**70)
 # Lone surrogates too: a student's bytes may be decoded to anything.

@@ -25,8 +25,9 @@ from grader.core.scenario import (
 )
 from grader.core.submission import StudentFile, Submission
 from grader.execution.bag import Odometry
+from grader.execution.codec import to_json
 from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.plan import plan_scenario, plan_to_json
+from grader.execution.plan import plan_scenario
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
@@ -214,7 +215,7 @@ def test_what_leaves_nothing_open_is_planned_as_ever():
     """Byte for byte: evidence stays comparable, and a seed that somebody noted still gives the same run."""
     exercise = read_rubric(Path(__file__).with_name("fixed_course.yaml"))
     kept = ("numbers", "recordings", "messages", "servers", "calls", "goals", "duration_ns", "starts_ns", "host_seed")
-    plans = [plan_to_json(plan("fixed", s, seed)) for s in exercise.scenarios for seed in (1, 2, 2**40)]
+    plans = [to_json(plan("fixed", s, seed)) for s in exercise.scenarios for seed in (1, 2, 2**40)]
     text = json.dumps([{name: data[name] for name in kept} for data in plans])
     assert hashlib.sha256(text.encode()).hexdigest() == PLANS
     assert tuple(map(scenario_digest, exercise.scenarios)) == SCENARIOS

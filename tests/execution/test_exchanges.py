@@ -23,6 +23,7 @@ from grader.core.scenario import (
     Span,
     Written,
 )
+from grader.execution.codec import from_json, to_json
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.exchanges import (
     PlannedServer,
@@ -34,7 +35,7 @@ from grader.execution.exchanges import (
     plan_server,
 )
 from grader.execution.interfaces import built, interface_class, plain_fields
-from grader.execution.plan import plan_from_json, plan_to_json
+from grader.execution.plan import Plan
 from grader.execution.service_peers import check_types
 
 TRIGGER, SCAN = "std_srvs/srv/Trigger", "sensor_msgs/msg/LaserScan"
@@ -102,7 +103,7 @@ def test_a_plan_crosses_the_line():
         may_exit=("a.py",),
         shutdown_ns=7,
     )
-    assert plan_from_json(plan_to_json(exchanges)) == exchanges
+    assert from_json(Plan, to_json(exchanges)) == exchanges
 
 
 def test_a_message_is_built_from_plain_fields():

@@ -22,7 +22,8 @@ from grader.core.scenario import (
 )
 from grader.core.submission import StudentFile, Submission
 from grader.execution.bag import Odometry
-from grader.execution.plan import derive, plan_from_json, plan_scenario, plan_to_json
+from grader.execution.codec import from_json, to_json
+from grader.execution.plan import Plan, derive, plan_scenario
 
 MS = 1_000_000
 SUBMISSION = Submission(
@@ -156,4 +157,4 @@ def test_which_part_of_a_recording_is_played_is_drawn():
 def test_a_plan_comes_back_as_it_was(stimuli):
     """Over the line to the worker, as JSON."""
     planned = plan(*stimuli, odometry=drive())
-    assert plan_from_json(json.loads(json.dumps(plan_to_json(planned)))) == planned
+    assert from_json(Plan, json.loads(json.dumps(to_json(planned)))) == planned

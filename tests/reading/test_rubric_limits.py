@@ -11,7 +11,6 @@ from grader.core.errors import RubricError
 from grader.core.limits import Limits
 from grader.core.quantities import KIB, MIB, NS_PER_S, Unit
 from grader.rubrics.loader import read_rubric
-from grader.rubrics.model import USUAL, LimitsShape, limits_of
 from grader.rubrics.units import QuantityError, format_quantity, parse_quantity
 
 BYTES = Unit("B")
@@ -69,7 +68,7 @@ def test_what_is_not_named_stays_as_usual(read):
     """A rubric names only what it needs otherwise."""
     (first, _) = read("{messages: 7}").scenarios
     assert first.limits == Limits(messages=7)
-    assert read("{}").scenarios[0].limits == USUAL == limits_of(LimitsShape())
+    assert read("{}").scenarios[0].limits == Limits()
 
 
 @pytest.mark.parametrize(

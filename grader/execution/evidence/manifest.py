@@ -20,7 +20,9 @@ from typing import Any
 import msgspec
 
 from grader.core.errors import EvidenceError
+from grader.core.report import Environment
 from grader.core.scenario import Scenario
+from grader.core.submission import StudentFile
 
 #: What the run was and which recordings belong to it; written last.
 MANIFEST = "evidence.json"
@@ -141,43 +143,13 @@ class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A mapping with fixed keys."""
 
 
-class KeptFile(_Strict, frozen=True):
-    """One file that an exercise asked for; see `grader.core.submission.StudentFile`."""
-
-    wanted: str
-    found: str | None
-    similar: tuple[str, ...]
-    others: tuple[str, ...]
-
-
 class KeptSubmission(_Strict, frozen=True):
     """What was handed in; see `grader.core.submission.Submission`."""
 
     name: str
     digest: str
-    files: tuple[KeptFile, ...]
+    files: tuple[StudentFile, ...]
     notes: tuple[str, ...]
-
-
-class KeptProperty(_Strict, frozen=True):
-    """One thing that the sandbox held back; see `grader.core.checkup.Property`."""
-
-    name: str
-    holds: bool
-    mechanism: str
-    found: str
-
-
-class KeptEnvironment(_Strict, frozen=True):
-    """What the recordings were made with; see `grader.core.report.Environment`."""
-
-    grader: str
-    ros_distro: str
-    rclpy: str
-    rmw: str
-    python: str
-    isolation: str
-    containment: tuple[KeptProperty, ...]
 
 
 class KeptRecording(_Strict, frozen=True):
@@ -225,7 +197,7 @@ class Manifest(_Strict, frozen=True):
     files: tuple[str, ...]
     submission: KeptSubmission
     run: KeptRun
-    environment: KeptEnvironment
+    environment: Environment
     exercises: tuple[KeptExercise, ...]
     sources: dict[str, str]
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from typing import Any, TypeAlias, Union, get_type_hints
 
 import msgspec
 
@@ -28,10 +31,9 @@ from grader.core.trace import (
     Response,
     ServiceEnd,
     Start,
-    StartWay,
     Trace,
 )
-from grader.execution.codec import FORMAT, FaultDetails, details_from_text, lively, trace_from_json, trace_to_json
+from grader.execution.codec import FORMAT, WORDS, trace_to_json
 
 #: Shorter values take less as the dict they are; a longer one may hold a number that no decoder takes.
 _SHORTEST, _LONGEST = 64, 4_000
@@ -81,6 +83,13 @@ def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
     return Fields(text) if lazy else _decode(text)
 
 
+#: Exit code, signal and Python version of a fault, as `Fault` has them.
+_FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
+# The words of faults in recordings that lack these details.
+_EXITED = re.compile(r"exited with code (-?\d{1,9})")
+_KILLED = re.compile(r"ended by (SIG[A-Z0-9]+|signal \d+)")
+_PYTHON = re.compile(r"\(read by Python (\d{1,3})\.(\d{1,3})\)")
+_SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 #: Stands for bytes that are a message of the recording itself.
 THERE = "*"
 #: Place of the bytes in what is packed of messages, and of requests and responses.
@@ -89,132 +98,107 @@ _PLACES = {"message": _CDR, "delivery": _CDR, "request": 8, "response": 8}
 _ODD_NUMBER = b'{"float":'
 
 
-class _Row(msgspec.Struct, array_like=True, forbid_unknown_fields=True, tag_field="is"):
-    """One observation as it is written: its kind, then its fields in their order."""
+def _lively(value: Any) -> Any:
+    """Return what `plain` was given of the fields of a message."""
+    if isinstance(value, dict):
+        if value.keys() == {"float"} and isinstance(value["float"], str):
+            return _SPECIAL[value["float"]]
+        return {name: _lively(field) for name, field in value.items()}
+    return [_lively(field) for field in value] if isinstance(value, list) else value
 
 
-class _Message(_Row, tag="message"):
-    t_ns: int
-    topic: str
-    type: str
-    value: msgspec.Raw
-    cdr: str
+def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: Any) -> Any:
+    """Return the struct that checks what is written of a dataclass: a list of its fields, after its word if it has one.
+
+    Args:
+        kind: The dataclass.
+        left_out: Fields that are not written, or otherwise.
+        last: Name, type and default of a field at the end that need not be there.
+        others: Types of fields that are written as something else.
+    """
+    hints = {**get_type_hints(kind), **others}
+    fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]
+    return msgspec.defstruct(
+        kind.__name__,
+        [*fields_, *([last] if last else [])],
+        array_like=True,
+        forbid_unknown_fields=True,
+        tag=WORDS.get(kind),
+        tag_field="is" if kind in WORDS else None,
+    )
 
 
-class _Delivery(_Message, tag="delivery"):
-    pass
+def _trace_row(rows: Iterable[Any]) -> Any:
+    """Return the struct that checks what `trace_to_json` writes, of observations that are checked by these."""
+    written: list[Any] = [
+        *((name, str) for name in ("format", "scenario", "clock_reason", "harness_problem")),
+        ("clock", ClockKind),
+        ("stop_ns", int),
+        ("notes", tuple[str, ...]),
+        ("observations", list[Union[tuple(rows)]]),  # type: ignore[misc]  # noqa: UP007
+        ("starts", tuple[_row_of(Start), ...], ()),  # type: ignore[misc]
+        ("reached", tuple[str, ...], ()),
+    ]
+    return msgspec.defstruct("Trace", written)
 
 
-class _Request(_Row, tag="request"):
-    t_ns: int
-    service: str
-    type: str
-    number: int
-    sender: str
-    client: int
-    value: dict[str, Any]
-    cdr: str
+def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> Trace:
+    """Return the trace that a struct holds, with observations that are made by these."""
+    return Trace(
+        scenario=row.scenario,
+        clock=row.clock,
+        stop_ns=row.stop_ns,
+        observations=tuple([makers[type(one)](one) for one in row.observations]),
+        clock_reason=row.clock_reason,
+        notes=row.notes,
+        harness_problem=row.harness_problem,
+        starts=tuple(_same(Start, start) for start in row.starts),
+        reached=row.reached,
+    )
 
 
-class _Response(_Request, tag="response"):
-    pass
+def trace_from_json(data: Any) -> Trace:
+    """Return the trace that JSON values hold; raises HarnessError if they hold none."""
+    try:
+        if data["format"] != FORMAT:
+            raise HarnessError(f"trace: expected format {FORMAT}, found {str(data['format'])[:40]}")
+        return _trace_of(msgspec.convert(data, _TRACE), _EXACT_MAKERS)
+    except (KeyError, TypeError, ValueError, IndexError, RecursionError) as error:
+        raise HarnessError(f"trace: expected {FORMAT}, found something else ({type(error).__name__})") from error
 
 
-class _Log(_Row, tag="log"):
-    t_ns: int
-    process: str
-    severity: str
-    logger: str
-    text: str
-    file: str
-    line: int
+def _same(kind: Callable[..., Any], row: Any) -> Any:
+    return kind(*msgspec.structs.astuple(row))
 
 
-class _Line(_Row, tag="line"):
-    t_ns: int
-    process: str
-    stream: str
-    text: str
+def _carrying(kind: Callable[..., Any], row: Any) -> Any:
+    *values, value, cdr = msgspec.structs.astuple(row)
+    return kind(*values, _lively(value), base64.b64decode(cdr, validate=True))
 
 
-class _End(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    kind: str
-    topic: str
-    type: str
-    node: str
-    participant: int
-    reliability: str
-    durability: str
-    depth: int
-    deadline_ns: int
-    liveliness: str
+def _graph(row: Any) -> GraphSnapshot:
+    ends = tuple(_same(Endpoint, end) for end in row.endpoints)
+    return GraphSnapshot(row.t_ns, row.nodes, ends, tuple(_same(ServiceEnd, end) for end in row.services))
 
 
-class _Service(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    kind: str
-    service: str
-    type: str
-    node: str
+def _fault(row: Any) -> Fault:
+    *values, details = msgspec.structs.astuple(row)
+    return Fault(*values, *(_details_from_text(row.kind, row.text) if details is msgspec.UNSET else details))
 
 
-class _Graph(_Row, tag="graph"):
-    t_ns: int
-    nodes: list[str]
-    endpoints: list[_End]
-    services: list[_Service] = []
+def _details_from_text(kind: FaultKind, text: str) -> _FaultDetails:
+    """Return exit code, signal and Python version of a fault whose recording has only the text.
 
-
-class _Fault(_Row, tag="fault"):
-    t_ns: int
-    process: str
-    kind: FaultKind
-    text: str
-    file: str
-    line: int
-    frames: tuple[str, ...]
-    details: FaultDetails | msgspec.UnsetType = msgspec.UNSET
-
-
-class _Offer(_Row, tag="offer"):
-    t_ns: int
-    process: str
-    kind: str
-    name: str
-    detail: str
-
-
-class _Mark(_Row, tag="mark"):
-    t_ns: int
-    name: str
-    detail: str
-
-
-class _Packed(msgspec.Struct, forbid_unknown_fields=True):
-    """A whole trace as it is written."""
-
-    format: str
-    scenario: str
-    clock: ClockKind
-    clock_reason: str
-    stop_ns: int
-    notes: tuple[str, ...]
-    harness_problem: str
-    observations: list[_Message | _Delivery | _Request | _Response | _Log | _Line | _Graph | _Fault | _Offer | _Mark]
-    starts: list[tuple[str, str, StartWay, str, tuple[str, ...]]] = []
-
-
-_DECODER = msgspec.json.Decoder(_Packed)
-_fields = msgspec.structs.astuple
-
-
-def _graph(row: _Graph) -> GraphSnapshot:
-    services = tuple(ServiceEnd(*_fields(end)) for end in row.services)
-    return GraphSnapshot(row.t_ns, tuple(row.nodes), tuple(Endpoint(*_fields(end)) for end in row.endpoints), services)
-
-
-def _fault(row: _Fault) -> Fault:
-    *fields, details = _fields(row)
-    return Fault(*fields, *(details_from_text(row.kind, row.text) if details is msgspec.UNSET else details))
+    Early recordings of version 1 tell these three only in the words of that time. Nothing else reads them from text.
+    """
+    exited = _EXITED.fullmatch(text) if kind is FaultKind.EXITED else None
+    killed = _KILLED.fullmatch(text) if kind is FaultKind.KILLED else None
+    version = _PYTHON.search(text) if kind is FaultKind.SYNTAX_ERROR else None
+    return (
+        int(exited[1]) if exited else None,
+        killed[1] if killed else "",
+        (int(version[1]), int(version[2])) if version else None,
+    )
 
 
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
@@ -222,7 +206,7 @@ def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Obse
     # the __init__ of a frozen dataclass takes twice as long, and there are a thousand messages
     t_ns, topic, type_, value, cdr = (getattr(kind, name).__set__ for name in kind.__slots__)
 
-    def make(row: _Message) -> Observation:
+    def make(row: Any) -> Observation:
         made = blank(kind)
         t_ns(made, row.t_ns)
         topic(made, row.topic)
@@ -238,18 +222,40 @@ def _exchange(kind: type[Request] | type[Response]) -> Callable[[Any], Observati
     return lambda row: kind(row.t_ns, row.service, row.type, row.number, row.sender, row.client, row.value)
 
 
-_MAKERS: Mapping[type[_Row], Callable[[Any], Observation]] = {
-    _Message: _without_bytes(Message),
-    _Delivery: _without_bytes(Delivery),
-    _Request: _exchange(Request),
-    _Response: _exchange(Response),
-    _Log: lambda row: LogRecord(*_fields(row)),
-    _Line: lambda row: OutputLine(*_fields(row)),
-    _Graph: _graph,
-    _Fault: _fault,
-    _Offer: lambda row: Offer(*_fields(row)),
-    _Mark: lambda row: Mark(*_fields(row)),
+#: What checks each kind of observation, and what makes it of that.
+_EXACT_ROWS: Mapping[type, Any] = {
+    **{kind: _row_of(kind, value=dict[str, Any], cdr=str) for kind in (Message, Delivery, Request, Response)},
+    **{kind: _row_of(kind) for kind in (LogRecord, OutputLine, Offer, Mark)},
+    GraphSnapshot: _row_of(
+        GraphSnapshot,
+        "services",
+        endpoints=tuple[_row_of(Endpoint), ...],  # type: ignore[misc]
+        last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
+    ),
+    Fault: _row_of(
+        Fault, "exit_code", "signal", "python", last=("details", _FaultDetails | msgspec.UnsetType, msgspec.UNSET)
+    ),
 }
+_EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
+    **{_EXACT_ROWS[kind]: partial(_carrying, kind) for kind in (Message, Delivery, Request, Response)},
+    **{_EXACT_ROWS[kind]: partial(_same, kind) for kind in (LogRecord, OutputLine, Offer, Mark)},
+    _EXACT_ROWS[GraphSnapshot]: _graph,
+    _EXACT_ROWS[Fault]: _fault,
+}
+_TRACE = _trace_row(_EXACT_ROWS.values())
+#: The quick way leaves the fields of messages as the JSON that they are.
+_ROWS: Mapping[type, Any] = {
+    **_EXACT_ROWS,
+    **{kind: _row_of(kind, value=msgspec.Raw, cdr=str) for kind in (Message, Delivery)},
+}
+_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
+    **_EXACT_MAKERS,
+    _ROWS[Message]: _without_bytes(Message),
+    _ROWS[Delivery]: _without_bytes(Delivery),
+    _ROWS[Request]: _exchange(Request),
+    _ROWS[Response]: _exchange(Response),
+}
+_DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 
 
 def pack(trace: Trace, there: Sequence[bool]) -> bytes:
@@ -276,23 +282,14 @@ def unpack(data: bytes) -> Trace:
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
     try:
         packed = _DECODER.decode(data)
-        observations = tuple([_MAKERS[type(row)](row) for row in packed.observations])
+        trace = _trace_of(packed, _MAKERS)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return unpack_exactly(data, None)  # texts that no encoding holds, or damage: the codec tells which
     if packed.format != FORMAT:
         raise EvidenceError(f"trace: expected format {FORMAT}, found {packed.format[:40]}")
     if _ODD_NUMBER in data:
-        observations = tuple(map(_revived, observations))
-    return Trace(
-        packed.scenario,
-        packed.clock,
-        packed.stop_ns,
-        observations,
-        packed.clock_reason,
-        packed.notes,
-        packed.harness_problem,
-        tuple(Start(*start) for start in packed.starts),
-    )
+        return replace(trace, observations=tuple(map(_revived, trace.observations)))
+    return trace
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
@@ -329,6 +326,6 @@ def _revived(observation: Observation) -> Observation:
     if not isinstance(observation, (Message, Delivery, Request, Response)):
         return observation
     try:
-        return replace(observation, value=lively(dict(observation.value)))
+        return replace(observation, value=_lively(dict(observation.value)))
     except KeyError as error:
         raise EvidenceError("trace: expected a number, found another word") from error

@@ -27,7 +27,7 @@ from grader.core.trace import (
     Request,
     Response,
 )
-from grader.execution.codec import observation_to_json, plain
+from grader.execution.codec import observation_to_json, plain, to_json
 
 #: Deepest nesting of a message that is built from its fields.
 DEPTH = 8
@@ -203,9 +203,7 @@ def _fields(observation: Observation) -> dict[str, Any]:
     _, _, *values = observation_to_json(observation)
     fields = dict(zip(type(observation).__slots__[1:], values, strict=False))
     if isinstance(observation, GraphSnapshot):
-        ends = observation.endpoints
-        fields["endpoints"] = [{name: getattr(e, name) for name in type(e).__slots__} for e in ends]
-        fields["services"] = [{name: getattr(e, name) for name in type(e).__slots__} for e in observation.services]
+        fields |= {"endpoints": to_json(observation.endpoints), "services": to_json(observation.services)}
     if isinstance(observation, (Request, Response)):
         fields = {"what": type(observation).__name__.lower(), **fields}
     return fields

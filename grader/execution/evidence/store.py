@@ -11,12 +11,11 @@ from typing import Any
 
 import msgspec
 
-from grader.core.checkup import Property
 from grader.core.errors import EvidenceError
 from grader.core.exercise import Exercise
 from grader.core.report import Environment, Reproduction
 from grader.core.scenario import Scenario
-from grader.core.submission import Run, StudentFile, Submission
+from grader.core.submission import Run, Submission
 from grader.core.trace import ClockKind, Trace
 from grader.execution.evidence import manifest as files
 from grader.execution.evidence import manifest as kept
@@ -145,7 +144,7 @@ def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Map
         submission=_submission(manifest),
         traces=traces,
         sources=manifest.sources,
-        environment=_environment(manifest.environment),
+        environment=manifest.environment,
         seed=manifest.run.seed,
         duration_s=manifest.run.duration_s,
         notes=manifest.run.notes,
@@ -232,7 +231,7 @@ def _facts(run: Run, exercise: str) -> dict[str, str]:
 
 
 def _kept_facts(manifest: kept.Manifest, owner: kept.KeptExercise) -> dict[str, str]:
-    run, environment = manifest.run, _environment(manifest.environment)
+    run, environment = manifest.run, manifest.environment
     return _as_facts(owner.id, manifest.submission.digest, owner.rubric, run.seed, run.recording, environment)
 
 
@@ -266,11 +265,11 @@ def _manifest(
         submission=kept.KeptSubmission(
             submission.name,
             submission.digest,
-            tuple(kept.KeptFile(f.wanted, f.found, f.similar, f.others) for f in submission.files.values()),
+            tuple(submission.files.values()),
             submission.notes,
         ),
         run=kept.KeptRun(submission.path, run.seed, run.duration_s, run.notes, run.reproduce.recording, dict(request)),
-        environment=msgspec.convert(asdict(run.environment), kept.KeptEnvironment),
+        environment=run.environment,
         exercises=tuple(
             kept.KeptExercise(
                 e.id,
@@ -297,12 +296,6 @@ def _submission(manifest: kept.Manifest) -> Submission:
         path=manifest.run.path,
         root=_NOWHERE,
         digest=submission.digest,
-        files={f.wanted: StudentFile(f.wanted, f.found, f.similar, f.others) for f in submission.files},
+        files={file.wanted: file for file in submission.files},
         notes=submission.notes,
     )
-
-
-def _environment(environment: kept.KeptEnvironment) -> Environment:
-    plain = {name: getattr(environment, name) for name in environment.__struct_fields__ if name != "containment"}
-    held = tuple(Property(p.name, p.holds, p.mechanism, p.found) for p in environment.containment)
-    return Environment(**plain, containment=held)

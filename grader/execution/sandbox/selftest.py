@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.checkup import PROPERTIES, TIERS, Property, TierReport, missing
+from grader.execution.codec import to_json
 from grader.execution.domains import private_domains, shared_domains
-from grader.execution.ros_installation import RosInstallation, runtime_to_json
+from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.environment import PACKAGE, worker_environment
 from grader.execution.sandbox.exposure import worker_view
 from grader.execution.sandbox.properties import mechanism
@@ -98,7 +99,7 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
     submission = bait.folder / "submission"
     request = {
         "isolation": isolation.name,
-        "runtime": runtime_to_json(ros.runtime),
+        "runtime": to_json(ros.runtime),
         "submission": str(submission),
         "staged": STAGED,
         "domain": next(shared_domains() if isolation.shares_network else private_domains()),

@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from grader.core.limits import Limits
-from grader.execution.ros_installation import runtime_from_json
+from grader.execution.codec import from_json
+from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox import probe
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Command, StudentProcess
@@ -90,7 +91,7 @@ def condition() -> Mapping[str, object]:
 def probe_command(request: dict[str, Any], segment: str) -> Command:
     """Return the command of the probe, as a student's process."""
     isolation = isolation_from_name(request["isolation"])
-    runtime = runtime_from_json(request["runtime"])
+    runtime = from_json(PythonRuntime, request["runtime"])
     told = {
         **request["probe"],
         "worker": os.getpid(),

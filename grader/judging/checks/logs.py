@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
-from grader.core.exercise import Finding, Location, Pattern
+from grader.core.exercise import Finding, Location
+from grader.core.names import Pattern
 from grader.core.quantities import DurationNs, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.findings import (
