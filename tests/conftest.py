@@ -1,13 +1,19 @@
 """What holds for all tests: a busy machine makes no test fail, and neither does a shell that ignores Ctrl-C."""
 
+from __future__ import annotations
+
 import logging
 import signal
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("unhurried")
+#: The markers of tests that `-m fast` leaves out.
+NOT_FAST = ("ros", "browser", "sandbox", "slow", "nightly")
+
+settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=30)
+settings.register_profile("nightly", settings.get_profile("default"), max_examples=200)
 
 # What a shell runs in the background ignores interrupts, and so would every program that is interrupted here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -17,12 +23,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 class _Fail(logging.Handler):
     """Fails where the grader logs a mistake of its own that it gets over."""
 
-    def emit(self, record):
+    def emit(self, record: logging.LogRecord) -> None:
         raise AssertionError(record.getMessage())
 
 
 @pytest.fixture(autouse=True)
-def strict_log(request):
+def strict_log(request: pytest.FixtureRequest) -> Iterator[None]:
     """Let a test fail that logs a mistake, unless it asks for caplog."""
     if "caplog" in request.fixturenames:
         yield
@@ -33,14 +39,28 @@ def strict_log(request):
     logging.getLogger("grader").removeHandler(handler)
 
 
-def pytest_addoption(parser):
+def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option of the nightly run."""
     parser.addoption("--everything", action="store_true", help="run the tests that are left to the nightly run as well")
 
 
-def pytest_collection_modifyitems(config, items):
-    """Leave out what is marked for the nightly run, unless everything is asked for."""
-    left_out = [] if config.getoption("--everything") else [i for i in items if i.get_closest_marker("nightly")]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
+def pytest_configure(config: pytest.Config) -> None:
+    """Try more examples of each property in the nightly run."""
+    settings.load_profile("nightly" if config.getoption("--everything") else "default")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the fast tests, leave out the nightly ones unless everything is asked for, and put those with nodes first.
+
+    Real nodes wait more than they compute: beside each other they leave the processor to each other. The tests that
+    compute come last and fill what is left.
+    """
+    for item in items:
+        if not any(item.get_closest_marker(kind) for kind in NOT_FAST):
+            item.add_marker("fast")
+    nightly = [item for item in items if item.get_closest_marker("nightly")]
+    if nightly and not config.getoption("--everything"):
+        config.hook.pytest_deselected(items=nightly)
         items[:] = [item for item in items if not item.get_closest_marker("nightly")]
+    items.sort(key=lambda item: item.get_closest_marker("ros") is None)

@@ -1,6 +1,7 @@
 """What keeps judging pure and the host apart; `lint-imports` checks which package imports which (pyproject.toml)."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -27,9 +28,14 @@ EXCUSED = {
 HOST_MAY_IMPORT = {"rclpy", "time_machine", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs"}
 
 
+@functools.cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports_of(path):
     """Yield the absolute module names that a file imports, wherever in it; relative ones begin with a dot."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -89,7 +95,7 @@ def text_readers(package):
     return [
         f"{path.relative_to(package).as_posix()}:{node.lineno}"
         for path in sorted(package.rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree_of(path))
         if reads_text(node)
     ]
 
@@ -197,7 +203,7 @@ def test_a_planted_need_is_found(tmp_path):
 def test_every_module_says_what_it_holds():
     """One sentence at the top of every file."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path
+        assert ast.get_docstring(tree_of(path)), path
 
 
 #: Places on one person's machine; what students hand in may name any.

@@ -4,11 +4,11 @@ import json
 import os
 import subprocess
 import sys
-from fractions import Fraction
 from pathlib import Path
 
 import click
 import pytest
+from cli_samples import a_report
 from click.testing import CliRunner
 
 import grader
@@ -16,20 +16,6 @@ from grader.app import grade as session
 from grader.cli import main
 from grader.core import errors
 from grader.core.exercise import Outcome
-from grader.core.report import Environment, ExerciseReport, Report, Verdict
-from grader.core.trace import ClockKind
-
-
-def a_report(*outcomes, score=None):
-    """Return a report of one exercise with a criterion of 10 points for each outcome."""
-    earned = {Outcome.MET: 10, Outcome.PARTLY: 5}
-    verdicts = tuple(
-        Verdict(f"c{n}", f"Criterion {n} ±", o, Fraction(earned.get(o, 0)), Fraction(10), "why")
-        for n, o in enumerate(outcomes or (Outcome.MET,))
-    )
-    part = ExerciseReport("velocity_publisher", "1", "Velocity", True, ClockKind.VIRTUAL, "", verdicts)
-    environment = Environment("0.1.0", "jazzy", "7.1.6", "rmw_fastrtps_cpp", "3.11.9", "none")
-    return Report("ada", "./ada", "sha256:" + "0" * 64, environment, 7, (part,), 1.5)
 
 
 class Session:
@@ -313,7 +299,7 @@ def test_a_folder_named_like_a_subcommand_is_graded(run_session, with_batch, arg
 CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
-from test_cli import a_report
+from cli_samples import a_report
 from grader import cli, session
 def grade(request, progress, hear=None, early=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")
@@ -332,6 +318,7 @@ def process(*arguments, **kwargs):
     return subprocess.Popen(command, stderr=kwargs.pop("stderr", subprocess.PIPE), **kwargs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--json", "--no-progress"])
 def test_a_reader_that_had_enough_is_no_problem(option):
     """`grade ada | head -1` ends quietly and with its own exit code."""
@@ -342,6 +329,7 @@ def test_a_reader_that_had_enough_is_no_problem(option):
     assert child.returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 def test_a_full_disk_behind_standard_output_is_said():
     """The report is lost, and nobody takes the exit code for a success."""
@@ -352,6 +340,7 @@ def test_a_full_disk_behind_standard_output_is_said():
     assert child.returncode == 2
 
 
+@pytest.mark.slow
 def test_an_ascii_terminal_still_gets_the_numbers():
     """Signs that it cannot show give way to plain ones."""
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
@@ -360,6 +349,7 @@ def test_an_ascii_terminal_still_gets_the_numbers():
     assert b"Criterion 0 +/-" in out
 
 
+@pytest.mark.slow
 def test_a_terminal_sees_progress_and_colours():
     """On a terminal the step is named, escaped, and gone again; the report is coloured."""
     leader, follower = os.openpty()
@@ -380,6 +370,7 @@ def test_a_terminal_sees_progress_and_colours():
     assert b"\x1b[31malone" not in seen
 
 
+@pytest.mark.slow
 def test_help_starts_light():
     """Neither rich nor pydantic nor ROS is imported before they are needed."""
     code = (

@@ -10,14 +10,11 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from recorded.archive import SEED, SUBMISSIONS, outcomes, told
-from ruamel.yaml import YAML
+from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
 
 from grader.app.grade import Request, grade
 
 ROOT = Path(__file__).resolve().parent.parent
-EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
-GOLDEN = YAML(typ="safe").load((SUBMISSIONS / "golden.yaml").read_text(encoding="utf-8"))
 #: What these are told depends on where a loop stood when it was stopped.
 UNSTEADY = ("broken/loops_in_callback", "broken/loops_in_constructor", "broken/events_executor", "broken/memory_grows")
 GRADE = str(Path(sys.executable).with_name("grade"))
@@ -38,26 +35,30 @@ def run(*arguments, **options):
     return subprocess.run([GRADE, *map(str, arguments)], check=False, capture_output=True, text=True, **options)
 
 
+#: Of the submissions of a kind that ask the same, all but each of so many are left to the nightly run.
+EACH = 24
+
+
 def live():
-    """Yield every folder; of those of a kind that ask the same, all but each eighth are left to the nightly run."""
+    """Yield every folder, marked where it is left to the nightly run; the recording of each is judged in any case."""
     seen = Counter()
-    for folder, entry in EXPECTED.items():
+    for folder, entry in expected().items():
         kind = (folder.partition("/")[0], *entry["graded"])
-        yield pytest.param(folder, marks=[pytest.mark.nightly] if seen[kind] % 8 else [])
+        yield pytest.param(folder, marks=[pytest.mark.nightly] if seen[kind] % EACH else [])
         seen[kind] += 1
 
 
 @pytest.mark.parametrize("folder", list(live()))
 def test_a_submission_gets_what_it_is_worth(folder):
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
-    wanted = EXPECTED[folder]
+    wanted = expected()[folder]
     report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
     assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.
     same_words = report.environment.ros_distro == "jazzy" or folder != "broken/timer_callback_called"
     if steady and same_words:
-        assert told(report) == GOLDEN.get(folder, {})
+        assert told(report) == golden().get(folder, {})
 
 
 def test_the_reference_solutions_score_full_on_the_virtual_clock():

@@ -42,7 +42,10 @@ def test_every_program_is_listed():
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("program", PROGRAMS, ids=[p["folder"] for p in PROGRAMS])
+@pytest.mark.parametrize(
+    "program",
+    [pytest.param(p, id=p["folder"], marks=[pytest.mark.nightly] if p.get("nightly") else []) for p in PROGRAMS],
+)
 def test_a_program_gets_what_it_is_worth(program):
     """What a process says about itself is no evidence, and nothing that it did is lost."""
     clock = program.get("decided", "auto")

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from stand_in_runner import CANARY, ROOT, evaluated, job_environment, obeyed, pairs, run_action
 
+pytestmark = pytest.mark.slow
+
 #: Writes the reports that it is asked for, prints what a hostile student would like to print, and ends as it is told.
 PROGRAM = """#!{python} -IS
 import json, os, sys

@@ -9,6 +9,8 @@ import sys
 import pytest
 from stand_in_runner import ROOT, job_environment, obeyed
 
+pytestmark = pytest.mark.slow
+
 #: Ends as its HOME says, `doctor` as its LANG says; writes reports unless it ends with 2.
 PROGRAM = """#!{python} -IS
 import os, sys

@@ -15,6 +15,8 @@ from grader.cli.main import app
 from grader.core.errors import EnvironmentFault, KeyFileError, RubricError
 from grader.packaging import CLASSROOM50_BYTES, Chosen, classroom50, gradescope, pins, wheel
 
+pytestmark = pytest.mark.slow
+
 
 def opened(content):
     return zipfile.ZipFile(io.BytesIO(content))

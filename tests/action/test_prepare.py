@@ -6,6 +6,8 @@ import subprocess
 import pytest
 from stand_in_runner import ROOT
 
+pytestmark = pytest.mark.slow
+
 RESTRICTION = "sys/kernel/apparmor_restrict_unprivileged_userns"
 SYSCTL = "sysctl --quiet --write kernel.apparmor_restrict_unprivileged_userns=0"
 

@@ -60,6 +60,12 @@ class Arena:
         tier: Name of the tier in which students' code is run.
     """
 
+    _tcp: socket.socket
+    _udp: socket.socket
+    _multicast: socket.socket
+    _abstract: socket.socket
+    _unix: socket.socket
+
     def __init__(self, tier: str) -> None:
         self.tier = tier
         self.secret = f"canary-{secrets.token_hex(16)}"
@@ -245,7 +251,7 @@ class Arena:
         (self.base / "earlier.json").write_text(json.dumps({"token": self.secret}), encoding="utf-8")
 
     def _listen(self, stack: contextlib.ExitStack) -> None:
-        kinds = {
+        kinds: dict[str, tuple[int, int, str | tuple[str, int]]] = {
             "_tcp": (socket.AF_INET, socket.SOCK_STREAM, ("0.0.0.0", 0)),
             "_udp": (socket.AF_INET, socket.SOCK_DGRAM, ("0.0.0.0", 0)),
             "_multicast": (socket.AF_INET, socket.SOCK_DGRAM, ("0.0.0.0", 0)),

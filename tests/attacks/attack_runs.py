@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import hostile_reports
 from arena import ROOT, Arena, Ran
@@ -237,7 +238,7 @@ def _equip(folder: Path, arena: Arena) -> None:
     (folder / "planted.py").write_text(arena.planted(), encoding="utf-8")
 
 
-def _module(path: Path) -> object:
+def _module(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None

@@ -1,10 +1,14 @@
 """Every attack of the table, tried in the tiers that CI has, and the traps, tried on what they must notice."""
 
+from __future__ import annotations
+
 import os
 import shutil
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import hostile_reports
 import pytest
@@ -27,14 +31,14 @@ NOTHING = Ran(0, {}, "", "", {})
 
 
 @pytest.fixture(scope="module")
-def usable():
+def usable() -> dict[str, str]:
     try:
         return {tier.name: tier.why for tier in inspect_tiers(find_ros())}
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
 
 
-def skip_without(tier, usable):
+def skip_without(tier: str, usable: dict[str, str]) -> None:
     if tier in UNPRIVILEGED and os.geteuid() == 0:
         missing = [program for program in ("bwrap", "setpriv") if shutil.which(program) is None]
         if missing:
@@ -46,7 +50,7 @@ def skip_without(tier, usable):
 @pytest.mark.ros
 @pytest.mark.parametrize("unit", [unit for unit in UNITS if unit not in IN_ONE_TIER])
 @pytest.mark.parametrize("tier", [USUAL, *(pytest.param(tier, marks=pytest.mark.nightly) for tier in OTHERS)])
-def test_attacks_are_contained(tier, unit, usable):
+def test_attacks_are_contained(tier: str, unit: str, usable: dict[str, str]) -> None:
     """Nothing is read, written, reached, left behind or earned by an attack, and right nodes beside it lose nothing."""
     skip_without(tier, usable)
     achieved = run_unit(tier, UNITS[unit])
@@ -55,14 +59,14 @@ def test_attacks_are_contained(tier, unit, usable):
 
 @pytest.mark.ros
 @pytest.mark.parametrize("unit", IN_ONE_TIER)
-def test_archives_and_texts_are_contained(unit, usable):
+def test_archives_and_texts_are_contained(unit: str, usable: dict[str, str]) -> None:
     """Neither what is unpacked nor what is shown depends on the tier, so one of them is enough."""
     skip_without(USUAL, usable)
     achieved = run_unit(USUAL, UNITS[unit])
     assert {number: texts for number, texts in achieved.items() if texts} == {}
 
 
-def test_the_table_has_each_attack_once():
+def test_the_table_has_each_attack_once() -> None:
     """72 attacks, numbered without a gap, each with a fixture of its own that exists and names its number."""
     attacks = read_attacks()
     assert [attack.number for attack in attacks] == list(range(1, 73))
@@ -71,7 +75,7 @@ def test_the_table_has_each_attack_once():
     assert {attack.earns for attack in attacks} <= set(EARNS)
 
 
-def test_no_fixture_is_forgotten():
+def test_no_fixture_is_forgotten() -> None:
     """What lies among the fixtures is in the table."""
     found = {path for folder in ("nodes", "folders", "archives", "reports") for path in (HERE / folder).glob("a[0-9]*")}
     assert found == {attack.path for attack in read_attacks()}
@@ -80,22 +84,22 @@ def test_no_fixture_is_forgotten():
 # --- the traps ---
 
 
-def texts(arena, *runs):
+def texts(arena: Arena, *runs: Ran) -> list[str]:
     return [finding.text for finding in arena.findings(*runs)]
 
 
 @pytest.fixture
-def arena():
+def arena() -> Iterator[Arena]:
     with Arena(USUAL) as arena:
         yield arena
 
 
-def test_an_untouched_arena_has_nothing_to_tell(arena):
+def test_an_untouched_arena_has_nothing_to_tell(arena: Arena) -> None:
     """Without an attack there is no finding."""
     assert texts(arena, NOTHING) == []
 
 
-def test_the_secret_is_found_wherever_the_grader_wrote_it(arena):
+def test_the_secret_is_found_wherever_the_grader_wrote_it(arena: Arena) -> None:
     """In any file of the report, and on either stream."""
     leaks = [
         Ran(1, {}, "", "", {"evidence/a.mcap": b"x" + arena.secret.encode()}),
@@ -105,34 +109,34 @@ def test_the_secret_is_found_wherever_the_grader_wrote_it(arena):
     assert [len(texts(arena, leak)) for leak in leaks] == [1, 1, 1]
 
 
-def test_a_file_outside_is_blamed_on_the_attack_that_it_names(arena):
+def test_a_file_outside_is_blamed_on_the_attack_that_it_names(arena: Arena) -> None:
     """A marker carries the number of its attack."""
     (arena.outside / "marker-a24").touch()
     assert [(found.number, found.text) for found in arena.findings()] == [(24, "marker-a24 was written outside")]
 
 
-def test_what_arrives_is_noticed(arena):
+def test_what_arrives_is_noticed(arena: Arena) -> None:
     """A connection and a packet, at the addresses that attacks are told."""
-    told = {}
+    told: dict[str, Any] = {}
     exec(arena.planted(), told)
     with socket.create_connection(told["TCP"][0]), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(b"x", told["UDP"][0])
         assert texts(arena) == ["a connection arrived", "a packet arrived"]
 
 
-def test_temporary_files_are_noticed(arena):
+def test_temporary_files_are_noticed(arena: Arena) -> None:
     """What the grader leaves in its temporary folder is a finding."""
     (arena.base / "tmp" / "grade-left").mkdir()
     assert texts(arena) == ["tmp holds grade-left"]
 
 
-def test_a_harmed_bystander_is_noticed(arena):
+def test_a_harmed_bystander_is_noticed(arena: Arena) -> None:
     """A lower priority is enough."""
     os.setpriority(os.PRIO_PROCESS, arena.bystander_pid, os.getpriority(os.PRIO_PROCESS, arena.bystander_pid) + 1)
     assert texts(arena) == ["a process of the instructor's was changed"]
 
 
-def test_a_process_whose_parent_is_gone_is_noticed_and_ended(arena):
+def test_a_process_whose_parent_is_gone_is_noticed_and_ended(arena: Arena) -> None:
     """It has become a child of whoever watches, and does not survive the look."""
     sleep = [sys.executable, "-I", "-S", "-c", "import time; time.sleep(99)", arena.mark]
     subprocess.run([sys.executable, "-I", "-c", f"import subprocess; subprocess.Popen({sleep!r})"], check=True)
@@ -141,13 +145,13 @@ def test_a_process_whose_parent_is_gone_is_noticed_and_ended(arena):
     assert texts(arena) == []
 
 
-def report(**outcomes):
+def report(**outcomes: str) -> dict[str, Any]:
     log = {"id": "a01__log", "outcome": "met", "reason": "", "evidence": {"first": outcomes.pop("said")}}
     criteria = [{"id": f"a01__{what}", "outcome": outcome, "reason": ""} for what, outcome in outcomes.items()]
     return {"exercises": [{"criteria": [*criteria, log]}]}
 
 
-def test_an_attack_that_says_that_it_escaped_is_believed():
+def test_an_attack_that_says_that_it_escaped_is_believed() -> None:
     """A node tells which of its attempts succeeded."""
     right = {"topic": "met", "rate": "met", "speed": "met"}
     assert list(objections(report(said="2 attempts, escaped: none", **right), "a01", "honest")) == []
@@ -156,13 +160,13 @@ def test_an_attack_that_says_that_it_escaped_is_believed():
 
 
 @pytest.mark.parametrize("rate", ["met", "partly", "undecided"])
-def test_a_slow_node_must_not_get_its_rate(rate):
+def test_a_slow_node_must_not_get_its_rate(rate: str) -> None:
     """An attack that improves a verdict, or makes it undecided, is not contained."""
     found = objections(report(said="1 attempts, escaped: none", topic="met", rate=rate, speed="met"), "a01", "slow")
     assert len(list(found)) == 1
 
 
-def test_a_node_that_was_not_judged_is_no_success():
+def test_a_node_that_was_not_judged_is_no_success() -> None:
     """An empty report proves nothing."""
     assert list(objections({}, "a01", "whatever")) == ["it was not judged"]
 
@@ -187,7 +191,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("format_", "content"), BAD.values(), ids=BAD)
-def test_hostile_text_that_came_through_is_noticed(format_, content):
+def test_hostile_text_that_came_through_is_noticed(format_: str, content: bytes) -> None:
     """Each of these reports would do what its hostile text wants."""
     assert list(hostile_reports.objections(format_, content))
 
@@ -203,6 +207,6 @@ GOOD = {
 
 
 @pytest.mark.parametrize(("format_", "content"), GOOD.values(), ids=GOOD)
-def test_hostile_text_that_stayed_text_is_let_pass(format_, content):
+def test_hostile_text_that_stayed_text_is_let_pass(format_: str, content: bytes) -> None:
     """Quoting a hostile text is what a report is for."""
     assert list(hostile_reports.objections(format_, content)) == []

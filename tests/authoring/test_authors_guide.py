@@ -3,6 +3,8 @@
 Run as a program, it writes the tables anew.
 """
 
+from __future__ import annotations
+
 import inspect
 import os
 import re
@@ -10,6 +12,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,36 +27,36 @@ STIMULI_HEAD, CHECKS_HEAD = "| stimulus | is |\n|---|---|\n", "| check | asks |\
 TABLE = r"((?:\|.*\n)+)"
 
 
-def checks_table():
+def checks_table() -> str:
     """Return the table of all checks, from their docstrings."""
     return "".join(f"| `{name}` | {manual_of(kind).summary.replace('|', '/')} |\n" for name, kind in CHECKS.items())
 
 
-def stimuli_table():
+def stimuli_table() -> str:
     """Return the table of all stimuli, from the docstrings of their shapes."""
     rows = []
     for field in StimulusShape.model_fields.values():
-        text = " ".join(inspect.cleandoc(field.annotation.__doc__).split("\n\n")[0].split())
+        text = " ".join(inspect.cleandoc(getattr(field.annotation, "__doc__", None) or "").split("\n\n")[0].split())
         text = text.removeprefix("A stimulus: ").replace("|", "/")
         rows.append(f"| `{field.alias}` | {text} |\n")
     return "".join(rows)
 
 
-def with_tables(text):
+def with_tables(text: str) -> str:
     """Return the guide with its tables written anew."""
     for head, table in ((STIMULI_HEAD, stimuli_table()), (CHECKS_HEAD, checks_table())):
-        text = re.sub(re.escape(head) + TABLE, lambda _, head=head, table=table: head + table, text)
+        text = re.sub(re.escape(head) + TABLE, (head + table).replace("\\", r"\\"), text)
     return text
 
 
-def test_the_tables_show_every_check_and_every_stimulus():
+def test_the_tables_show_every_check_and_every_stimulus() -> None:
     """`python tests/authoring/test_authors_guide.py` was run after the last change."""
     text = GUIDE.read_text(encoding="utf-8")
     assert CHECKS_HEAD + checks_table() in text
     assert STIMULI_HEAD + stimuli_table() in text
 
 
-def steps():
+def steps() -> Any:
     """Return the guide's files and commands in order; a command comes with the lines that it has to print."""
     text = GUIDE.read_text(encoding="utf-8")
     found = [(m.start(), ("file", m[1], m[2])) for m in FILE.finditer(text)]
@@ -64,7 +67,7 @@ def steps():
     return [step for _, step in sorted(found)]
 
 
-def run(command, folder):
+def run(command: str, folder: Path) -> str:
     """Run a command as a reader would who has the grader on the path; return what it printed."""
     words, _, remark = command.partition("  # ")
     here = str(Path(sys.executable).parent)
@@ -82,7 +85,7 @@ def run(command, folder):
 
 
 @pytest.mark.ros
-def test_the_worked_example_works(tmp_path):
+def test_the_worked_example_works(tmp_path: Path) -> None:
     """Every file as it stands in the guide, every command in order, and every line that it is said to print."""
     commands = 0
     for kind, name, content in steps():

@@ -1,19 +1,23 @@
 """Checks of a rubric's own: read as strictly as any other, run by whoever judges, and never taken from students."""
 
+from __future__ import annotations
+
 import json
 import pickle
 import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
-from grader.app.grade import Request, read_exercises
+from grader.app.grade import read_exercises
+from grader.app.request import Request
 from grader.classroom.cache_key import Conditions
 from grader.classroom.cluster.jobs import lay_out
 from grader.classroom.cluster.sending import checks_of
@@ -21,40 +25,43 @@ from grader.classroom.messages import Errand, Terms
 from grader.cli import main
 from grader.core.errors import RubricError
 from grader.core.exercise import Outcome
+from grader.core.report import Verdict
 from grader.core.submission import StudentFile, Submission
+from grader.core.trace import Trace
 from grader.judging.judge_run import judge_exercise
 from grader.packaging import Chosen, classroom50
-from grader.rubrics.loader import own_check_files, read_rubric
+from grader.rubrics.loader import RubricMistakes, own_check_files, read_rubric
 from grader.testing import TraceBuilder, judge
 
 FLOAT = "std_msgs/msg/Float32"
 
 
-def command(*words):
+def command(*words: Path | str) -> Result:
     return CliRunner().invoke(main.app, [*map(str, words)])
 
 
-def refused(path, **rest):
+def refused(path: Path, **rest: Any) -> RubricError | RubricMistakes:
     with pytest.raises(RubricError) as error:
         read_rubric(path, **rest)
     return error.value
 
 
-def flow(start_s=0.1):
+def flow(start_s: float = 0.1) -> TraceBuilder:
     return TraceBuilder("pump.py", stop_s=2.0).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=10, start_s=start_s)
 
 
-def verdict(path, trace):
+def verdict(path: Path, trace: Trace) -> Verdict:
     submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
     (found,) = judge_exercise(read_rubric(path), {"alone": trace}, submission).verdicts
     return found
 
 
-def test_a_check_of_ones_own_judges(tmp_path):
+def test_a_check_of_ones_own_judges(tmp_path: Path) -> None:
     """Its parameters are read with their units, and its findings become verdicts."""
     path = write_rubric(tmp_path)
     (criterion,) = read_rubric(path).criteria
-    assert (criterion.check_name, criterion.check.within) == ("starts_early", 500_000_000)
+    check: Any = criterion.check
+    assert (criterion.check_name, check.within) == ("starts_early", 500_000_000)
     assert judge(criterion.check, flow().trace()).credit == 1
     assert verdict(path, flow().trace()).score == Fraction(10)
     late = verdict(path, flow(start_s=0.7).trace())
@@ -76,7 +83,7 @@ def test_a_check_of_ones_own_judges(tmp_path):
         ("[pump_checks.py]", "[1]", "4:10: expected text"),
     ],
 )
-def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path, old, new, told):
+def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path: Path, old: str, new: str, told: str) -> None:
     """As for the checks that come with the grader."""
     error = refused(write_rubric(tmp_path, RUBRIC.replace(old, new)))
     assert f"{tmp_path}/pump.yaml" in error.message
@@ -108,7 +115,9 @@ def test_a_mistake_in_the_rubric_is_told_with_its_place(tmp_path, old, new, told
         ('CHECKS = {"starts_early": StartsEarly}', "raise SystemExit(0)", 35, "SystemExit: 0"),
     ],
 )
-def test_a_file_that_holds_no_checks_is_told_with_its_line(tmp_path, old, new, line, told):
+def test_a_file_that_holds_no_checks_is_told_with_its_line(
+    tmp_path: Path, old: str, new: str, line: int, told: str
+) -> None:
     """Whatever it is; and the command ends with 2."""
     assert old in CHECKS_FILE
     path = write_rubric(tmp_path, checks=CHECKS_FILE.replace(old, new))
@@ -119,7 +128,7 @@ def test_a_file_that_holds_no_checks_is_told_with_its_line(tmp_path, old, new, l
     assert command("rubric", "check", path).exit_code == 2
 
 
-def test_a_file_is_never_taken_from_where_students_write(tmp_path):
+def test_a_file_is_never_taken_from_where_students_write(tmp_path: Path) -> None:
     """Neither from the submission that is graded nor from a class; nothing of it is run."""
     path = write_rubric(tmp_path, checks="raise AssertionError('it was run')")
     assert "expected a file that students cannot write" in refused(path, submissions=[tmp_path]).message
@@ -130,7 +139,7 @@ def test_a_file_is_never_taken_from_where_students_write(tmp_path):
         read_exercises(Request("", rubrics=(path,)), [tmp_path / "elsewhere", tmp_path])
 
 
-def test_a_link_does_not_lead_out_of_the_folder(tmp_path):
+def test_a_link_does_not_lead_out_of_the_folder(tmp_path: Path) -> None:
     """A rubric's folder holds all of it."""
     (tmp_path / "course").mkdir()
     path = write_rubric(tmp_path / "course")
@@ -139,7 +148,7 @@ def test_a_link_does_not_lead_out_of_the_folder(tmp_path):
     assert "expected a file in the rubric's folder" in refused(path).message
 
 
-def test_the_digest_covers_the_file(tmp_path):
+def test_the_digest_covers_the_file(tmp_path: Path) -> None:
     """A changed check is another rubric: results are made anew, and reports say what they were made with."""
     path = write_rubric(tmp_path)
     before = read_rubric(path).digest
@@ -151,7 +160,7 @@ def test_the_digest_covers_the_file(tmp_path):
     ]
 
 
-def test_an_exception_leaves_the_criterion_undecided(tmp_path):
+def test_an_exception_leaves_the_criterion_undecided(tmp_path: Path) -> None:
     """It costs no points; class, text, file and line are there for whoever mends the check."""
     found = verdict(write_rubric(tmp_path), TraceBuilder("pump.py").trace())
     assert (found.outcome, found.score) == (Outcome.UNDECIDED, 0)
@@ -163,7 +172,7 @@ def test_an_exception_leaves_the_criterion_undecided(tmp_path):
     ("returned", "told"),
     [("None", "returned a NoneType, expected a Finding"), ("sys.exit(0)", "failed on this recording")],
 )
-def test_what_is_no_finding_is_undecided(tmp_path, returned, told):
+def test_what_is_no_finding_is_undecided(tmp_path: Path, returned: str, told: str) -> None:
     """A check that gives up the process, or nothing, ends no report."""
     text = CHECKS_FILE.replace('raise LookupError("nobody thought of silence")', f"import sys; return {returned}")
     found = verdict(write_rubric(tmp_path, checks=text), TraceBuilder("pump.py").trace())
@@ -171,7 +180,7 @@ def test_what_is_no_finding_is_undecided(tmp_path, returned, told):
     assert told in found.reason
 
 
-def test_a_check_travels_to_other_processes(tmp_path):
+def test_a_check_travels_to_other_processes(tmp_path: Path) -> None:
     """A process that never read the rubric can take the check out of a pickle."""
     (criterion,) = read_rubric(write_rubric(tmp_path)).criteria
     (tmp_path / "pickled").write_bytes(pickle.dumps(criterion))
@@ -180,7 +189,7 @@ def test_a_check_travels_to_other_processes(tmp_path):
     assert done.stdout == "StartsEarly(topic='/flow', within=500000000) 10\n"
 
 
-def test_it_is_explained_and_listed(tmp_path):
+def test_it_is_explained_and_listed(tmp_path: Path) -> None:
     """In the words of its docstring, like any other."""
     path = write_rubric(tmp_path)
     for shown in (command("rubric", "explain", path), command("explain", "starts_early", "--rubric", path)):
@@ -191,7 +200,7 @@ def test_it_is_explained_and_listed(tmp_path):
     assert command("rubric", "check", path).output == f"{path}: pump: 1 scenario, 1 criterion, 10 points\n"
 
 
-def test_the_schema_knows_it(tmp_path):
+def test_the_schema_knows_it(tmp_path: Path) -> None:
     """Editors complete it in the rubric that names its file."""
     path = write_rubric(tmp_path)
     data = YAML(typ="safe", pure=True).load(RUBRIC)
@@ -200,7 +209,7 @@ def test_the_schema_knows_it(tmp_path):
         jsonschema.validate(data, json.loads(command("rubric", "schema").stdout))
 
 
-def test_a_check_without_a_docstring_is_odd(tmp_path):
+def test_a_check_without_a_docstring_is_odd(tmp_path: Path) -> None:
     """`grade rubric check` warns that nothing explains it."""
     begin, end = CHECKS_FILE.index('    """The first'), CHECKS_FILE.index("    topic: str")
     path = write_rubric(tmp_path, checks=CHECKS_FILE[:begin] + CHECKS_FILE[end:])
@@ -209,7 +218,7 @@ def test_a_check_without_a_docstring_is_odd(tmp_path):
     assert "StartsEarly, which has no docstring to explain it" in command("rubric", "check", path).stderr
 
 
-def test_a_bundle_for_a_platform_holds_it(tmp_path):
+def test_a_bundle_for_a_platform_holds_it(tmp_path: Path) -> None:
     """Beside its rubric, so that the rubric can be read from there."""
     files = classroom50(Chosen(rubrics=(write_rubric(tmp_path),)))
     for name in ("rubric.yaml", "pump_checks.py"):
@@ -219,7 +228,7 @@ def test_a_bundle_for_a_platform_holds_it(tmp_path):
     assert read_rubric(tmp_path / "there" / "rubric.yaml").digest == read_rubric(tmp_path / "pump.yaml").digest
 
 
-def test_it_travels_to_a_cluster(tmp_path, monkeypatch):
+def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As bytes, with its path from where the class is graded; there the rubric is the same."""
     for folder in ("here/course", "there"):
         (tmp_path / folder).mkdir(parents=True)
@@ -236,7 +245,7 @@ def test_it_travels_to_a_cluster(tmp_path, monkeypatch):
 
 
 @pytest.mark.ros
-def test_real_nodes_are_judged_by_it(tmp_path):
+def test_real_nodes_are_judged_by_it(tmp_path: Path) -> None:
     """By grade, by the processes of a class, and again from evidence, whose judgement notices a changed check."""
     (tmp_path / "course").mkdir()
     path = write_rubric(tmp_path / "course")
@@ -245,7 +254,7 @@ def test_real_nodes_are_judged_by_it(tmp_path):
         (tmp_path / "class" / name / "pump.py").write_text(PUMP.replace("PERIOD", period))
     grade = str(Path(sys.executable).with_name("grade"))
 
-    def scores(*words):
+    def scores(*words: str | Path) -> Any:
         done = subprocess.run([grade, *map(str, words)], cwd=tmp_path, check=False, capture_output=True, text=True)
         assert done.returncode in (0, 1), done.stderr
         return json.loads(done.stdout)["score"] if done.stdout.startswith("{") else done.stdout

@@ -1,9 +1,12 @@
 """The commands `grade rubric check`, `schema` and `explain`: what authors are told about their rubrics."""
 
+from __future__ import annotations
+
 import json
+from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from grader.cli import main
 from grader.judging.checks import CHECKS
@@ -37,16 +40,16 @@ RATE = """\
 """
 
 
-def rubric(*words):
+def rubric(*words: Path | str) -> Result:
     return CliRunner().invoke(main.app, ["rubric", *map(str, words)])
 
 
-def written(folder, text, name="r.yaml"):
+def written(folder: Path, text: str, name: str = "r.yaml") -> Path:
     (folder / name).write_text(text, encoding="utf-8")
     return folder / name
 
 
-def test_a_good_rubric_is_summed_up(tmp_path):
+def test_a_good_rubric_is_summed_up(tmp_path: Path) -> None:
     """One line on standard output, no warning, exit code 0."""
     path = written(tmp_path, GOOD)
     done = rubric("check", path)
@@ -54,7 +57,7 @@ def test_a_good_rubric_is_summed_up(tmp_path):
     assert done.stdout == f"{path}: pump: 1 scenario, 1 criterion, 10 points\n"
 
 
-def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path):
+def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path: Path) -> None:
     """Line and column of each, however many there are; exit code 2, and the good rubric is still summed up."""
     many = GOOD.replace("points: 10", "points: -1") + "".join(f"key{n}: 1\n" for n in range(20))
     bad, good = written(tmp_path, many, "bad.yaml"), written(tmp_path, GOOD)
@@ -80,7 +83,7 @@ def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path):
         ("", RATE.replace("2.5", "5"), "21:71", "window is 10 s, but alone is observed for 5 s only"),
     ],
 )
-def test_what_is_odd_is_a_warning_with_its_place(tmp_path, old, new, place, told):
+def test_what_is_odd_is_a_warning_with_its_place(tmp_path: Path, old: str, new: str, place: str, told: str) -> None:
     """Exit code 0 all the same."""
     path = written(tmp_path, GOOD.replace(old, new, 1) if old else GOOD + new)
     done = rubric("check", path)
@@ -88,18 +91,18 @@ def test_what_is_odd_is_a_warning_with_its_place(tmp_path, old, new, place, told
     assert any(line.startswith(f"warning: {path}:{place}: ") and told in line for line in done.stderr.splitlines())
 
 
-def test_the_rubrics_that_come_with_the_grader_are_not_odd():
+def test_the_rubrics_that_come_with_the_grader_are_not_odd() -> None:
     """No warning in any of them."""
     done = rubric("check", *builtin_rubrics().values())
     assert (done.exit_code, done.stderr) == (0, "")
 
 
-def test_the_schema_is_the_one_that_is_shipped():
+def test_the_schema_is_the_one_that_is_shipped() -> None:
     """What editors read, and nothing else."""
     assert rubric("schema").stdout == schema_text()
 
 
-def test_every_criterion_of_a_file_is_explained(tmp_path):
+def test_every_criterion_of_a_file_is_explained(tmp_path: Path) -> None:
     """What it asks and with which values; also for programs."""
     path = written(tmp_path, GOOD + RATE)
     done = rubric("explain", path)
@@ -110,7 +113,7 @@ def test_every_criterion_of_a_file_is_explained(tmp_path):
     assert [(r["kind"], r["id"], r["points"]) for r in rows] == [("criterion", "flows", 10), ("criterion", "rate", 2.5)]
 
 
-def test_all_checks_are_listed():
+def test_all_checks_are_listed() -> None:
     """Each begins a line with its name."""
     starts = {line.split(" ")[0] for line in rubric("explain", "--checks").stdout.splitlines()}
     assert set(CHECKS) <= starts

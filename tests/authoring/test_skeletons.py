@@ -1,11 +1,14 @@
 """Skeletons of rubrics: what is asked of a reference that did this or that, and that the reference meets all of it."""
 
+from __future__ import annotations
+
 import json
 import math
 import random
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -26,18 +29,18 @@ POSE = "geometry_msgs/msg/PoseStamped"
 TRIGGER = "std_srvs/srv/Trigger"
 
 
-def asked(builder, alone=None):
+def asked(builder: TraceBuilder, alone: TraceBuilder | None = None) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return check and parameters of each row for what a builder's node did."""
     trace = builder.trace()
     seen = Seen(alone.trace() if alone else trace, trace, ("pump.py",), 9.0)
     return {row.id: (row.check, dict(row.parameters)) for row in questions(seen)}
 
 
-def pump(**changes):
+def pump(**changes: Any) -> TraceBuilder:
     return TraceBuilder("pump.py", "/pump", **changes)
 
 
-def test_a_steady_topic_is_asked_for_its_rate_and_its_constant_fields():
+def test_a_steady_topic_is_asked_for_its_rate_and_its_constant_fields() -> None:
     """With the measured rate, 5 % of it for all points and 10 % for half of them."""
     value = {"header": {"stamp": {"sec": 5, "nanosec": 1}}, "pose": {"position": {"x": 0.5, "y": 0.0}}}
     rows = asked(pump().messages("/goal", POSE, value, rate_hz=20))
@@ -59,7 +62,7 @@ def test_a_steady_topic_is_asked_for_its_rate_and_its_constant_fields():
     ("low", "high", "bounds"),
     [(20.3, 29.8, (20, 30)), (-0.99, 0.98, (-1, 1)), (12360.1, 12361.9, (12360, 12362)), (0.12, 0.18, (0.12, 0.18))],
 )
-def test_a_field_that_varies_is_asked_for_a_round_range(low, high, bounds):
+def test_a_field_that_varies_is_asked_for_a_round_range(low: float, high: float, bounds: tuple[float, float]) -> None:
     """As round as the range is wide, and never narrower than what was seen."""
     draw = random.Random(3)
     numbers = [low, high, *(draw.uniform(low, high) for _ in range(50))]
@@ -70,14 +73,14 @@ def test_a_field_that_varies_is_asked_for_a_round_range(low, high, bounds):
     assert parameters["high"] >= high
 
 
-def test_a_text_that_never_changes_is_asked_for():
+def test_a_text_that_never_changes_is_asked_for() -> None:
     """By its path; one that changes or is empty is not."""
     frames = pump().messages("/goal", POSE, {"header": {"frame_id": "map"}, "note": ""}, rate_hz=10)
     assert asked(frames)["goal_texts"] == ("field_equal", {"topic": "/goal", "fields": {"header.frame_id": "map"}})
     assert "goal_texts" not in asked(pump().messages("/goal", POSE, lambda n: {"note": f"{n}"}, rate_hz=10))
 
 
-def test_bursts_and_single_messages_have_no_rate():
+def test_bursts_and_single_messages_have_no_rate() -> None:
     """No number is made up for what has none."""
     builder = pump()
     for t_s in (0.1, 0.11, 0.12, 4.0, 4.01, 9.0):
@@ -86,7 +89,7 @@ def test_bursts_and_single_messages_have_no_rate():
     assert "level_rate" not in asked(pump().message(1.0, "/level", FLOAT, {"data": 1.0}))
 
 
-def test_an_answer_is_asked_for_no_rate():
+def test_an_answer_is_asked_for_no_rate() -> None:
     """What is published only when something comes in has the stimulus's rate, not one of its own."""
     silent = pump().subscription("/level", FLOAT)
     driven = pump().subscription("/level", FLOAT).messages("/alarm", FLOAT, {"data": 1.0}, rate_hz=5)
@@ -97,7 +100,7 @@ def test_an_answer_is_asked_for_no_rate():
     assert rows["subscribes_level"] == ("subscribes", {"topic": "/level", "type": FLOAT})
 
 
-def test_services_logs_and_calls_are_asked_for():
+def test_services_logs_and_calls_are_asked_for() -> None:
     """Each with what was seen of it."""
     builder = pump().server("/empty", TRIGGER).client("/fill", TRIGGER).log(1, "pumping")
     builder.call(2, "/fill", TRIGGER, {}, {}, by_student=True).call(3, "/fill", TRIGGER, {}, {}, by_student=True)
@@ -107,7 +110,7 @@ def test_services_logs_and_calls_are_asked_for():
     assert rows["pump_logs"] == ("uses_logger", {"process": "pump.py"})
 
 
-def test_parameters_are_asked_for_their_defaults():
+def test_parameters_are_asked_for_their_defaults() -> None:
     """Read as a node tells them; lists have no value in the rubric, and what every node has is left out."""
     told = {"speed": "1.5", "mode": "'fast'", "on": "True", "limits": "[1, 2]", "use_sim_time": "True", "odd": "nan"}
     builder = pump().add(*(Offer(0, "pump.py", "parameter", f"/pump:{name}", text) for name, text in told.items()))
@@ -123,13 +126,13 @@ def test_parameters_are_asked_for_their_defaults():
     assert stimuli == ["speed", "mode", "on", "limits", "odd"]
 
 
-def test_nan_is_asked_for_nothing():
+def test_nan_is_asked_for_nothing() -> None:
     """There is no number to ask for."""
     rows = asked(pump().messages("/level", FLOAT, {"data": math.nan}, rate_hz=10))
     assert set(rows) == {"publishes_level", "level_rate"}
 
 
-def test_who_waits_for_somebody_is_given_something():
+def test_who_waits_for_somebody_is_given_something() -> None:
     """Numbers, the recorded odometry or messages by type; calls and servers; nothing where a node speaks."""
     builder = pump().subscription("/level", FLOAT).subscription("/odom", "nav_msgs/msg/Odometry")
     builder.subscription("/goal", POSE).subscription("/own", FLOAT).publisher("/own", FLOAT)
@@ -144,7 +147,7 @@ def test_who_waits_for_somebody_is_given_something():
     }
 
 
-def test_the_text_can_be_read_whatever_files_are_called(tmp_path):
+def test_the_text_can_be_read_whatever_files_are_called(tmp_path: Path) -> None:
     """Names with quotation marks, braces and line breaks stay names; comments stay comments."""
     name = 'a "b", {c}: #d.py'
     row = DraftCriterion(
@@ -162,12 +165,12 @@ def test_the_text_can_be_read_whatever_files_are_called(tmp_path):
 @pytest.mark.parametrize(
     ("text", "id_"), [("/cmd_vel", "cmd_vel"), ("MyNode", "my_node"), ("3D-scan", "x_3_d_scan"), ("é", "x")]
 )
-def test_an_id_is_made_of_anything(text, id_):
+def test_an_id_is_made_of_anything(text: str, id_: str) -> None:
     """Small letters, digits and `_`, a letter first."""
     assert as_id(text) == id_
 
 
-def test_nothing_is_written_over(tmp_path):
+def test_nothing_is_written_over(tmp_path: Path) -> None:
     """A rubric that took an afternoon is not replaced by a skeleton; nothing is run."""
     (tmp_path / "r.yaml").write_text("mine")
     done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "-o", str(tmp_path / "r.yaml")])
@@ -177,7 +180,7 @@ def test_nothing_is_written_over(tmp_path):
 
 
 @pytest.mark.ros
-def test_the_reference_scores_full_under_its_skeleton(tmp_path):
+def test_the_reference_scores_full_under_its_skeleton(tmp_path: Path) -> None:
     """A node that publishes, listens and logs: seen, given numbers, asked, checked and graded for real."""
     grade = str(Path(sys.executable).with_name("grade"))
     reference = str(ROOT / "reference_solutions" / "temperature_sensor.py")
@@ -193,7 +196,7 @@ def test_the_reference_scores_full_under_its_skeleton(tmp_path):
 
 
 @pytest.mark.ros
-def test_a_reference_that_fails_is_told(tmp_path):
+def test_a_reference_that_fails_is_told(tmp_path: Path) -> None:
     """A rubric made of a traceback would ask for it."""
     (tmp_path / "pump.py").write_text("import rclpy\nrclpy.init()\nrclpy.create_node('pump')\nraise ValueError('no')\n")
     done = CliRunner().invoke(main.app, ["rubric", "new", str(tmp_path / "pump.py")])
@@ -201,7 +204,7 @@ def test_a_reference_that_fails_is_told(tmp_path):
     assert "expected a reference that runs, found pump.py:4: ValueError: no" in done.stderr
 
 
-def test_what_came_of_each_input_becomes_a_case():
+def test_what_came_of_each_input_becomes_a_case() -> None:
     """What differs from the defaults in some answer is asked for in all; silence is a case too; repeats are none."""
     silent = pump().subscription("/say", "std_msgs/msg/String")
     driven = pump().subscription("/say", "std_msgs/msg/String")
@@ -219,7 +222,7 @@ def test_what_came_of_each_input_becomes_a_case():
 
 
 @pytest.mark.parametrize("text", ["say={data: a}", "/say", "/say={data: [}", "/say=5", "/say="])
-def test_a_message_to_send_has_a_topic_and_fields(text):
+def test_a_message_to_send_has_a_topic_and_fields(text: str) -> None:
     """Anything else is told before something runs."""
     done = CliRunner().invoke(main.app, ["rubric", "new", "a.py", "--send", text])
     assert done.exit_code == 2

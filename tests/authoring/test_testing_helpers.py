@@ -1,13 +1,17 @@
 """Traces made with grader.testing: what the checks that come with the grader find in them."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import pytest
 
 from grader.core.exercise import Finding
 from grader.core.quantities import NS_PER_S
-from grader.core.trace import FaultKind
+from grader.core.trace import FaultKind, Trace
 from grader.execution.ending import exited
 from grader.judging.checks.logs import UsesLogger
 from grader.judging.checks.rate import TopicRate
@@ -17,11 +21,11 @@ from grader.testing import TraceBuilder, judge, met
 FLOAT = "std_msgs/msg/Float32"
 
 
-def pump(**changes):
+def pump(**changes: Any) -> TraceBuilder:
     return TraceBuilder("pump.py", "/pump", **changes)
 
 
-def test_messages_at_a_rate_are_exactly_at_that_rate():
+def test_messages_at_a_rate_are_exactly_at_that_rate() -> None:
     """A thirtieth of a second is no whole number of nanoseconds, and the rate holds all the same."""
     trace = pump(stop_s=10.2).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=30).trace()
     finding = judge(TopicRate("/flow", 30.0, 0.001, 10_000_000_000), trace)
@@ -29,14 +33,14 @@ def test_messages_at_a_rate_are_exactly_at_that_rate():
     assert judge(Publishes("/flow", FLOAT), trace).credit == 1
 
 
-def test_values_may_follow_the_number_of_a_message():
+def test_values_may_follow_the_number_of_a_message() -> None:
     """One that differs is found."""
     trace = pump().messages("/flow", FLOAT, lambda n: {"data": 2.0 if n == 3 else 1.5}, rate_hz=10).trace()
     finding = judge(FieldValues("/flow", {"data": 1.5}), trace)
     assert (finding.credit, finding.evidence["wrong"], finding.evidence["first_wrong_s"]) == (0, 1, 0.4)
 
 
-def test_graph_logs_calls_and_faults_arrive_in_order():
+def test_graph_logs_calls_and_faults_arrive_in_order() -> None:
     """Whatever the order in which they were put, and with their process and lines."""
     trace = (
         pump()
@@ -65,13 +69,19 @@ def test_graph_logs_calls_and_faults_arrive_in_order():
 class Gives:
     """A check that returns what it is given."""
 
-    finding: object
+    finding: Any
 
-    def judge(self, trace):
-        return self.finding
+    def judge(self, trace: Trace) -> Finding:
+        given: Finding = self.finding
+        return given
 
 
-def test_a_process_that_ends_by_itself_has_an_exit_code():
+def made(*values: Any, **more: Any) -> Finding:
+    """Return a finding with values of any type, as an own check may."""
+    return Finding(*values, **more)
+
+
+def test_a_process_that_ends_by_itself_has_an_exit_code() -> None:
     """As one of a recording has."""
     (fault,) = pump().exited(5, 3).trace().faults()
     assert fault == exited("pump.py", 5 * NS_PER_S, 3)
@@ -81,53 +91,54 @@ def test_a_process_that_ends_by_itself_has_an_exit_code():
     ("finding", "wrong"),
     [
         (True, "returned a bool, expected a Finding"),
-        (Finding(0.5, "half"), "gave a credit of type float, expected a Fraction"),
+        (made(0.5, "half"), "gave a credit of type float, expected a Fraction"),
         (Finding(Fraction(3, 2), "more"), "gave a credit of 3/2, expected 0 to 1"),
-        (Finding(Fraction(1), 5), "gave a reason, hint or location of another type"),
+        (made(Fraction(1), 5), "gave a reason, hint or location of another type"),
         (Finding(Fraction(1), "", {"x": {1, 2}}), "gave evidence that holds more than plain JSON values"),
-        (Finding(Fraction(1), "", location=("pump.py", 3)), "gave a reason, hint or location of another type"),
-        (Finding(Fraction(0), "", problem="bursts"), "gave a problem of type str, expected a Problem"),
+        (made(Fraction(1), "", location=("pump.py", 3)), "gave a reason, hint or location of another type"),
+        (made(Fraction(0), "", problem="bursts"), "gave a problem of type str, expected a Problem"),
     ],
 )
-def test_a_finding_that_no_report_could_show_is_refused(finding, wrong):
+def test_a_finding_that_no_report_could_show_is_refused(finding: Finding | bool, wrong: str) -> None:
     """With the words that an instructor would read in the report."""
     with pytest.raises(ValueError, match=wrong):
         judge(Gives(finding), pump().trace())
 
 
-def test_a_check_may_see_the_files():
+def test_a_check_may_see_the_files() -> None:
     """It is then asked about them as well, and about the trace alone where there are none."""
 
     class Short:
-        def judge(self, trace):
+        def judge(self, trace: Trace) -> Finding:
             return met("not looked at")
 
-        def judge_sources(self, trace, sources):
+        def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
             return met(f"{len(sources['pump.py'])} characters")
 
     assert judge(Short(), pump().trace(), {"pump.py": "abc"}).reason == "3 characters"
     assert judge(Short(), pump().trace()).reason == "not looked at"
 
 
-def test_a_check_that_changes_the_trace_is_refused():
+def test_a_check_that_changes_the_trace_is_refused() -> None:
     """Other checks read it too."""
 
     class Sorts:
-        def judge(self, trace):
-            trace.messages()[0].value["data"] = 0.0
+        def judge(self, trace: Trace) -> Finding:
+            value: Any = trace.messages()[0].value
+            value["data"] = 0.0
             return met("sorted")
 
     with pytest.raises(ValueError, match="Sorts changed the trace"):
         judge(Sorts(), pump().message(1, "/flow", FLOAT, {"data": 1.5}).trace())
 
 
-def test_a_check_that_changes_its_mind_is_refused():
+def test_a_check_that_changes_its_mind_is_refused() -> None:
     """Checks are pure: the same trace gives the same finding."""
 
     class Counts:
         asked = 0
 
-        def judge(self, trace):
+        def judge(self, trace: Trace) -> Finding:
             self.asked += 1
             return met(f"asked {self.asked} times")
 

@@ -1,13 +1,8 @@
-"""A real browser for the tests of pages, and the helpers of the rooms whose pages they are."""
+"""A real browser for the tests of pages."""
 
 import shutil
-import sys
-from pathlib import Path
 
 import pytest
-
-TESTS = Path(__file__).resolve().parent.parent
-sys.path += [str(TESTS / "judging"), str(TESTS / "reporting"), str(TESTS / "classroom")]
 
 #: Everything that a browser does by itself over the network is switched off: what is left comes from the page.
 ARGUMENTS = [

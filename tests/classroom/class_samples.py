@@ -1,14 +1,20 @@
 """A class for tests: submissions, a scheduler that grades without running anything, and what it hands back."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 from grader.app.grade import Request
 from grader.classroom.cache_key import unusable_digest
-from grader.classroom.local import Attempt
+from grader.classroom.local import Attempt, Task
 from grader.classroom.request import Course
 from grader.classroom.store import Standing, State
+from grader.classroom.summary import Graded
 from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
 from grader.submissions.submission import stage_submission
@@ -16,7 +22,7 @@ from grader.submissions.submission import stage_submission
 GRADING = Request("", exercises=("velocity_publisher",))
 
 
-def report(score, *, final=True, reason="as expected"):
+def report(score: int, *, final: bool = True, reason: str = "as expected") -> dict[str, Any]:
     """Return a report as JSON values: one exercise of two criteria, `score` of 10 points."""
     outcome = ("met" if score == 10 else "not_met") if final else "undecided"
     rate = {"id": "rate", "title": "Publishes at 20 Hz", "outcome": outcome, "score": score - 4, "max_score": 6}
@@ -29,18 +35,18 @@ def report(score, *, final=True, reason="as expected"):
 class FakeScheduler:
     """Gives each submission the score in its `score.py`, or the state that this is the name of."""
 
-    def __init__(self, jobs=1, stop_after=None):
+    def __init__(self, jobs: int = 1, stop_after: int | None = None) -> None:
         self.graded = []
         self.tasks = {}
         self.stop_after = stop_after
 
-    def __call__(self, jobs):
+    def __call__(self, jobs: int) -> FakeScheduler:
         return self
 
-    def prepare(self, isolation):
+    def prepare(self, isolation: str) -> list[Any]:
         return ["no walls"] if isolation == "none" else []
 
-    def run(self, tasks, hear):
+    def run(self, tasks: Sequence[Task], hear: Callable[..., Any]) -> Iterator[Attempt]:
         for task in tasks:
             if len(self.graded) == self.stop_after:
                 raise KeyboardInterrupt
@@ -49,7 +55,7 @@ class FakeScheduler:
             self.tasks[task.name] = task
             yield Attempt(task, self.standing(task))
 
-    def standing(self, task):
+    def standing(self, task: Task) -> Standing:
         staging = task.into.parent / "staging"
         staging.mkdir()
         try:
@@ -77,7 +83,7 @@ class FakeScheduler:
         return Standing(state, key, submission.digest, task.label, score=float(score), max_score=10.0)
 
 
-def hand_in(folder, **scores):
+def hand_in(folder: Path, **scores: int | str) -> Path:
     """Write a submission for each name; what it holds is what the fake scheduler gives it."""
     for name, score in scores.items():
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -85,19 +91,19 @@ def hand_in(folder, **scores):
     return folder
 
 
-def course(source, results, **changes):
+def course(source: Path, results: Path, **changes: Any) -> Course:
     """Return what to grade."""
     return replace(Course((source,), results, grading=GRADING), **changes)
 
 
-def grade(wanted, scheduler=None, watcher=None):
+def grade(wanted: Course, scheduler: FakeScheduler | None = None, watcher: None = None) -> Graded | None:
     """Grade a class with the fake scheduler, or another one."""
     from grader.classroom.class_run import grade_class
 
     return grade_class(wanted, watcher or Watcher(lambda line: None), lambda line: None, scheduler or FakeScheduler())
 
 
-def scores(graded):
+def scores(graded: Graded) -> dict[str, Fraction | None]:
     """Return name -> final score of a class."""
     return {row.name: row.adjusted.score for row in graded.book.rows}
 

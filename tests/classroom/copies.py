@@ -1,7 +1,16 @@
 """Programs as somebody rewrites them who does not want to be found out: the same program, told differently."""
 
+from __future__ import annotations
+
 import ast
 import random
+from collections.abc import Mapping
+
+from grader.similarity.finding import programs_of
+from grader.similarity.library import Handed
+from grader.submissions.collected import Collected
+
+FILE = "odom_subscriber.py"
 
 # Names that stay: what ROS and Python call things.
 _KEPT = {"main", "self", "__init__", "__name__", "args"}
@@ -10,23 +19,23 @@ _KEPT = {"main", "self", "__init__", "__name__", "args"}
 class _Names(ast.NodeVisitor):
     """Collects what a program names itself."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.names = set()
 
-    def visit_FunctionDef(self, node):
+    def visit_FunctionDef(self, node: ast.ClassDef | ast.FunctionDef) -> None:
         self.names.add(node.name)
         self.generic_visit(node)
 
     visit_ClassDef = visit_AsyncFunctionDef = visit_FunctionDef  # noqa: N815  names of ast
 
-    def visit_arg(self, node):
+    def visit_arg(self, node: ast.arg) -> None:
         self.names.add(node.arg)
 
-    def visit_Name(self, node):
+    def visit_Name(self, node: ast.Name) -> None:
         if isinstance(node.ctx, ast.Store):
             self.names.add(node.id)
 
-    def visit_Attribute(self, node):
+    def visit_Attribute(self, node: ast.Attribute) -> None:
         if isinstance(node.ctx, ast.Store) and isinstance(node.value, ast.Name) and node.value.id == "self":
             self.names.add(node.attr)
         self.generic_visit(node)
@@ -35,37 +44,37 @@ class _Names(ast.NodeVisitor):
 class _Rename(ast.NodeTransformer):
     """Gives everything that a program names itself another name, and says all texts in other words."""
 
-    def __init__(self, names):
+    def __init__(self, names: Mapping[str, str]) -> None:
         self.names = names
 
-    def visit_FunctionDef(self, node):
+    def visit_FunctionDef(self, node: ast.ClassDef | ast.FunctionDef) -> ast.ClassDef | ast.FunctionDef:
         node.name = self.names.get(node.name, node.name)
         self.generic_visit(node)
         return node
 
     visit_ClassDef = visit_AsyncFunctionDef = visit_FunctionDef  # noqa: N815  names of ast
 
-    def visit_arg(self, node):
+    def visit_arg(self, node: ast.arg) -> ast.arg:
         node.arg = self.names.get(node.arg, node.arg)
         return node
 
-    def visit_Name(self, node):
+    def visit_Name(self, node: ast.Name) -> ast.Name:
         node.id = self.names.get(node.id, node.id)
         return node
 
-    def visit_Attribute(self, node):
+    def visit_Attribute(self, node: ast.Attribute) -> ast.Attribute:
         self.generic_visit(node)
         if isinstance(node.value, ast.Name) and node.value.id == "self":
             node.attr = self.names.get(node.attr, node.attr)
         return node
 
-    def visit_Constant(self, node):
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
         if isinstance(node.value, str) and " " in node.value:
             node.value = f"now {node.value}"
         return node
 
 
-def renamed(text, seed=0):
+def renamed(text: str, seed: int = 0) -> str:
     """Return a program with other names and texts, in another layout and without its comments."""
     tree = ast.parse(text)
     found = _Names()
@@ -75,7 +84,7 @@ def renamed(text, seed=0):
     return ast.unparse(_Rename(names).visit(tree)) + "\n"
 
 
-def reordered(text, seed=0):
+def reordered(text: str, seed: int = 0) -> str:
     """Return a program whose methods and functions stand in another order; comments go."""
     tree = ast.parse(text)
     draw = random.Random(seed)
@@ -89,7 +98,7 @@ def reordered(text, seed=0):
     return ast.unparse(tree) + "\n"
 
 
-def commented(text, seed=0):
+def commented(text: str, seed: int = 0) -> str:
     """Return a program with a comment of one's own on every third line, and more room between lines."""
     del seed
     lines = text.splitlines()
@@ -98,7 +107,7 @@ def commented(text, seed=0):
     return "# my own work\n\n" + "\n".join(said) + "\n"
 
 
-def logged(text, seed=0):
+def logged(text: str, seed: int = 0) -> str:
     """Return a program with a line of its own in every function, besides other names and another order."""
     tree = ast.parse(reordered(renamed(text, seed), seed))
     for k, node in enumerate(n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
@@ -109,3 +118,11 @@ def logged(text, seed=0):
 
 #: Ways to disguise a copy, the thorough ones last.
 DISGUISES = {"comments": commented, "order": reordered, "names": renamed, "all and lines added": logged}
+
+
+def handed(name: str, *texts: bytes | str, **more: tuple[str]) -> Handed:
+    """Return a submission of these texts, or byte strings."""
+    contents = [text if isinstance(text, bytes) else text.encode() for text in texts]
+    files = [(FILE if k == 0 else f"file_{k}.py", content) for k, content in enumerate(contents)]
+    programs, passed_over = programs_of(Collected(tuple(files)))
+    return Handed(name, name, programs, passed_over, **more)

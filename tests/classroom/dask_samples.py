@@ -1,6 +1,15 @@
 """What stands in for a cluster: a client whose workers answer as they are told, and tasks to send there."""
 
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
+
+from distributed.scheduler import KilledWorker
 
 from grader.classroom import store as kept
 from grader.classroom.cache_key import Conditions
@@ -12,7 +21,7 @@ CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "a
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
 
 
-def task(folder, name="ada", **changes):
+def task(folder: Path, name: str = "ada", **changes: Path | str | tuple[Path]) -> Task:
     """Return a task for a submission that lies in `folder/name` and holds one program."""
     place = folder / name
     place.mkdir(exist_ok=True)
@@ -33,7 +42,9 @@ def task(folder, name="ada", **changes):
     return Task(**{**fields, **changes})
 
 
-def graded(name="ada", machine=f"worker {ONE} on lab", score=3.0, key=None):
+def graded(
+    name: str = "ada", machine: str = f"worker {ONE} on lab", score: float = 3.0, key: str | None = None
+) -> Answer:
     """Return an answer with a result."""
     key = CONDITIONS.key("sha256:2") if key is None else key
     standing = Standing(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
@@ -43,27 +54,34 @@ def graded(name="ada", machine=f"worker {ONE} on lab", score=3.0, key=None):
 class FakeFuture:
     """An answer that is there at once, unless nobody would take the submission."""
 
-    def __init__(self, key, status, value):
+    def __init__(self, key: str, status: str, value: ImportError | KilledWorker | bytes | None) -> None:
         self.key, self.status, self._value = key, status, value
 
-    def add_done_callback(self, call):
+    def add_done_callback(self, call: Callable[..., Any]) -> None:
         if self.status != "pending":
             call(self)
 
-    def result(self):
+    def result(self) -> bytes:
         return self._value
 
-    def exception(self):
+    def exception(self) -> ImportError | KilledWorker:
         return self._value
 
-    def release(self):
+    def release(self) -> None:
         """Do nothing."""
 
 
 class FakeClient:
     """A cluster: `answers` is called with name and allowed workers, and returns what becomes of a submission."""
 
-    def __init__(self, answers=None, threads=None, versions=None, fitness=None, scheduler="0.1.0"):
+    def __init__(
+        self,
+        answers: Callable[..., Any] | None = None,
+        threads: Mapping[str, int] | None = None,
+        versions: Mapping[str, Any] | None = None,
+        fitness: Mapping[str, Any] | None = None,
+        scheduler: PackageNotFoundError | str = "0.1.0",
+    ) -> None:
         self.answers = answers or (lambda name, only: graded(name))
         self.threads = {ONE: 1, TWO: 1} if threads is None else threads
         self.versions = versions or {}
@@ -73,24 +91,37 @@ class FakeClient:
         self.sent, self.cancelled, self.keys = [], [], []
         self.handler = None
 
-    def nthreads(self):
+    def nthreads(self) -> dict[str, int] | None:
         if self.status != "running":
             raise OSError("gone")
         return self.threads
 
-    def run_on_scheduler(self, function, argument):
+    def run_on_scheduler(self, function: Callable[..., Any], argument: str) -> str | None:
         if isinstance(self.scheduler, Exception):
             raise self.scheduler
         return self.scheduler
 
-    def run(self, function, argument, *, workers, on_error):
+    def run(
+        self, function: Callable[..., Any], argument: str, *, workers: Sequence[str], on_error: str
+    ) -> dict[str, Any]:
         assert on_error == "return"
         if function.__name__ == "version":
             return {w: self.versions.get(w, "0.1.0") for w in workers}
         found = {w: self.fitness.get(w, Fitness(f"worker {w} on lab")) for w in workers}
         return {w: pack(fit) if isinstance(fit, Fitness) else fit for w, fit in found.items()}
 
-    def submit(self, function, version, terms, errand, topic, *, key, pure, workers):
+    def submit(
+        self,
+        function: Callable[..., Any],
+        version: str,
+        terms: bytes,
+        errand: bytes | types.SimpleNamespace,
+        topic: str,
+        *,
+        key: str,
+        pure: bool,
+        workers: Sequence[str] | None,
+    ) -> FakeFuture:
         assert pure is False
         assert key not in self.keys
         self.keys.append(key)
@@ -103,15 +134,15 @@ class FakeClient:
             return FakeFuture(key, "error", said)
         return FakeFuture(key, said, None)
 
-    def scatter(self, data, **options):
+    def scatter(self, data: bytes, **options: bool) -> types.SimpleNamespace:
         assert options == {"hash": False}
         return SimpleNamespace(data=data)
 
-    def cancel(self, futures, *, force):
+    def cancel(self, futures: Sequence[FakeFuture], *, force: bool) -> None:
         self.cancelled += futures
 
-    def subscribe_topic(self, topic, handler):
+    def subscribe_topic(self, topic: str, handler: Callable[..., Any]) -> None:
         self.handler = handler
 
-    def unsubscribe_topic(self, topic):
+    def unsubscribe_topic(self, topic: str) -> None:
         self.handler = None

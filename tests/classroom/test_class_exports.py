@@ -1,13 +1,19 @@
 """What spreadsheets and platforms are given: read back by the rules of each, with hostile names."""
 
+from __future__ import annotations
+
 import csv
 import io
 import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 from class_samples import course, grade, hand_in
 
 from grader.classroom.outputs import platforms
+from grader.classroom.summary import Graded
 from grader.core.errors import ClassError
 
 ROSTER = """Student,ID,SIS User ID,SIS Login ID,Section,Email address
@@ -23,19 +29,21 @@ GRADEBOOK = """Student,ID,SIS User ID,SIS Login ID,Section,Other (7),ROS homewor
 MOODLE = "First name,Last name,Email address\nAda,Lovelace,ada@x.edu\nBob,=HYPERLINK(1),bob@x.edu\n"
 
 
-def rows(path):
+def rows(path: Path) -> list[list[str]]:
     """Return the rows of a CSV file as a program reads it."""
     return list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
 
 
 @pytest.fixture
-def class_(tmp_path):
+def class_(tmp_path: Path) -> Callable[..., Any]:
     """Return what grades a class of three for the platforms asked for."""
     hand_in(tmp_path / "in", ada=10, bob=4, cleo="undecided 6", zoe=5)
     for name, text in (("roster", ROSTER), ("gradebook", GRADEBOOK), ("moodle", MOODLE)):
         (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
 
-    def run(canvas="", *, gradebook=False, moodle=False, gradescope=False, **changes):
+    def run(
+        canvas: str = "", *, gradebook: bool = False, moodle: bool = False, gradescope: bool = False, **changes: Path
+    ) -> tuple[Graded, Path] | None:
         files = [tmp_path / "gradebook.csv" if gradebook else None, tmp_path / "moodle.csv" if moodle else None]
         wanted = platforms(canvas, *files, gradescope=gradescope)
         here = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / "roster.csv", platforms=wanted, **changes)
@@ -44,7 +52,7 @@ def class_(tmp_path):
     return run
 
 
-def test_canvas_from_its_own_gradebook(class_):
+def test_canvas_from_its_own_gradebook(class_: Callable[..., Any]) -> None:
     """Five columns and the one assignment, as Canvas named it; no other score is touched, no blank one written."""
     graded, out = class_("12345", gradebook=True)
     assert rows(out / "canvas.csv") == [
@@ -59,13 +67,13 @@ def test_canvas_from_its_own_gradebook(class_):
     )
 
 
-def test_canvas_by_number_alone(class_):
+def test_canvas_by_number_alone(class_: Callable[..., Any]) -> None:
     """The roster tells the numbers, the reports the points."""
     _, out = class_("Homework (9)")
     assert [row[-1] for row in rows(out / "canvas.csv")] == ["Homework (9)", "10", "10", "4"]
 
 
-def test_canvas_with_other_points_is_told(class_, tmp_path):
+def test_canvas_with_other_points_is_told(class_: Callable[..., Any], tmp_path: Path) -> None:
     """A score of 10 would be little of 100."""
     graded, _ = class_("7", gradebook=True)
     assert graded.remarks == ("Other (7) has 5 points in Canvas, the reports have 10",)
@@ -74,13 +82,13 @@ def test_canvas_with_other_points_is_told(class_, tmp_path):
 @pytest.mark.parametrize(
     ("number", "text"), [("99", r"a column that ends in \(99\)"), ("homework", "expected an assignment's number")]
 )
-def test_an_assignment_that_canvas_does_not_know(class_, number, text):
+def test_an_assignment_that_canvas_does_not_know(class_: Callable[..., Any], number: str, text: str) -> None:
     """A title that matches nothing would make a new assignment."""
     with pytest.raises(ClassError, match=text):
         class_(number, gradebook=True)
 
 
-def test_moodle_has_grade_and_feedback_side_by_side(class_):
+def test_moodle_has_grade_and_feedback_side_by_side(class_: Callable[..., Any]) -> None:
     """And nobody whom Moodle does not know: one such user makes it refuse all."""
     graded, out = class_(moodle=True)
     header, *found = rows(out / "moodle.csv")
@@ -90,7 +98,7 @@ def test_moodle_has_grade_and_feedback_side_by_side(class_):
     assert len(graded.left_out["moodle"]) == 2
 
 
-def test_moodle_tells_only_what_students_may_see(class_):
+def test_moodle_tells_only_what_students_may_see(class_: Callable[..., Any]) -> None:
     """Reasons come from what is handed back, never from the instructor's report; without one there is the score."""
     _, out = class_(moodle=True)
     place = out / "students" / "bob" / "feedback.json"
@@ -102,7 +110,7 @@ def test_moodle_tells_only_what_students_may_see(class_):
     assert rows(out / "moodle.csv")[2][2] == "4 of 10 points."
 
 
-def test_moodle_unknown_users_are_named_beforehand(class_, tmp_path):
+def test_moodle_unknown_users_are_named_beforehand(class_: Callable[..., Any], tmp_path: Path) -> None:
     """With what they could not be found by."""
     (tmp_path / "moodle.csv").write_text("Email address\nada@x.edu\nother@x.edu\n", encoding="utf-8")
     graded, out = class_(moodle=True)
@@ -110,14 +118,14 @@ def test_moodle_unknown_users_are_named_beforehand(class_, tmp_path):
     assert any("Bob" in line and "moodle.csv" in line for line in graded.left_out["moodle"])
 
 
-def test_moodle_needs_a_column_that_it_knows_people_by(class_, tmp_path):
+def test_moodle_needs_a_column_that_it_knows_people_by(class_: Callable[..., Any], tmp_path: Path) -> None:
     """A name is not enough."""
     (tmp_path / "moodle.csv").write_text("Full name,Grade\nAda Lovelace,\n", encoding="utf-8")
     with pytest.raises(ClassError, match="expected a column Email address, Username or ID number"):
         class_(moodle=True)
 
 
-def test_gradescope_has_the_score_that_counts_and_the_raw_one(class_, tmp_path):
+def test_gradescope_has_the_score_that_counts_and_the_raw_one(class_: Callable[..., Any], tmp_path: Path) -> None:
     """In the results.json of each submission, and a table of all."""
     (tmp_path / "adjust.yaml").write_text("students:\n  bob: {score: 7, reason: regraded}\n", encoding="utf-8")
     _, out = class_(gradescope=True, adjustments=tmp_path / "adjust.yaml")
@@ -128,7 +136,7 @@ def test_gradescope_has_the_score_that_counts_and_the_raw_one(class_, tmp_path):
     assert "raw_score" not in (out / "gradescope" / "ada" / "results.json").read_text(encoding="utf-8")
 
 
-def test_twins_are_exported_once_one_is_ignored(class_, tmp_path):
+def test_twins_are_exported_once_one_is_ignored(class_: Callable[..., Any], tmp_path: Path) -> None:
     """Until then nobody decides which one counts."""
     hand_in(tmp_path / "in", **{"ada@x.edu": 5})
     graded, out = class_("12345", gradebook=True)
@@ -142,7 +150,7 @@ def test_twins_are_exported_once_one_is_ignored(class_, tmp_path):
 
 
 @pytest.mark.parametrize("file", ["gradebook.csv", "canvas.csv", "moodle.csv", "gradescope.csv"])
-def test_no_cell_is_a_formula(class_, tmp_path, file):
+def test_no_cell_is_a_formula(class_: Callable[..., Any], tmp_path: Path, file: str) -> None:
     """Whatever people call themselves, and whatever is said about them."""
     (tmp_path / "adjust.yaml").write_text('students:\n  bob: {score: 7, reason: "=1+1"}\n', encoding="utf-8")
     hand_in(tmp_path / "in", **{"@SUM(A1)": 5, "+1": 4})
@@ -151,7 +159,7 @@ def test_no_cell_is_a_formula(class_, tmp_path, file):
     assert not [cell for cell in cells if cell[:1] in ("=", "+", "-", "@", "\t", "\r")]
 
 
-def test_the_gradebook_has_points_by_exercise_and_criterion(class_):
+def test_the_gradebook_has_points_by_exercise_and_criterion(class_: Callable[..., Any]) -> None:
     """What is undecided is left open, never 0."""
     _, out = class_()
     header, *found = rows(out / "gradebook.csv")

@@ -1,7 +1,12 @@
 """A class from end to end, without running anybody's code: what is graded, what is kept, what is written."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
@@ -9,17 +14,18 @@ from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 from grader.app.seeds import SeedKey
 from grader.classroom.gradebook import Status
 from grader.classroom.store import SEED_KEY, State, Store, open_store
+from grader.classroom.summary import Graded
 from grader.core.errors import ClassError, HarnessError
 
 
-def regraded(tmp_path, **changes):
+def regraded(tmp_path: Path, **changes: Any) -> tuple[list[str], Graded] | None:
     """Grade the class in `in` again, and return the names of those who were graded."""
     scheduler = FakeScheduler()
     graded = grade(course(tmp_path / "in", tmp_path / "out", **changes), scheduler)
     return scheduler.graded, graded
 
 
-def test_everybody_is_graded_once(tmp_path):
+def test_everybody_is_graded_once(tmp_path: Path) -> None:
     """The same command grades nobody again, and says how all stand."""
     hand_in(tmp_path / "in", ada=10, bob=7)
     names, graded = regraded(tmp_path)
@@ -30,7 +36,7 @@ def test_everybody_is_graded_once(tmp_path):
     assert scores(graded) == {"ada": 10, "bob": 7}
 
 
-def test_what_was_handed_in_anew_is_graded(tmp_path):
+def test_what_was_handed_in_anew_is_graded(tmp_path: Path) -> None:
     """Only that; who left the class is named, and the result stays."""
     hand_in(tmp_path / "in", ada=10, bob=7)
     regraded(tmp_path)
@@ -44,7 +50,7 @@ def test_what_was_handed_in_anew_is_graded(tmp_path):
 
 
 @pytest.mark.parametrize("change", [{"grading": "seed"}, {"grading": "clock"}, {"grading": "exercises"}])
-def test_other_conditions_are_other_results(tmp_path, change):
+def test_other_conditions_are_other_results(tmp_path: Path, change: Mapping[str, str]) -> None:
     """The seed, the clock and the rubrics are part of the key."""
     hand_in(tmp_path / "in", ada=10)
     regraded(tmp_path)
@@ -53,7 +59,7 @@ def test_other_conditions_are_other_results(tmp_path, change):
     assert regraded(tmp_path, grading=other)[0] == ["ada"]
 
 
-def test_a_stopped_run_goes_on(tmp_path):
+def test_a_stopped_run_goes_on(tmp_path: Path) -> None:
     """What was done is not done again, and nothing is missing in the end."""
     hand_in(tmp_path / "in", ada=10, bob=7, cleo=5, dan=3)
     with pytest.raises(KeyboardInterrupt):
@@ -63,7 +69,7 @@ def test_a_stopped_run_goes_on(tmp_path):
     assert scores(graded) == {"ada": 10, "bob": 7, "cleo": 5, "dan": 3}
 
 
-def test_a_stopped_rerun_goes_on_too(tmp_path):
+def test_a_stopped_rerun_goes_on_too(tmp_path: Path) -> None:
     """Everybody is graded again once, not from the beginning after each stop; the next rerun is a new one."""
     hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
     regraded(tmp_path)
@@ -73,7 +79,7 @@ def test_a_stopped_rerun_goes_on_too(tmp_path):
     assert regraded(tmp_path, rerun="all")[0] == ["ada", "bob", "cleo"]
 
 
-def test_a_failure_is_tried_again_and_is_never_a_mark(tmp_path):
+def test_a_failure_is_tried_again_and_is_never_a_mark(tmp_path: Path) -> None:
     """Nothing is known of the score, and the same command tries once more."""
     hand_in(tmp_path / "in", ada="failed")
     _, graded = regraded(tmp_path)
@@ -83,7 +89,7 @@ def test_a_failure_is_tried_again_and_is_never_a_mark(tmp_path):
 
 
 @pytest.mark.parametrize("later", ["failed", "undecided 6"])
-def test_a_good_result_is_never_replaced_by_a_fault_of_ours(tmp_path, later):
+def test_a_good_result_is_never_replaced_by_a_fault_of_ours(tmp_path: Path, later: str) -> None:
     """Also not where the files changed: the old result stays, and the row says that it is old."""
     hand_in(tmp_path / "in", ada=10)
     regraded(tmp_path)
@@ -98,7 +104,7 @@ def test_a_good_result_is_never_replaced_by_a_fault_of_ours(tmp_path, later):
     assert (scores(graded), graded.book.rows[0].problem) == ({"ada": 4}, "")
 
 
-def test_rerun_chooses(tmp_path):
+def test_rerun_chooses(tmp_path: Path) -> None:
     """Failed ones, undecided ones, or all."""
     hand_in(tmp_path / "in", ada=10, bob="undecided 6")
     (tmp_path / "in" / "eve").mkdir()
@@ -109,14 +115,14 @@ def test_rerun_chooses(tmp_path):
     assert regraded(tmp_path, rerun="all")[0] == ["ada", "bob", "eve"]
 
 
-def test_what_is_undecided_has_no_final_score(tmp_path):
+def test_what_is_undecided_has_no_final_score(tmp_path: Path) -> None:
     """The points so far are shown as raw ones only."""
     hand_in(tmp_path / "in", bob="undecided 6")
     row = regraded(tmp_path)[1].book.rows[0]
     assert (row.status, row.adjusted.score, row.report["score"]) == (Status.UNDECIDED, None, 6)
 
 
-def test_the_class_is_written_for_programs_and_for_spreadsheets(tmp_path):
+def test_the_class_is_written_for_programs_and_for_spreadsheets(tmp_path: Path) -> None:
     """batch.json and gradebook.csv name everybody."""
     hand_in(tmp_path / "in", ada=10, bob="failed")
     regraded(tmp_path)
@@ -126,14 +132,14 @@ def test_the_class_is_written_for_programs_and_for_spreadsheets(tmp_path):
     assert [line.split(",")[0] for line in lines] == ["submission", "ada", "bob"]
 
 
-def test_results_have_one_writer(tmp_path):
+def test_results_have_one_writer(tmp_path: Path) -> None:
     """A second command on the same folder ends at once."""
     hand_in(tmp_path / "in", ada=10)
     with open_store(tmp_path / "out"), pytest.raises(ClassError, match="another process grades into this folder"):
         regraded(tmp_path)
 
 
-def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path, monkeypatch):
+def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others would fail too; the same command goes on when there is room again."""
     hand_in(tmp_path / "in", ada=10, bob="failed", cleo=5)
     free = Store.free_bytes
@@ -146,7 +152,7 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_done(tmp_path, monkeypatch)
     assert scores(graded) == {"ada": 10, "bob": None, "cleo": 5}
 
 
-def test_a_decision_about_nobody_ends_the_run_before_it_begins(tmp_path):
+def test_a_decision_about_nobody_ends_the_run_before_it_begins(tmp_path: Path) -> None:
     """The message names the line and the nearest name."""
     hand_in(tmp_path / "in", ada=10)
     (tmp_path / "adjust.yaml").write_text("students:\n  adda: {days_late: 1}\n", encoding="utf-8")
@@ -156,7 +162,7 @@ def test_a_decision_about_nobody_ends_the_run_before_it_begins(tmp_path):
     assert not (tmp_path / "out" / "students" / "ada").exists()
 
 
-def test_results_survive_in_every_state(tmp_path):
+def test_results_survive_in_every_state(tmp_path: Path) -> None:
     """What is written is read back."""
     hand_in(tmp_path / "in", ada=10, bob="undecided 6", cleo="failed")
     (tmp_path / "in" / "eve").mkdir()
@@ -166,12 +172,12 @@ def test_results_survive_in_every_state(tmp_path):
     assert states == [State.GRADED, State.UNDECIDED, State.FAILED, State.REFUSED]
 
 
-def seeds(scheduler):
+def seeds(scheduler: FakeScheduler) -> dict[str, int]:
     """Return the seed that each submission was graded with."""
     return {name: task.conditions.seed for name, task in scheduler.tasks.items()}
 
 
-def test_a_class_keeps_a_key_of_its_own(tmp_path):
+def test_a_class_keeps_a_key_of_its_own(tmp_path: Path) -> None:
     """Everybody gets a seed that nobody can predict, the same again when graded again."""
     hand_in(tmp_path / "in", ada=10, bob=7)
     first, again, elsewhere = FakeScheduler(), FakeScheduler(), FakeScheduler()
@@ -185,7 +191,7 @@ def test_a_class_keeps_a_key_of_its_own(tmp_path):
     assert key.stat().st_mode & 0o777 == 0o600
 
 
-def test_the_key_of_a_class_is_in_nothing_else_that_it_leaves(tmp_path):
+def test_the_key_of_a_class_is_in_nothing_else_that_it_leaves(tmp_path: Path) -> None:
     """Results are handed on: pages, tables, reports."""
     hand_in(tmp_path / "in", ada=10)
     scheduler = FakeScheduler()
@@ -197,7 +203,7 @@ def test_the_key_of_a_class_is_in_nothing_else_that_it_leaves(tmp_path):
     assert key.decode() not in repr(scheduler.tasks)
 
 
-def test_another_key_is_another_result(tmp_path):
+def test_another_key_is_another_result(tmp_path: Path) -> None:
     """One that is named is not kept; a changed one grades everybody again."""
     hand_in(tmp_path / "in", ada=10)
     regraded(tmp_path, seed_key=SeedKey(b"one key of 16 bytes"))
@@ -208,7 +214,7 @@ def test_another_key_is_another_result(tmp_path):
     assert regraded(tmp_path)[0] == []
 
 
-def test_a_seed_for_everybody_needs_no_key(tmp_path):
+def test_a_seed_for_everybody_needs_no_key(tmp_path: Path) -> None:
     """And none is made."""
     hand_in(tmp_path / "in", ada=10)
     scheduler = FakeScheduler()

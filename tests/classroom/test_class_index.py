@@ -1,8 +1,12 @@
 """The page of a class as `grade batch` writes it: who is where, what no page may name, and that it is always whole."""
 
+from __future__ import annotations
+
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in
@@ -12,22 +16,22 @@ from grader.classroom.class_page import without_folders
 RUN = re.compile(r'<div id="run">.*?</div>\n<nav', re.DOTALL)
 
 
-def page_of(folder):
+def page_of(folder: Path) -> str:
     """Return the text of the page in a folder for results."""
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
-def data_of(folder):
+def data_of(folder: Path) -> dict[str, Any]:
     """Return the data in the page."""
     return json.loads(re.search(r'<script type="application/json" id="class">(.*?)</script>', page_of(folder))[1])
 
 
-def standing(folder):
+def standing(folder: Path) -> dict[str, str]:
     """Return name -> status of everybody in the page."""
     return {student["name"]: student["status"] for student in data_of(folder)["students"]}
 
 
-def test_the_page_lies_beside_the_gradebook(tmp_path):
+def test_the_page_lies_beside_the_gradebook(tmp_path: Path) -> None:
     """With the scripts that it shares with the reports; everything it loads is there."""
     hand_in(tmp_path / "in", ada=10, bob=7)
     graded = grade(course(tmp_path / "in", tmp_path / "out"))
@@ -38,7 +42,7 @@ def test_the_page_lies_beside_the_gradebook(tmp_path):
     assert standing(tmp_path / "out") == {"ada": "graded", "bob": "graded"}
 
 
-def test_a_page_that_stands_alone_loads_nothing(tmp_path):
+def test_a_page_that_stands_alone_loads_nothing(tmp_path: Path) -> None:
     """As the reports of `--standalone` do."""
     hand_in(tmp_path / "in", ada=10)
     grade(course(tmp_path / "in", tmp_path / "out", standalone=True))
@@ -46,7 +50,7 @@ def test_a_page_that_stands_alone_loads_nothing(tmp_path):
     assert not (tmp_path / "out" / "assets").exists()
 
 
-def test_a_stopped_run_leaves_a_page(tmp_path):
+def test_a_stopped_run_leaves_a_page(tmp_path: Path) -> None:
     """It says so, and who was not graded; the next run says it no more."""
     hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)
     wanted = course(tmp_path / "in", tmp_path / "out")
@@ -59,7 +63,7 @@ def test_a_stopped_run_leaves_a_page(tmp_path):
     assert "was stopped before everybody" not in page_of(tmp_path / "out")
 
 
-def test_the_same_results_give_the_same_page(tmp_path):
+def test_the_same_results_give_the_same_page(tmp_path: Path) -> None:
     """But for the block about the run, also when one of the runs was stopped and went on."""
     hand_in(tmp_path / "in", ada=10, bob=7, cleo="undecided 5")
     grade(course(tmp_path / "in", tmp_path / "out"))
@@ -71,7 +75,7 @@ def test_the_same_results_give_the_same_page(tmp_path):
     assert RUN.sub("", one) == RUN.sub("", other)
 
 
-def test_no_page_names_a_folder_of_this_machine(tmp_path):
+def test_no_page_names_a_folder_of_this_machine(tmp_path: Path) -> None:
     """Neither in what the run was, nor in why something was refused or failed."""
     hand_in(tmp_path / "in", ada=10, bob="failed", dan=3)
     (tmp_path / "in" / "broken.zip").write_bytes(b"PK\x03\x04 no archive")
@@ -94,12 +98,12 @@ def test_no_page_names_a_folder_of_this_machine(tmp_path):
         ("geometry_msgs/msg/Twist stays", "geometry_msgs/msg/Twist stays"),
     ],
 )
-def test_paths_begin_where_the_class_begins(text, said):
+def test_paths_begin_where_the_class_begins(text: str, said: str) -> None:
     """Names of ROS are none."""
     assert without_folders(text, ("/data/x/in",)) == said
 
 
-def test_addresses_are_those_of_the_roster(tmp_path):
+def test_addresses_are_those_of_the_roster(tmp_path: Path) -> None:
     """One that only the name of a file told is not repeated."""
     hand_in(tmp_path / "in", **{"ada - ada@uni.example": 10})
     pattern = "(?P<name>[a-z]+) - (?P<email>.+)"
@@ -114,7 +118,7 @@ def test_addresses_are_those_of_the_roster(tmp_path):
     assert "<bdi>ada@uni.example</bdi>" in page_of(tmp_path / "out")
 
 
-def test_what_was_decided_is_beside_the_raw_score(tmp_path):
+def test_what_was_decided_is_beside_the_raw_score(tmp_path: Path) -> None:
     """Penalty, another score with its reason, and what does not count; the distribution shows both."""
     hand_in(tmp_path / "in", ada=10, bob=10, cleo=4, dan=10)
     late = tmp_path / "late.yaml"
@@ -139,7 +143,7 @@ def test_what_was_decided_is_beside_the_raw_score(tmp_path):
     assert (bins[10][3], bins[8][4]) == (2, 1)
 
 
-def test_who_needs_a_look_is_listed(tmp_path):
+def test_who_needs_a_look_is_listed(tmp_path: Path) -> None:
     """Undecided, not graded, not on the roster, twice, without a submission."""
     hand_in(tmp_path / "in", ada=10, bob="failed", cleo="undecided 5", eve=1)
     hand_in(tmp_path / "more", ada=3)

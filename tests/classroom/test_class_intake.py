@@ -1,5 +1,7 @@
 """Which submissions are found in folders and downloads, what they are called, and what is named instead of dropped."""
 
+from __future__ import annotations
+
 import io
 import os
 import re
@@ -7,18 +9,20 @@ import stat
 import sys
 import tarfile
 import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from grader.classroom.downloads import AUTO
-from grader.classroom.intake import take_in
+from grader.classroom.intake import Entry, Intake, take_in
 from grader.core.errors import ClassError
 
 PY = b"print('hello')\n"
 
 
-def put(folder, *names):
+def put(folder: Path, *names: str) -> Path:
     """Write a file for each name."""
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -26,7 +30,7 @@ def put(folder, *names):
     return folder
 
 
-def zipped(path, files, links=()):
+def zipped(path: Path, files: Mapping[str, bytes], links: Sequence[str] = ()) -> Path:
     """Write a zip of name -> content."""
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
@@ -37,7 +41,7 @@ def zipped(path, files, links=()):
     return path
 
 
-def packed(files):
+def packed(files: Mapping[str, bytes]) -> bytes:
     """Return a zip as bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
@@ -46,20 +50,20 @@ def packed(files):
     return buffer.getvalue()
 
 
-def found(tmp_path, *sources, **how):
+def found(tmp_path: Path, *sources: Path, **how: str) -> Intake | None:
     return take_in(sources, tmp_path / "out", **how)
 
 
-def names(intake):
+def names(intake: Intake) -> list[str]:
     return [entry.name for entry in intake.entries]
 
 
-def contents(entry):
+def contents(entry: Entry) -> list[str]:
     """Return the files of an entry that is a folder."""
     return sorted(p.relative_to(entry.path).as_posix() for p in entry.path.rglob("*") if p.is_file())
 
 
-def test_folders_and_archives_are_submissions(tmp_path):
+def test_folders_and_archives_are_submissions(tmp_path: Path) -> None:
     """One a student; what is neither is named, and what systems leave there is not."""
     class_ = put(tmp_path / "class", "ada/a.py", "Bob Ross/b.py", "notes.txt", ".git/x", "__MACOSX/y", ".DS_Store")
     zipped(class_ / "cleo.tar.gz", {"c.py": PY})
@@ -76,14 +80,14 @@ def test_folders_and_archives_are_submissions(tmp_path):
 HIDDEN = (".ada/a.py", ".bob.zip", "venv/c.py", "dan/d.py", "eve/e.py")
 
 
-def test_what_is_passed_over_for_its_name_is_named(tmp_path):
+def test_what_is_passed_over_for_its_name_is_named(tmp_path: Path) -> None:
     """A student may be called like that; folder or archive, nothing disappears without a word."""
     intake = found(tmp_path, put(tmp_path / "class", *HIDDEN))
     assert names(intake) == ["dan", "eve"]
     assert [stray.rpartition("/")[2].partition(":")[0] for stray in intake.strays] == [".ada", ".bob.zip", "venv"]
 
 
-def test_what_is_passed_over_in_a_download_is_named(tmp_path):
+def test_what_is_passed_over_in_a_download_is_named(tmp_path: Path) -> None:
     """Once for each folder, also when the download was unpacked before; not what a system has put there."""
     further = (".ada/b.py", "__MACOSX/dan/._d.py", ".DS_Store", "._eve")
     files = {f"hw/{name}": PY for name in (*HIDDEN, *further)}
@@ -93,13 +97,13 @@ def test_what_is_passed_over_in_a_download_is_named(tmp_path):
     assert found(tmp_path, tmp_path / "hw.zip") == intake
 
 
-def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path):
+def test_results_in_the_folder_of_submissions_are_none_of_them(tmp_path: Path) -> None:
     """Neither at first nor when the command is given again."""
     class_ = put(tmp_path / "class", "ada/a.py", "out/students/ada/x.py")
     assert names(take_in([class_], class_ / "out")) == ["ada"]
 
 
-def test_a_link_is_not_followed(tmp_path):
+def test_a_link_is_not_followed(tmp_path: Path) -> None:
     """It may lead to somebody else's work."""
     class_ = put(tmp_path / "class", "ada/a.py")
     (class_ / "bob").symlink_to(class_ / "ada")
@@ -109,19 +113,19 @@ def test_a_link_is_not_followed(tmp_path):
 
 
 @pytest.mark.parametrize("order", [("Ada", "ada"), ("ada", "Ada")])
-def test_names_that_become_the_same_are_told_apart_whatever_the_order(tmp_path, order):
+def test_names_that_become_the_same_are_told_apart_whatever_the_order(tmp_path: Path, order: tuple[str, str]) -> None:
     """Each name follows from the submission alone."""
     class_ = put(tmp_path / "class", *(f"{name}/a.py" for name in order))
     assert {e.label: e.name for e in found(tmp_path, class_).entries} == {"Ada": "ada-2e5fcc", "ada": "ada-64df89"}
 
 
-def test_several_sources_are_one_class(tmp_path):
+def test_several_sources_are_one_class(tmp_path: Path) -> None:
     """Submissions of the same name in two of them stay two."""
     one, other = put(tmp_path / "one", "ada/a.py", "bob/b.py"), put(tmp_path / "other", "ada/a.py")
     assert len(set(names(found(tmp_path, one, other)))) == 3
 
 
-def test_downloads_of_one_name_are_not_mixed_up(tmp_path):
+def test_downloads_of_one_name_are_not_mixed_up(tmp_path: Path) -> None:
     """Each is unpacked into a place of its own."""
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
@@ -133,7 +137,7 @@ def test_downloads_of_one_name_are_not_mixed_up(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["", "_"])
-def test_moodle_with_folders(tmp_path, ending):
+def test_moodle_with_folders(tmp_path: Path, ending: str) -> None:
     """A student's file and text belong together; the number is the participant's."""
     archive = zipped(
         tmp_path / "course-hw-12.zip",
@@ -153,7 +157,7 @@ def test_moodle_with_folders(tmp_path, ending):
     assert contents(intake.entries[0]) == ["onlinetext.html", "velocity_publisher.py"]
 
 
-def test_moodle_without_folders(tmp_path):
+def test_moodle_without_folders(tmp_path: Path) -> None:
     """Files of one student get their own names back."""
     prefix = "Ada Lovelace_657693_assignsubmission_file_"
     files = {
@@ -165,7 +169,7 @@ def test_moodle_without_folders(tmp_path):
     assert [contents(entry) for entry in intake.entries] == [["fan_controller.py", "temperature_sensor.py"], ["x.py"]]
 
 
-def test_canvas(tmp_path):
+def test_canvas(tmp_path: Path) -> None:
     """Files get their own names back, also those that were handed in again, and lateness is noted."""
     files = {
         "lovelaceada_1001_77001_velocity_publisher-2.py": PY,
@@ -180,7 +184,7 @@ def test_canvas(tmp_path):
     assert (dict(bob.identity), bob.late, contents(bob)) == ({"name": "rossbob", "id": "1002"}, True, ["hw.zip"])
 
 
-def test_clones_of_github_classroom(tmp_path):
+def test_clones_of_github_classroom(tmp_path: Path) -> None:
     """The folder says what comes before the user's name, which may hold hyphens."""
     clones = put(tmp_path / "hw-1-submissions", "hw-1-ada/a.py", "hw-1-bob-ross/b.py")
     intake = found(tmp_path, clones)
@@ -188,7 +192,7 @@ def test_clones_of_github_classroom(tmp_path):
     assert [dict(entry.identity) for entry in intake.entries] == [{"user": "ada"}, {"user": "bob-ross"}]
 
 
-def test_clones_of_classroom50(tmp_path):
+def test_clones_of_classroom50(tmp_path: Path) -> None:
     """What all names have in common comes before the user's name; the table of scores is no submission."""
     clones = put(tmp_path / "ros_submissions_2026", "ros-hw-ada/a.py", "ros-hw-bob-ross/b.py", "scores.csv")
     intake = found(tmp_path, clones, layout="classroom50")
@@ -196,7 +200,7 @@ def test_clones_of_classroom50(tmp_path):
     assert len(intake.strays) == 1
 
 
-def test_a_pattern_of_ones_own(tmp_path):
+def test_a_pattern_of_ones_own(tmp_path: Path) -> None:
     """Names that do not match are graded all the same, and say so."""
     class_ = put(tmp_path / "class", "1234 - Ada/a.py", "readme/x.py")
     intake = found(tmp_path, class_, pattern=r"(?P<id>\d+) - (?P<name>.+)")
@@ -214,26 +218,26 @@ def test_a_pattern_of_ones_own(tmp_path):
         (".*", "found no named group"),
     ],
 )
-def test_a_pattern_that_cannot_be_used(tmp_path, pattern, text):
+def test_a_pattern_that_cannot_be_used(tmp_path: Path, pattern: str, text: str) -> None:
     """The message says what is wrong with it."""
     with pytest.raises(ClassError) as error:
         found(tmp_path, put(tmp_path / "class", "ada/a.py"), pattern=pattern)
     assert text in error.value.message
 
 
-def test_a_folder_around_everything_is_opened(tmp_path):
+def test_a_folder_around_everything_is_opened(tmp_path: Path) -> None:
     """Many tools pack a folder and not what is in it."""
     archive = zipped(tmp_path / "hw.zip", {"hw/ada/a.py": PY, "hw/bob.zip": packed({"b.py": PY})})
     assert names(found(tmp_path, archive)) == ["ada", "bob"]
 
 
-def test_a_class_of_one_is_not_opened(tmp_path):
+def test_a_class_of_one_is_not_opened(tmp_path: Path) -> None:
     """The only folder is a student's."""
     assert names(found(tmp_path, zipped(tmp_path / "hw.zip", {"ada/a.py": PY, "ada/pkg/b.py": PY}))) == ["ada"]
 
 
 @pytest.mark.parametrize("compression", ["", "gz", "bz2", "xz"])
-def test_a_tar_is_a_download(tmp_path, compression):
+def test_a_tar_is_a_download(tmp_path: Path, compression: str) -> None:
     """Compressed or not, with and without a leading dot."""
     path = tmp_path / "hw.tar"
     with tarfile.open(path, f"w:{compression}") as archive:
@@ -254,7 +258,7 @@ def test_a_tar_is_a_download(tmp_path, compression):
         ("ada/con.py", "Windows keeps for a device"),
     ],
 )
-def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path, bad, text):
+def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path: Path, bad: str, text: str) -> None:
     """That submission is listed with the reason; nothing of it is written."""
     archive = zipped(
         tmp_path / "hw.zip", {"ada/a.py": PY, bad: b"/etc/passwd", "bob/b.py": PY}, links=[bad] if "link" in bad else []
@@ -266,7 +270,7 @@ def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path, bad, text):
     assert not list(tmp_path.rglob("evil*"))
 
 
-def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path):
+def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path: Path) -> None:
     """Also where the whole class lies in one folder of the download."""
     files = {"hw/": b"", "hw/ada/../../evil.py": PY, "hw/bob/b.py": PY, "hw/cleo/c.py": PY, "hw/scores.csv": b""}
     intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
@@ -276,7 +280,7 @@ def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path):
     assert again == intake
 
 
-def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path, monkeypatch):
+def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A part of the work would get a part of the marks."""
     monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
     files = {"lovelaceada_1_2_a.py": PY, "lovelaceada_1_3_b.bin": b"x" * 5000, "rossbob_2_4_a.py": PY}
@@ -284,7 +288,7 @@ def test_a_bad_file_of_a_student_refuses_all_of_that_student(tmp_path, monkeypat
     assert ("MiB a file" in ada.problem, bob.problem) == (True, "")
 
 
-def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path):
+def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path: Path) -> None:
     """It is not waited for, and the others go on."""
     class_ = put(tmp_path / "class", "Bob_2_assignsubmission_file/b.py")
     for kind in ("file", "onlinetext"):
@@ -295,7 +299,7 @@ def test_a_pipe_in_a_folder_that_is_put_together_refuses_that_student(tmp_path):
 
 
 @pytest.mark.parametrize("bad", ["/etc/evil.py", "../evil.py", "C:/evil.py"])
-def test_a_member_of_nobody_is_named(tmp_path, bad):
+def test_a_member_of_nobody_is_named(tmp_path: Path, bad: str) -> None:
     """It is not written anywhere."""
     intake = found(tmp_path, zipped(tmp_path / "hw.zip", {bad: PY, "bob/b.py": PY, "cleo/c.py": PY}))
     assert names(intake) == ["bob", "cleo"]
@@ -304,7 +308,7 @@ def test_a_member_of_nobody_is_named(tmp_path, bad):
     assert not list(tmp_path.rglob("evil*"))
 
 
-def test_one_student_cannot_fill_the_disk(tmp_path, monkeypatch):
+def test_one_student_cannot_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is too large is refused by itself, counted while it is unpacked."""
     monkeypatch.setattr("grader.classroom.downloads.MAX_ARCHIVE_BYTES", 1000)
     archive = zipped(tmp_path / "hw.zip", {"ada/a.bin": b"\0" * 5000, "bob/b.py": PY})
@@ -313,7 +317,7 @@ def test_one_student_cannot_fill_the_disk(tmp_path, monkeypatch):
     assert bob.problem == ""
 
 
-def test_a_download_is_unpacked_once_and_again_when_it_changed(tmp_path):
+def test_a_download_is_unpacked_once_and_again_when_it_changed(tmp_path: Path) -> None:
     """The same bytes are the same folder; another download replaces it as a whole."""
     archive = zipped(tmp_path / "hw.zip", {"ada/a.py": PY, "bob/b.py": PY})
     first = found(tmp_path, archive).entries[0].path
@@ -325,7 +329,7 @@ def test_a_download_is_unpacked_once_and_again_when_it_changed(tmp_path):
     assert (again / "a.py").read_bytes() == b"new"
 
 
-def test_refusals_are_remembered(tmp_path):
+def test_refusals_are_remembered(tmp_path: Path) -> None:
     """Also where the download is not unpacked again."""
     archive = zipped(tmp_path / "hw.zip", {"ada/con.py": PY, "bob/b.py": PY})
     first = found(tmp_path, archive)
@@ -334,7 +338,7 @@ def test_refusals_are_remembered(tmp_path):
 
 
 @pytest.mark.parametrize("make", [lambda p: p.mkdir(), lambda p: p.write_bytes(b"PK\x03\x04 no zip"), lambda p: None])
-def test_a_source_without_submissions_cannot_be_used(tmp_path, make):
+def test_a_source_without_submissions_cannot_be_used(tmp_path: Path, make: Callable[..., Any]) -> None:
     """An empty folder, a damaged download, a path that is not there."""
     source = tmp_path / "source"
     make(source)
@@ -343,7 +347,7 @@ def test_a_source_without_submissions_cannot_be_used(tmp_path, make):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names that are no text exist on Linux only")
-def test_a_name_that_is_no_text_is_safe(tmp_path):
+def test_a_name_that_is_no_text_is_safe(tmp_path: Path) -> None:
     """Undecodable bytes, controls and what reorders text do not reach the name of a result."""
     class_ = put(tmp_path / "class", "bob/b.py")
     for raw in (b"ad\xffa", b"\xe2\x80\xaeevil", b"x\ny", b"a" * 200):

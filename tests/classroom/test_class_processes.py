@@ -1,11 +1,15 @@
 """One process for each submission: whatever becomes of it, the others and the class go on."""
 
+from __future__ import annotations
+
 import json
 import sys
 import threading
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -43,19 +47,21 @@ print(done)
 """
 
 
-def task(tmp_path, label, deadline_s=600.0):
+def task(tmp_path: Path, label: str, deadline_s: float = 600.0) -> Task:
     return Task(label, label, tmp_path, tmp_path / label, (), (), None, CONDITIONS, 1, False, deadline_s)
 
 
-def scheduler(jobs=2):
+def scheduler(jobs: int = 2) -> LocalScheduler:
     return LocalScheduler(jobs, (sys.executable, "-c", PROGRAM))
 
 
-def graded(tasks, jobs=2, hear=lambda name, step: None):
+def graded(
+    tasks: Sequence[Task], jobs: int = 2, hear: Callable[..., Any] = lambda name, step: None
+) -> dict[str, Standing]:
     return {a.task.name: a.standing for a in scheduler(jobs).run(tasks, hear)}
 
 
-def test_one_disaster_touches_nobody_else(tmp_path):
+def test_one_disaster_touches_nobody_else(tmp_path: Path) -> None:
     """A crash, an exit, nonsense: each is a failure of ours, and the others have their results."""
     labels = ("fine", "crashes", "exits", "talks nonsense", "lingers", "fine too")
     found = graded([task(tmp_path, label) for label in labels])
@@ -70,21 +76,21 @@ def test_one_disaster_touches_nobody_else(tmp_path):
     assert found["exits"].problem == "the grader ended without a result (exit code 7)"
 
 
-def test_what_does_not_end_is_given_up(tmp_path):
+def test_what_does_not_end_is_given_up(tmp_path: Path) -> None:
     """After its deadline; nothing is left of it."""
     found = graded([task(tmp_path, "hangs", deadline_s=0.2)])
     assert found["hangs"].problem.startswith("the grader was not done after")
     assert found["hangs"].state is State.FAILED
 
 
-def test_whoever_listens_hears_what_is_running(tmp_path):
+def test_whoever_listens_hears_what_is_running(tmp_path: Path) -> None:
     """By name and step."""
     heard = []
     graded([task(tmp_path, "fine")], hear=lambda name, step: heard.append((name, step)))
     assert heard == [("fine", "starting"), ("fine", "grading")]
 
 
-def test_giving_up_leaves_no_process(tmp_path):
+def test_giving_up_leaves_no_process(tmp_path: Path) -> None:
     """Closing the iterator, as Ctrl-C does, ends everything that is under way."""
     started = threading.Event()
     here = scheduler()
@@ -100,7 +106,7 @@ def test_giving_up_leaves_no_process(tmp_path):
     assert [pid for pid in pids if Path(f"/proc/{pid}").exists()] == []
 
 
-def test_a_program_that_cannot_be_started_is_a_failure(tmp_path):
+def test_a_program_that_cannot_be_started_is_a_failure(tmp_path: Path) -> None:
     """Of ours, not of the student's."""
     here = LocalScheduler(1, ("/nothing/there",))
     attempt = next(here.run([task(tmp_path, "fine")], lambda name, step: None))
@@ -108,7 +114,7 @@ def test_a_program_that_cannot_be_started_is_a_failure(tmp_path):
 
 
 @pytest.mark.parametrize("odd", ["b a", "ö", "-x"])
-def test_tasks_reach_the_process_as_they_are(tmp_path, odd):
+def test_tasks_reach_the_process_as_they_are(tmp_path: Path, odd: str) -> None:
     """Paths with spaces, umlauts and hyphens."""
     program = (
         "import json,sys; t = json.loads(sys.stdin.readline())['task']; print(json.dumps({'step': t['submission']}))"
@@ -123,7 +129,9 @@ def test_tasks_reach_the_process_as_they_are(tmp_path, odd):
 @pytest.mark.parametrize(
     ("tier", "shares", "most"), [("landlock", True, 1), ("none", True, 3), ("bubblewrap", False, 3)]
 )
-def test_submissions_that_could_reach_each_other_go_one_at_a_time(tmp_path, monkeypatch, tier, shares, most):
+def test_submissions_that_could_reach_each_other_go_one_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tier: str, shares: bool, most: int
+) -> None:
     """Where the sandbox leaves them one network; without walls it is the user's wish."""
     isolation = SimpleNamespace(name=tier, shares_network=shares)
     choice = SimpleNamespace(isolation=isolation, containment=())

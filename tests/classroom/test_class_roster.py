@@ -1,11 +1,13 @@
 """Whose submission it is: rosters of every platform, and everybody for whom that is not clear."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest
 
 from grader.classroom.intake import Entry, safe_name
-from grader.classroom.roster import match, read_roster
+from grader.classroom.roster import Matching, Person, match, read_roster
 from grader.core.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
@@ -26,16 +28,16 @@ ross,Rossella,Verdi,rv@x.edu,A,3
 GITHUB = '"identifier","github_username","github_id","name"\n"ada@x.edu","ada","1",""\n"bob@x.edu","","",""\n'
 
 
-def roster(tmp_path, text, encoding="utf-8"):
+def roster(tmp_path: Path, text: str, encoding: str = "utf-8") -> list[Person]:
     (tmp_path / "roster.csv").write_bytes(text.encode(encoding))
     return read_roster(tmp_path / "roster.csv")
 
 
-def entry(label, **identity):
+def entry(label: str, **identity: str) -> Entry:
     return Entry(safe_name(label), label, Path(label), identity)
 
 
-def who(matching):
+def who(matching: Matching) -> dict[str, str]:
     return {name: person.name for name, person in matching.people.items()}
 
 
@@ -43,34 +45,34 @@ def who(matching):
     ("text", "encoding"),
     [(CANVAS, "utf-8"), (CANVAS, "utf-8-sig"), (MOODLE, "utf-16"), (CLASSROOM50.replace(",", "\t"), "utf-8")],
 )
-def test_rosters_are_read_as_platforms_write_them(tmp_path, text, encoding):
+def test_rosters_are_read_as_platforms_write_them(tmp_path: Path, text: str, encoding: str) -> None:
     """Whatever is between the cells and in front of the text; made-up students and rows of points are nobody."""
     people = roster(tmp_path, text, encoding)
     assert [person.name for person in people][:2] == ["Ada Lovelace", "Bob Ross"]
     assert len(people) == (3 if "Verdi" in text else 2)
 
 
-def test_github_classroom_knows_people_by_what_the_course_calls_them(tmp_path):
+def test_github_classroom_knows_people_by_what_the_course_calls_them(tmp_path: Path) -> None:
     """Who has not accepted yet has no user name."""
     people = roster(tmp_path, GITHUB)
     assert [(p.name, p.user) for p in people] == [("ada@x.edu", "ada"), ("bob@x.edu", "")]
 
 
-def test_canvas_entries_go_by_number(tmp_path):
+def test_canvas_entries_go_by_number(tmp_path: Path) -> None:
     """And by the name without spaces where there is no number of Canvas."""
     people = roster(tmp_path, CANVAS)
     found = match([entry("x", name="lovelaceada", id="1001"), entry("y", name="rossbob", id="0")], people)
     assert who(found) == {"x": "Ada Lovelace", "y": "Bob Ross"}
 
 
-def test_moodle_entries_go_by_participant(tmp_path):
+def test_moodle_entries_go_by_participant(tmp_path: Path) -> None:
     """The download has the number alone, the worksheet a word before it."""
     found = match([entry("x", name="Somebody", id="657694")], roster(tmp_path, MOODLE))
     assert who(found) == {"x": "Bob Ross"}
     assert [person.name for person in found.missing] == ["Ada Lovelace"]
 
 
-def test_clones_go_by_user(tmp_path):
+def test_clones_go_by_user(tmp_path: Path) -> None:
     """Also where the layout does not know the prefix: the longest user name at the end counts."""
     people = roster(tmp_path, CLASSROOM50)
     found = match([entry("ros-hw-ada", user="ada"), entry("ros-hw-bob-ross")], people)
@@ -78,12 +80,12 @@ def test_clones_go_by_user(tmp_path):
 
 
 @pytest.mark.parametrize("label", ["ada@x.edu", "ADA", "Ada Lovelace", "lovelace ada", "Adá Lovelace"])
-def test_folders_go_by_whatever_they_are_called(tmp_path, label):
+def test_folders_go_by_whatever_they_are_called(tmp_path: Path, label: str) -> None:
     """An address, a user name or a name."""
     assert who(match([entry(label)], roster(tmp_path, CLASSROOM50))) == {safe_name(label): "Ada Lovelace"}
 
 
-def test_nobody_is_chosen_where_several_could_be_meant(tmp_path):
+def test_nobody_is_chosen_where_several_could_be_meant(tmp_path: Path) -> None:
     """The entry is listed, and nobody counts as missing because of it."""
     people = roster(tmp_path, "name,email\nAda Lovelace,a@x\nAda Lovelace,b@x\nBob,c@x\n")
     found = match([entry("Ada Lovelace"), entry("zoe")], people)
@@ -91,13 +93,13 @@ def test_nobody_is_chosen_where_several_could_be_meant(tmp_path):
     assert [person.name for person in found.missing] == ["Bob"]
 
 
-def test_two_submissions_of_one_person_are_listed(tmp_path):
+def test_two_submissions_of_one_person_are_listed(tmp_path: Path) -> None:
     """Both are graded; neither is chosen."""
     found = match([entry("ada"), entry("ada@x.edu")], roster(tmp_path, CLASSROOM50))
     assert found.duplicates == (("ada", "ada@x.edu"),)
 
 
-def test_without_a_roster_everybody_is_who_the_submission_says():
+def test_without_a_roster_everybody_is_who_the_submission_says() -> None:
     """A folder and an archive of one name are of one student."""
     found = match(
         [Entry("ada-1", "ada", Path("ada")), Entry("ada-2", "Ada", Path("ada.zip")), entry("b", name="Bo")], None
@@ -116,7 +118,7 @@ def test_without_a_roster_everybody_is_who_the_submission_says():
         (b'name\n"' + b"x" * 200_000 + b'"\n', "expected CSV"),
     ],
 )
-def test_a_roster_that_cannot_be_used(tmp_path, data, text):
+def test_a_roster_that_cannot_be_used(tmp_path: Path, data: bytes, text: str) -> None:
     """The message says what was expected."""
     (tmp_path / "roster.csv").write_bytes(data)
     with pytest.raises(ClassError) as error:
@@ -125,7 +127,7 @@ def test_a_roster_that_cannot_be_used(tmp_path, data, text):
 
 
 @pytest.mark.parametrize("text", ["", ".", "..", "/", "con", "a/b", "\x00", "\u202e", "-rf", "x" * 500, "李雷"])
-def test_a_safe_name_is_one_part_of_a_path(text):
+def test_a_safe_name_is_one_part_of_a_path(text: str) -> None:
     """Whatever it is made from."""
     name = safe_name(text)
     assert name

@@ -1,7 +1,12 @@
 """The folder for results: whole or not at all, whenever a run is stopped."""
 
+from __future__ import annotations
+
 import contextlib
 import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,11 +14,11 @@ from grader.classroom.store import Standing, State, Store, dump, load, open_stor
 from grader.core.errors import HarnessError
 
 
-def standing(state=State.GRADED, score=1.0, key="k"):
+def standing(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> Standing:
     return Standing(state, key, "sha256:1", "ada", score=score, max_score=10.0)
 
 
-def commit(store, new, name="ada", text="report"):
+def commit(store: Store, new: Standing, name: str = "ada", text: str = "report") -> bool | None:
     """Commit a result with one file."""
     fresh = store.fresh(name)
     fresh.mkdir()
@@ -21,11 +26,11 @@ def commit(store, new, name="ada", text="report"):
     return store.commit(name, fresh, new)
 
 
-def leftovers(store):
+def leftovers(store: Store) -> list[Any]:
     return [path.name for path in (store.folder / "students").iterdir() if path.name.startswith(".")]
 
 
-def test_a_new_result_takes_the_place_of_the_old_one(tmp_path):
+def test_a_new_result_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     """Nothing of the old one stays."""
     with open_store(tmp_path) as store:
         assert commit(store, standing(score=1.0), text="old")
@@ -36,14 +41,16 @@ def test_a_new_result_takes_the_place_of_the_old_one(tmp_path):
 
 
 @pytest.mark.parametrize("step", range(1, 12))
-def test_whenever_a_replacement_stops_one_of_both_results_is_there(tmp_path, monkeypatch, step):
+def test_whenever_a_replacement_stops_one_of_both_results_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
     """The machine stops at the n-th change of the disk; the next run finds the old result or the new one, whole."""
     with open_store(tmp_path) as store:
         commit(store, standing(score=1.0), text="old")
         calls = [0]
 
-        def stopping(function):
-            def wrapped(*arguments, **named):
+        def stopping(function: Callable[..., Any]) -> Callable[..., Any]:
+            def wrapped(*arguments: Path | int | str, **named: int | None) -> None:
                 calls[0] += 1
                 if calls[0] == step:
                     raise KeyboardInterrupt
@@ -62,7 +69,7 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(tmp_path, mon
         assert leftovers(store) == []
 
 
-def test_an_unfinished_result_is_none(tmp_path):
+def test_an_unfinished_result_is_none(tmp_path: Path) -> None:
     """What a killed run left behind is removed, and the submission has no result."""
     with open_store(tmp_path) as store:
         fresh = store.fresh("ada")
@@ -73,10 +80,10 @@ def test_an_unfinished_result_is_none(tmp_path):
         assert store.kept("ada").result is None
 
 
-def test_a_stopped_run_tidies_up(tmp_path):
+def test_a_stopped_run_tidies_up(tmp_path: Path) -> None:
     """What was being written is gone at once, not only when the command is given again."""
 
-    def stopped():
+    def stopped() -> None:
         with open_store(tmp_path) as store:
             store.fresh("ada").mkdir()
             raise KeyboardInterrupt
@@ -86,7 +93,7 @@ def test_a_stopped_run_tidies_up(tmp_path):
     assert leftovers(Store(tmp_path)) == []
 
 
-def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path):
+def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path: Path) -> None:
     """The result stays, what was tried last is known."""
     with open_store(tmp_path) as store:
         commit(store, standing(score=5.0))
@@ -97,12 +104,12 @@ def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path):
         assert store.kept("ada").attempt is None
 
 
-def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path, monkeypatch):
+def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk is the machine's fault, and says that the same command goes on."""
     with open_store(tmp_path) as store:
         commit(store, standing(score=5.0), text="old")
 
-        def full(*arguments):
+        def full(*arguments: int) -> None:
             raise OSError(28, "No space left on device")
 
         with monkeypatch.context() as patched:
@@ -114,18 +121,18 @@ def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b'{"schema": "grader/batch-result/v1"}', b"\xff", b"[" * 5000])
-def test_a_damaged_standing_is_none(data):
+def test_a_damaged_standing_is_none(data: bytes) -> None:
     """The submission is then graded again."""
     assert load(data) is None
 
 
-def test_a_standing_survives_names_that_are_no_text():
+def test_a_standing_survives_names_that_are_no_text() -> None:
     """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
     odd = Standing(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
     assert load(dump(odd)).state is State.REFUSED
 
 
-def test_a_standing_of_another_version_is_none():
+def test_a_standing_of_another_version_is_none() -> None:
     """It is not guessed at."""
     assert load(dump(standing())) == standing()
     assert load(dump(standing()).replace(b"batch-result/v1", b"batch-result/v2")) is None

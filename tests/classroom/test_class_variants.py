@@ -1,15 +1,22 @@
 """A class of which everybody has a variant: whose it is, the roster says, and nobody is graded by another's."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in
 
+from grader.app.request import Request
 from grader.app.variants import by_key
 from grader.classroom import worker
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
 from grader.classroom.store import State
+from grader.classroom.summary import Graded
 from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
 from grader.rubrics.builtin import builtin_rubrics
@@ -21,7 +28,7 @@ ROSTER = (
 
 
 @pytest.fixture
-def class_(tmp_path):
+def class_(tmp_path: Path) -> Callable[..., Any]:
     """Return what grades a class by a rubric with a variant; the scheduler beside it remembers the tasks."""
     hand_in(tmp_path / "in", ada=10, bob=4, eve=5)
     (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
@@ -30,7 +37,7 @@ def class_(tmp_path):
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {between: [5 Hz, 500 Hz], step: 1 Hz}\nscenarios:", 1)
     (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
 
-    def run(*, key="course.key", roster="roster.csv"):
+    def run(*, key: str = "course.key", roster: str = "roster.csv") -> tuple[Graded, FakeScheduler] | None:
         scheduler = FakeScheduler()
         grading = replace(GRADING, rubrics=(tmp_path / "r.yaml",), variant_key=tmp_path / key if key else None)
         wanted = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / roster if roster else None)
@@ -39,7 +46,7 @@ def class_(tmp_path):
     return run
 
 
-def test_everybody_is_graded_by_their_own_values(class_, tmp_path):
+def test_everybody_is_graded_by_their_own_values(class_: Callable[..., Any], tmp_path: Path) -> None:
     """By the number, else the user name; the values are those of the task sheet, and in the key of the result."""
     _, scheduler = class_()
     found = {name: task.conditions for name, task in scheduler.tasks.items()}
@@ -50,7 +57,7 @@ def test_everybody_is_graded_by_their_own_values(class_, tmp_path):
     assert found["ada"].rubrics != found["bob"].rubrics
 
 
-def test_whose_variant_is_not_clear_is_not_graded(class_):
+def test_whose_variant_is_not_clear_is_not_graded(class_: Callable[..., Any]) -> None:
     """That is no mark; the row says what to mend."""
     graded, _ = class_()
     eve = next(row for row in graded.book.rows if row.name == "eve")
@@ -58,7 +65,7 @@ def test_whose_variant_is_not_clear_is_not_graded(class_):
     assert "nobody on the roster goes with it for sure" in eve.problem
 
 
-def test_results_stay_until_the_values_change(class_, tmp_path):
+def test_results_stay_until_the_values_change(class_: Callable[..., Any], tmp_path: Path) -> None:
     """The same command grades nothing again; another course key means other values."""
     class_()
     assert class_()[0].graded == 0
@@ -66,7 +73,7 @@ def test_results_stay_until_the_values_change(class_, tmp_path):
     assert class_()[0].graded == 2
 
 
-def test_without_key_or_roster_nothing_is_graded(class_):
+def test_without_key_or_roster_nothing_is_graded(class_: Callable[..., Any]) -> None:
     """The message says which of the two is missing."""
     with pytest.raises(VariantError, match="--variant-key: expected the course key"):
         class_(key="")
@@ -74,11 +81,13 @@ def test_without_key_or_roster_nothing_is_graded(class_):
         class_(roster="")
 
 
-def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path, monkeypatch):
+def test_the_process_that_grades_gets_the_values_and_not_the_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """So that it can be anywhere; the line that repeats the run names student and key."""
     heard = []
 
-    def refuse(request, progress, hear):
+    def refuse(request: Request, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
         heard.append(request)
         raise HarnessError("enough")
 

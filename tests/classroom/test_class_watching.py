@@ -1,5 +1,7 @@
 """What is shown while a class is graded: count, rate, time left, what is running; never control characters."""
 
+from __future__ import annotations
+
 import io
 import re
 
@@ -12,18 +14,18 @@ from grader.classroom.watching import LiveWatcher, Watcher, clock_time, outcome_
 
 
 class Clock:
-    def __init__(self):
+    def __init__(self) -> None:
         self.now = 0.0
 
-    def __call__(self):
+    def __call__(self) -> float:
         return self.now
 
 
-def standing(state=State.GRADED, problem=""):
+def standing(state: State = State.GRADED, problem: str = "") -> Standing:
     return Standing(state, "", "", "x", problem, score=87.5, max_score=100.0, duration_s=2.06)
 
 
-def test_each_one_is_a_line_with_rate_and_time_left():
+def test_each_one_is_a_line_with_rate_and_time_left() -> None:
     """The rate is that of this run, what was done before does not count."""
     clock, lines = Clock(), []
     watcher = Watcher(lines.append, clock)
@@ -40,7 +42,7 @@ def test_each_one_is_a_line_with_rate_and_time_left():
     ]
 
 
-def test_many_that_run_are_counted():
+def test_many_that_run_are_counted() -> None:
     """A line stays a line on a machine with many processors."""
     watcher = Watcher([].append, Clock())
     watcher.begin(9, 0)
@@ -64,11 +66,11 @@ def test_a_terminal_shows_a_bar_under_the_lines():
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0, "0:00"), (59.6, "1:00"), (3599, "59:59"), (3661, "1:01:01")])
-def test_time_is_written_as_a_clock_does(seconds, text):
+def test_time_is_written_as_a_clock_does(seconds: float, text: str) -> None:
     """Hours only where there are any."""
     assert clock_time(seconds) == text
 
 
-def test_undecided_is_no_score():
+def test_undecided_is_no_score() -> None:
     """The points so far, and that they are not final."""
     assert outcome_words(standing(State.UNDECIDED)) == "87.5/100, undecided"

@@ -1,14 +1,20 @@
 """What grading one submission comes to in its process: whose fault it is decides, and nothing of ours is a mark."""
 
+from __future__ import annotations
+
 import dataclasses
+from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+from grader.app.request import Request
 from grader.classroom import worker
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import State
+from grader.classroom.store import Standing, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
@@ -17,10 +23,10 @@ from grader.core.trace import ClockKind
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 
 
-def attempt(tmp_path, monkeypatch, error):
+def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> Standing:
     """Return what an attempt comes to in which grading ends with an error."""
 
-    def grade(request, progress, hear):
+    def grade(request: Request, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
         raise error
 
     monkeypatch.setattr(worker, "grade", grade)
@@ -41,7 +47,9 @@ def attempt(tmp_path, monkeypatch, error):
         (MemoryError(), State.FAILED, "the grader failed: MemoryError: "),
     ],
 )
-def test_an_error_is_told_by_who_must_act(tmp_path, monkeypatch, error, state, problem):
+def test_an_error_is_told_by_who_must_act(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any, state: State, problem: str
+) -> None:
     """Only what is wrong with the submission itself refuses it and has a key; all else is tried again."""
     standing = attempt(tmp_path, monkeypatch, error)
     assert (standing.state, standing.problem) == (state, problem)
@@ -49,7 +57,7 @@ def test_an_error_is_told_by_who_must_act(tmp_path, monkeypatch, error, state, p
     assert standing.usage["peak_bytes"] > 1 << 20
 
 
-def test_the_same_reason_to_refuse_has_the_same_key(tmp_path, monkeypatch):
+def test_the_same_reason_to_refuse_has_the_same_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A submission that cannot be used is looked at again only when something changed."""
     one = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
     same = attempt(tmp_path, monkeypatch, SubmissionError("x: found none"))
@@ -57,7 +65,9 @@ def test_the_same_reason_to_refuse_has_the_same_key(tmp_path, monkeypatch):
     assert one.key == same.key != other.key
 
 
-def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path, monkeypatch):
+def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Where only exercises count of which there is a file, the others do not make it look changed."""
     rubrics = (("a", "sha256:1"), ("e", "sha256:2"))
     every = Conditions("0", rubrics, "sha256:9", None, "auto", "auto", every=True)
@@ -76,7 +86,7 @@ def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(tmp_path, mon
     assert worker.attempt(task, lambda step: None).key != every.key(digest)
 
 
-def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path, monkeypatch):
+def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The instructor's files show everything; the student's keep back what the rubric withholds."""
     secret = Verdict("b", "B", Outcome.NOT_MET, Fraction(0), Fraction(2), "hushhush")
     exercise = ExerciseReport(

@@ -1,6 +1,9 @@
 """Before a cluster is used: what is missing is said at once, with what to do."""
 
+from __future__ import annotations
+
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -10,7 +13,7 @@ from grader.cli.main import app
 from grader.core.errors import EnvironmentFault
 
 
-def test_without_the_library_nothing_begins(tmp_path, monkeypatch):
+def test_without_the_library_nothing_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 2 and what to install, before the class is looked at."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     done = CliRunner().invoke(
@@ -25,7 +28,7 @@ def test_without_the_library_nothing_begins(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:9"])
-def test_a_scheduler_that_does_not_answer_is_waited_for_a_while(address):
+def test_a_scheduler_that_does_not_answer_is_waited_for_a_while(address: str) -> None:
     """Then it is named."""
     with (
         pytest.raises(EnvironmentFault, match=f"--scheduler {address}: expected a Dask scheduler, found none") as error,
@@ -35,13 +38,13 @@ def test_a_scheduler_that_does_not_answer_is_waited_for_a_while(address):
     assert "dask scheduler" in error.value.hint
 
 
-def test_an_address_of_no_known_kind_is_refused():
+def test_an_address_of_no_known_kind_is_refused() -> None:
     """With the kinds that there are."""
     with pytest.raises(EnvironmentFault, match="unknown address scheme"), connected("foo://x:1", None, print):
         pass
 
 
-def test_encryption_needs_certificates():
+def test_encryption_needs_certificates() -> None:
     """They are asked for before anybody is called."""
     with (
         pytest.raises(EnvironmentFault, match="expected certificates in Dask's configuration, found none"),
@@ -50,7 +53,7 @@ def test_encryption_needs_certificates():
         pass
 
 
-def test_a_scheduler_file_holds_the_address(tmp_path):
+def test_a_scheduler_file_holds_the_address(tmp_path: Path) -> None:
     """As `dask scheduler --scheduler-file` writes it."""
     path = tmp_path / "scheduler.json"
     path.write_text(json.dumps({"address": "tcp://10.0.0.1:8786", "workers": {}}), encoding="utf-8")
@@ -59,7 +62,7 @@ def test_a_scheduler_file_holds_the_address(tmp_path):
 
 
 @pytest.mark.parametrize("content", [None, "", "[]", "{}", "[" * 100_000])
-def test_another_file_is_refused(tmp_path, content):
+def test_another_file_is_refused(tmp_path: Path, content: str | None) -> None:
     """One that is not there, too: nobody waits for it to appear."""
     path = tmp_path / "scheduler.json"
     if content is not None:

@@ -1,8 +1,13 @@
 """What becomes of submissions on a cluster: each has one result, whatever happens to workers on the way."""
 
+from __future__ import annotations
+
 from collections import Counter
+from collections.abc import Callable, Sequence
 from contextlib import closing
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from dask_samples import ONE, TWO, FakeClient, graded, task
@@ -10,12 +15,12 @@ from distributed import KilledWorker
 
 from grader.classroom.cluster.dispatcher import ClusterScheduler
 from grader.classroom.messages import Answer
-from grader.classroom.store import State
+from grader.classroom.store import Standing, State
 from grader.core.errors import HarnessError
 
 
 @pytest.fixture(autouse=True)
-def _without_rubrics(monkeypatch):
+def _without_rubrics(monkeypatch: pytest.MonkeyPatch) -> None:
     """What files exercises ask for is no matter here."""
     monkeypatch.setattr("grader.classroom.cluster.dispatcher.files_wanted", lambda task: ("velocity_publisher.py",))
 
@@ -23,7 +28,13 @@ def _without_rubrics(monkeypatch):
 NAMES = ("ada", "bob", "cleo", "dan")
 
 
-def run(tmp_path, client, jobs=None, names=NAMES, hear=lambda name, step: None):
+def run(
+    tmp_path: Path,
+    client: FakeClient,
+    jobs: int | None = None,
+    names: tuple[str, ...] = NAMES,
+    hear: Callable[..., Any] = lambda name, step: None,
+) -> dict[str, Standing]:
     """Grade on a cluster, and return name -> standing; each name comes once."""
     here = ClusterScheduler(client, jobs, lambda line: None)
     here.prepare("auto")
@@ -32,7 +43,7 @@ def run(tmp_path, client, jobs=None, names=NAMES, hear=lambda name, step: None):
     return {a.task.name: a.standing for a in attempts}
 
 
-def test_everybody_has_a_result_once(tmp_path):
+def test_everybody_has_a_result_once(tmp_path: Path) -> None:
     """And each key that the cluster knows a submission by is used once."""
     client = FakeClient()
     found = run(tmp_path, client)
@@ -42,7 +53,7 @@ def test_everybody_has_a_result_once(tmp_path):
 
 
 @pytest.mark.parametrize(("jobs", "most"), [(None, 3), (1, 1), (7, 4)])
-def test_no_more_are_under_way_than_asked(tmp_path, jobs, most):
+def test_no_more_are_under_way_than_asked(tmp_path: Path, jobs: int | None, most: int) -> None:
     """By default as many as the workers have threads."""
     client = FakeClient(answers=lambda name, only: "pending", threads={ONE: 2, TWO: 1})
     here = ClusterScheduler(client, jobs, lambda line: None)
@@ -50,7 +61,7 @@ def test_no_more_are_under_way_than_asked(tmp_path, jobs, most):
         client.subscribe_topic = lambda topic, handler: None
         nthreads, looks = client.nthreads, []
 
-        def look():
+        def look() -> dict[str, int] | None:
             looks.append(1)
             if len(looks) > 1:
                 raise OSError("enough")
@@ -63,7 +74,7 @@ def test_no_more_are_under_way_than_asked(tmp_path, jobs, most):
     assert len(client.cancelled) == most  # what is under way is given up
 
 
-def test_whoever_ends_workers_fails_alone(tmp_path):
+def test_whoever_ends_workers_fails_alone(tmp_path: Path) -> None:
     """The others have their results; a failure is no mark."""
     killed = KilledWorker("grade-1", SimpleNamespace(address=TWO), 3)
     found = run(tmp_path, FakeClient(answers=lambda name, only: killed if name == "bob" else graded(name)))
@@ -71,12 +82,12 @@ def test_whoever_ends_workers_fails_alone(tmp_path):
     assert Counter(s.state for s in found.values()) == {State.GRADED: 3, State.FAILED: 1}
 
 
-def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path):
+def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path: Path) -> None:
     """What it was sent goes to another one, and so does all that follows."""
     wrong = Answer(f"worker {TWO} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
     allowed = []
 
-    def answers(name, only):
+    def answers(name: str, only: Sequence[str] | None) -> Answer:
         allowed.append((name, only))
         return wrong if name == "bob" and only is None else graded(name)
 
@@ -85,7 +96,7 @@ def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path):
     assert allowed == [("ada", None), ("bob", None), ("bob", [ONE]), ("cleo", [ONE]), ("dan", [ONE])]
 
 
-def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path):
+def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path: Path) -> None:
     """As a failure of the machine, never as a mark."""
     wrong = Answer(f"worker {ONE} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
     found = run(tmp_path, FakeClient(answers=lambda name, only: wrong, threads={ONE: 1}))
@@ -95,11 +106,11 @@ def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("trouble", ["cancelled", "lost", ImportError("no module")])
-def test_what_the_cluster_loses_is_sent_again(tmp_path, trouble):
+def test_what_the_cluster_loses_is_sent_again(tmp_path: Path, trouble: ImportError | str) -> None:
     """A few times; then it is a failure, and the others go on."""
     count = Counter()
 
-    def answers(name, only):
+    def answers(name: str, only: None) -> Answer | ImportError | str:
         count[name] += 1
         return trouble if name == "ada" or (name, count[name]) == ("bob", 1) else graded(name)
 
@@ -108,11 +119,11 @@ def test_what_the_cluster_loses_is_sent_again(tmp_path, trouble):
     assert {n for n, s in found.items() if s.state is State.FAILED} == {"ada"}
 
 
-def test_submissions_of_workers_that_are_gone_go_elsewhere(tmp_path):
+def test_submissions_of_workers_that_are_gone_go_elsewhere(tmp_path: Path) -> None:
     """Also where they were bound to them, because others could not grade."""
     client = FakeClient(versions={TWO: "0.2.0"}, threads={ONE: 1, TWO: 1})
 
-    def answers(name, only):
+    def answers(name: str, only: Sequence[str]) -> Answer | str:
         if only == [ONE] and name == "bob":
             client.threads = {TWO: 1, "tcp://10.0.0.3:1": 1}
             return "pending"
@@ -125,11 +136,11 @@ def test_submissions_of_workers_that_are_gone_go_elsewhere(tmp_path):
     assert len(client.cancelled) == 1
 
 
-def test_a_scheduler_that_is_lost_ends_the_run(tmp_path):
+def test_a_scheduler_that_is_lost_ends_the_run(tmp_path: Path) -> None:
     """What was graded before is handed over."""
     client = FakeClient()
 
-    def answers(name, only):
+    def answers(name: str, only: None) -> Answer:
         if name == "cleo":
             client.status = "connecting"
         return graded(name)
@@ -144,7 +155,7 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path):
     assert client.cancelled == []
 
 
-def test_large_parcels_are_laid_down_first(tmp_path):
+def test_large_parcels_are_laid_down_first(tmp_path: Path) -> None:
     """And do not travel with what is to be done."""
     client = FakeClient()
     scattered = []
@@ -158,10 +169,10 @@ def test_large_parcels_are_laid_down_first(tmp_path):
 
 
 @pytest.mark.parametrize("trouble", [OSError("closed"), TimeoutError()])
-def test_where_nothing_can_be_laid_down_it_travels(tmp_path, trouble):
+def test_where_nothing_can_be_laid_down_it_travels(tmp_path: Path, trouble: OSError | TimeoutError) -> None:
     """The worker that was to hold it may end at that very moment."""
 
-    def scatter(data, **options):
+    def scatter(data: bytes, **options: bool) -> None:
         raise trouble
 
     client = FakeClient()
@@ -172,11 +183,11 @@ def test_where_nothing_can_be_laid_down_it_travels(tmp_path, trouble):
     assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
 
 
-def test_steps_are_heard_while_a_submission_is_under_way(tmp_path):
+def test_steps_are_heard_while_a_submission_is_under_way(tmp_path: Path) -> None:
     """And neither late nor from strangers."""
     client, heard = FakeClient(), []
 
-    def answers(name, only):
+    def answers(name: str, only: None) -> Answer:
         for said in ({"name": name, "step": "alone"}, {"name": "nobody", "step": "x"}, "nonsense"):
             client.handler((0.0, said))
         return graded(name)
@@ -187,7 +198,7 @@ def test_steps_are_heard_while_a_submission_is_under_way(tmp_path):
     assert client.handler is None
 
 
-def test_what_cannot_be_used_is_not_sent(tmp_path):
+def test_what_cannot_be_used_is_not_sent(tmp_path: Path) -> None:
     """It is refused here, and its reason does not depend on where others are graded."""
     client = FakeClient()
     tasks = [task(tmp_path, name) for name in ("ada", "bob")]

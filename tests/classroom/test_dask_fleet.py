@@ -1,6 +1,9 @@
 """Which workers of a cluster are used: those with the same grader and a sandbox, and each other one is named."""
 
+from __future__ import annotations
+
 from importlib.metadata import PackageNotFoundError
+from typing import Any
 
 import pytest
 from dask_samples import ONE, TWO, FakeClient
@@ -12,7 +15,7 @@ from grader.core.errors import EnvironmentFault, HarnessError
 WALLS = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 
 
-def fleet(client):
+def fleet(client: FakeClient) -> tuple[Fleet, list[Any]]:
     """Return the workers, and what is said of those that join later."""
     said = []
     return Fleet(client, "0.1.0", said.append), said
@@ -21,7 +24,7 @@ def fleet(client):
 @pytest.mark.parametrize(
     ("found", "words"), [("0.2.0", "0.2.0"), (PackageNotFoundError("rclpy-grader"), "none")], ids=["other", "none"]
 )
-def test_another_version_is_refused_by_name(found, words):
+def test_another_version_is_refused_by_name(found: PackageNotFoundError | str, words: str) -> None:
     """The worker is named with both versions, and submissions go to the others."""
     workers, _ = fleet(FakeClient(versions={TWO: found}))
     warnings = workers.inspect("auto")
@@ -29,7 +32,7 @@ def test_another_version_is_refused_by_name(found, words):
     assert (dict(workers.look()), workers.only(workers.look())) == ({ONE: 1}, (ONE,))
 
 
-def test_a_worker_without_a_sandbox_is_named_with_its_remedy():
+def test_a_worker_without_a_sandbox_is_named_with_its_remedy() -> None:
     """It is not used; where there is no other, nothing begins."""
     workers, _ = fleet(FakeClient(fitness={TWO: WALLS}))
     assert workers.inspect("auto") == (f"{WALLS.machine}: {WALLS.unfit}; it is not used",)
@@ -39,21 +42,21 @@ def test_a_worker_without_a_sandbox_is_named_with_its_remedy():
     assert (TWO in error.value.message, error.value.hint) == (True, "apt-get install bubblewrap")
 
 
-def test_all_workers_are_used_where_all_can_grade():
+def test_all_workers_are_used_where_all_can_grade() -> None:
     """Then nothing says where a submission must go, so that whoever joins takes part."""
     workers, _ = fleet(FakeClient())
     assert workers.inspect("auto") == ()
     assert workers.only(workers.look()) == ()
 
 
-def test_what_a_sandbox_leaves_open_is_told():
+def test_what_a_sandbox_leaves_open_is_told() -> None:
     """Once for each worker."""
     remark = Fitness(f"worker {ONE} on lab", remarks=("sandbox landlock: NOT contained: net_egress",))
     workers, _ = fleet(FakeClient(fitness={ONE: remark}))
     assert workers.inspect("auto") == (f"worker {ONE} on lab: sandbox landlock: NOT contained: net_egress",)
 
 
-def test_whoever_joins_later_is_asked_too():
+def test_whoever_joins_later_is_asked_too() -> None:
     """One that cannot grade is named and not used."""
     client = FakeClient(threads={ONE: 1}, fitness={TWO: WALLS})
     workers, said = fleet(client)
@@ -64,14 +67,14 @@ def test_whoever_joins_later_is_asked_too():
     assert said == [f"{WALLS.machine}: {WALLS.unfit}; it is not used"]
 
 
-def test_a_cluster_may_be_empty_at_first():
+def test_a_cluster_may_be_empty_at_first() -> None:
     """Grading begins when a worker joins."""
     workers, _ = fleet(FakeClient(threads={}))
     assert workers.inspect("auto") == ("cluster: there is no worker yet, grading begins when one joins",)
 
 
 @pytest.mark.parametrize("found", ["0.0.9", PackageNotFoundError("rclpy-grader")])
-def test_the_scheduler_needs_the_grader_as_well(found):
+def test_the_scheduler_needs_the_grader_as_well(found: PackageNotFoundError | str) -> None:
     """It reads what it hands on; without the package nothing would arrive."""
     workers, _ = fleet(FakeClient(scheduler=found))
     with pytest.raises(EnvironmentFault, match=r"scheduler of the cluster: expected rclpy-grader 0\.1\.0") as error:
@@ -79,14 +82,14 @@ def test_the_scheduler_needs_the_grader_as_well(found):
     assert error.value.hint == "install it there: pip install 'rclpy-grader[dask]==0.1.0'"
 
 
-def test_a_worker_that_leaves_while_it_is_asked_is_no_problem():
+def test_a_worker_that_leaves_while_it_is_asked_is_no_problem() -> None:
     """Nothing is known of it, and it is asked again should it come back."""
     workers, _ = fleet(FakeClient(versions={TWO: OSError("gone")}, fitness={ONE: OSError("gone")}))
     assert workers.inspect("auto") == ()
     assert set(workers.look()) == {ONE, TWO}
 
 
-def test_a_scheduler_that_is_gone_is_told():
+def test_a_scheduler_that_is_gone_is_told() -> None:
     """With what to do."""
     client = FakeClient()
     client.status = "connecting"

@@ -1,5 +1,7 @@
 """What travels to a cluster and back: bytes without code or places, and nothing that a result would not hold."""
 
+from __future__ import annotations
+
 import os
 import pickle
 from pathlib import Path
@@ -9,21 +11,21 @@ from dask_samples import CONDITIONS, graded, task
 
 from grader.classroom.cluster.jobs import lay_out
 from grader.classroom.cluster.sending import errand_of, failed, taken_in, terms_of
-from grader.classroom.local import Attempt
+from grader.classroom.local import Attempt, Task
 from grader.classroom.messages import Answer, Errand, Terms, pack, read_collected, unpack, write_answer
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.submissions.submission import stage_collected, stage_submission
 
 
-def sent(one, wanted=("velocity_publisher.py",)):
+def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Terms, Errand]:
     """Return terms and submission as they come out at the other end."""
     errand = errand_of(one, wanted)
     assert isinstance(errand, Errand), errand
     return unpack(pack(terms_of(one)), Terms), unpack(pack(errand), Errand)
 
 
-def test_a_submission_is_the_same_on_the_other_machine(tmp_path):
+def test_a_submission_is_the_same_on_the_other_machine(tmp_path: Path) -> None:
     """Digest, files, notes and name: also of files whose names are no text, and with what was left out."""
     one = task(tmp_path)
     (one.submission / "link.py").symlink_to("/etc/passwd")
@@ -40,7 +42,7 @@ def test_a_submission_is_the_same_on_the_other_machine(tmp_path):
     assert not (tmp_path / "there" / "link.py").exists()
 
 
-def test_no_place_of_this_machine_travels(tmp_path, monkeypatch):
+def test_no_place_of_this_machine_travels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Absolute paths become relative ones, of the submission, of rubrics and of a recording."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rubric.yaml").write_text("id: velocity_publisher\n", encoding="utf-8")
@@ -53,7 +55,7 @@ def test_no_place_of_this_machine_travels(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("place", ["rubrics/mine.yaml", "../mine.yaml", "../../a/mine.yaml"])
-def test_files_lie_where_reports_say_they_do(tmp_path, monkeypatch, place):
+def test_files_lie_where_reports_say_they_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     """Relative paths, also those that lead up, lead to the same files inside the folder of the grading."""
     start = tmp_path / "x" / "y"
     start.mkdir(parents=True)
@@ -73,14 +75,14 @@ def test_files_lie_where_reports_say_they_do(tmp_path, monkeypatch, place):
 @pytest.mark.parametrize(
     ("rubric", "bag", "part"), [(b"/etc/x", b"", b""), (b"a", b"/etc", b"x"), (b"a", b"bag", b"../../x")]
 )
-def test_nothing_is_laid_out_elsewhere(tmp_path, rubric, bag, part):
+def test_nothing_is_laid_out_elsewhere(tmp_path: Path, rubric: bytes, bag: bytes, part: bytes) -> None:
     """A path that leads out is refused before it is written."""
     terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bag, ((part, b"x"),), standalone=False, deadline_s=1.0)
     with pytest.raises(HarnessError, match="expected paths that stay inside"):
         lay_out(terms, Errand("a", b"a", b"a", b""), tmp_path)
 
 
-def test_a_recording_travels_with_its_files(tmp_path, monkeypatch):
+def test_a_recording_travels_with_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One file or a folder of them; one that is gone is told."""
     monkeypatch.chdir(tmp_path)
     Path("bag").mkdir()
@@ -94,7 +96,7 @@ def test_a_recording_travels_with_its_files(tmp_path, monkeypatch):
         terms_of(task(tmp_path, rubrics=(Path("no.yaml"),)))
 
 
-def test_what_cannot_be_used_is_refused_here(tmp_path):
+def test_what_cannot_be_used_is_refused_here(tmp_path: Path) -> None:
     """With the key that it has when it is graded on this machine: it is looked at once, wherever that is."""
     one = task(tmp_path)
     (one.submission / "velocity_publisher.py").unlink()
@@ -105,7 +107,7 @@ def test_what_cannot_be_used_is_refused_here(tmp_path):
     assert attempt.standing.key == CONDITIONS.key(attempt.standing.digest)
 
 
-def test_a_result_is_written_down(tmp_path):
+def test_a_result_is_written_down(tmp_path: Path) -> None:
     """With its files, and under the name that the source has for the submission."""
     attempt = taken_in(task(tmp_path, label="Ada L."), graded())
     assert (attempt.standing.state, attempt.standing.score, attempt.standing.label) == (State.GRADED, 3.0, "Ada L.")
@@ -115,7 +117,7 @@ def test_a_result_is_written_down(tmp_path):
 @pytest.mark.parametrize(
     "name", [b"../x", b"/x", b"evidence/../../x", b"result.json", b"x.py", b"evidence/\x1b[2J", b""]
 )
-def test_a_machine_writes_nothing_but_a_result(tmp_path, name):
+def test_a_machine_writes_nothing_but_a_result(tmp_path: Path, name: bytes) -> None:
     """Other files, and names that lead elsewhere, make the answer a failure; nothing of it is written."""
     answer = Answer("worker", graded().standing, ((b"report.json", b"{}"), (name, b"x")))
     attempt = taken_in(task(tmp_path), answer)
@@ -124,7 +126,7 @@ def test_a_machine_writes_nothing_but_a_result(tmp_path, name):
     assert not attempt.task.into.exists()
 
 
-def test_another_rubric_is_no_result(tmp_path):
+def test_another_rubric_is_no_result(tmp_path: Path) -> None:
     """What was graded under other conditions than asked is a failure of ours."""
     attempt = taken_in(task(tmp_path), graded(key="sha256:other"))
     assert attempt.standing.state is State.FAILED
@@ -132,28 +134,28 @@ def test_another_rubric_is_no_result(tmp_path):
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(Answer("w", b"[]"))])
-def test_nonsense_is_no_result(tmp_path, data):
+def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
     from grader.classroom.cluster.sending import answer_in
 
     assert taken_in(task(tmp_path), answer_in(data, "cluster")).standing.state is State.FAILED
 
 
-def test_a_full_disk_is_a_failure(tmp_path):
+def test_a_full_disk_is_a_failure(tmp_path: Path) -> None:
     """The result is tried again when there is room."""
     one = task(tmp_path, into=tmp_path / "no" / "such" / "folder")
     assert taken_in(one, graded()).standing.problem == "the result cannot be written: No such file or directory"
     assert failed(one, "x").standing.hint == "run the same command again"
 
 
-def test_too_many_files_are_no_result(tmp_path):
+def test_too_many_files_are_no_result(tmp_path: Path) -> None:
     """An answer is bounded in its files."""
     files = [(f"evidence/{n}".encode(), b"") for n in range(1_001)]
     with pytest.raises(HarnessError, match="expected the files of a result"):
         write_answer(files, tmp_path / "into", frozenset({"evidence"}))
 
 
-def test_read_submissions_stay_inside():
+def test_read_submissions_stay_inside() -> None:
     """Names that a machine made up are refused where they are read."""
     import msgspec
 

@@ -1,6 +1,9 @@
 """`grade batch --similarity`: what it adds to the results of a class, and what it leaves as it was."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import copies
@@ -8,13 +11,14 @@ import pytest
 from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
 
+from grader.classroom.summary import Graded
 from grader.cli.main import app
 
 CORRECT = Path(__file__).resolve().parent.parent / "submissions" / "correct"
 
 
 @pytest.fixture
-def source(tmp_path):
+def source(tmp_path: Path) -> Path:
     """Return a class of three; one took from another and changed all names."""
     text = (CORRECT / "odom_csv" / "odom_subscriber.py").read_text(encoding="utf-8")
     other = (CORRECT / "odom_json" / "odom_subscriber.py").read_text(encoding="utf-8")
@@ -24,14 +28,14 @@ def source(tmp_path):
     return folder
 
 
-def compared(source, **changes):
+def compared(source: Path, **changes: Path) -> tuple[Graded, list[str]]:
     """Grade the class and compare it; return the class, and the names of those who were graded."""
     scheduler = FakeScheduler()
     graded = grade(course(source, source.parent / "out", **{"given": (), **changes}), scheduler)
     return graded, scheduler.graded
 
 
-def test_it_is_added_to_results_that_are_there(source):
+def test_it_is_added_to_results_that_are_there(source: Path) -> None:
     """Nobody is graded again, no score changes, and the page of the class leads to what was found."""
     before = grade(course(source, source.parent / "out"))
     graded, names = compared(source)
@@ -46,14 +50,14 @@ def test_it_is_added_to_results_that_are_there(source):
     assert out / "similarity" / "index.html" in graded.files
 
 
-def test_a_later_run_without_it_keeps_the_pages(source):
+def test_a_later_run_without_it_keeps_the_pages(source: Path) -> None:
     """They are said to be of an earlier run."""
     compared(source)
     graded = grade(course(source, source.parent / "out"))
     assert [link.note for link in graded.links] == ["of an earlier run"]
 
 
-def test_a_run_that_was_stopped_goes_on_and_compares(source):
+def test_a_run_that_was_stopped_goes_on_and_compares(source: Path) -> None:
     """All are compared in the end, also those of the first part."""
     with pytest.raises(KeyboardInterrupt):
         grade(course(source, source.parent / "out", given=()), FakeScheduler(stop_after=1))
@@ -62,7 +66,7 @@ def test_a_run_that_was_stopped_goes_on_and_compares(source):
     assert graded.remarks == ("similar submissions: 1 pair",)
 
 
-def test_pages_of_pairs_that_are_none_any_more_go(source):
+def test_pages_of_pairs_that_are_none_any_more_go(source: Path) -> None:
     """A submission was handed in anew."""
     compared(source)
     (source / "bob" / "odom_subscriber.py").write_text("x = 1\n")
@@ -71,7 +75,7 @@ def test_pages_of_pairs_that_are_none_any_more_go(source):
     assert [path.name for path in (source.parent / "out" / "similarity").iterdir()] == ["index.html"]
 
 
-def test_a_submission_that_cannot_be_used_stops_nothing(source):
+def test_a_submission_that_cannot_be_used_stops_nothing(source: Path) -> None:
     """It is named on the page."""
     (source / "dan.zip").write_bytes(b"PK\3\4 no archive")
     graded, _ = compared(source)
@@ -79,7 +83,7 @@ def test_a_submission_that_cannot_be_used_stops_nothing(source):
     assert "it cannot be read" in (source.parent / "out" / "similarity" / "index.html").read_text()
 
 
-def test_people_of_the_same_name_are_told_apart(source):
+def test_people_of_the_same_name_are_told_apart(source: Path) -> None:
     """By the names of their submissions; all others are called by their own."""
     roster = source.parent / "roster.csv"
     roster.write_text("name,folder\nAda,ada\nAda,bob\nCleo,cleo\n", encoding="utf-8")
@@ -88,7 +92,7 @@ def test_people_of_the_same_name_are_told_apart(source):
     assert "<title>Pair 1: Ada (ada) and Ada (bob)</title>" in page
 
 
-def test_without_the_library_nothing_begins(source, monkeypatch):
+def test_without_the_library_nothing_begins(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 2 and what to install, before anybody is graded."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), "--similarity"])
@@ -107,7 +111,7 @@ def test_without_the_library_nothing_begins(source, monkeypatch):
         (["--similarity", "--template", "x"], "x: expected a folder with the Python files"),
     ],
 )
-def test_a_template_that_cannot_be_used_is_told_first(source, options, said):
+def test_a_template_that_cannot_be_used_is_told_first(source: Path, options: Sequence[str], said: str) -> None:
     """Before anybody is graded."""
     done = CliRunner().invoke(app, ["batch", str(source), "-o", str(source.parent / "o"), *options])
     assert done.exit_code == 2

@@ -1,5 +1,7 @@
 """Which submissions are listed as similar: disguised copies, and not programs that were written independently."""
 
+from __future__ import annotations
+
 import os
 import subprocess
 import sys
@@ -7,51 +9,42 @@ from pathlib import Path
 
 import copies
 import pytest
+from copies import FILE, handed
 
 from grader.core.errors import ClassError
 from grader.similarity import library
-from grader.similarity.finding import COMMON_LEAST, MAX_BYTES, find_similar, programs_of, read_given, read_programs
-from grader.similarity.library import Handed
-from grader.submissions.collected import Collected
+from grader.similarity.finding import COMMON_LEAST, MAX_BYTES, find_similar, read_given, read_programs
+from grader.similarity.library import Handed, Similar
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CORRECT = ROOT / "tests" / "submissions" / "correct"
 #: Programs of people who do not know each other.
 STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_once", "odom_json", "odom_namedtuple",
              "odom_history_path", "odom_loop_with_deadline", "odom_watchdog", "odom_yaml_lines")  # fmt: skip
-FILE = "odom_subscriber.py"
 
 
-def handed(name, *texts, **more):
-    """Return a submission of these texts, or byte strings."""
-    contents = [text if isinstance(text, bytes) else text.encode() for text in texts]
-    files = [(FILE if k == 0 else f"file_{k}.py", content) for k, content in enumerate(contents)]
-    programs, passed_over = programs_of(Collected(tuple(files)))
-    return Handed(name, name, programs, passed_over, **more)
-
-
-def strangers():
+def strangers() -> list[Handed]:
     """Return a class in which everybody worked alone."""
     return [Handed(name, name, *read_programs(CORRECT / name)) for name in STRANGERS]
 
 
-def text_of(name):
+def text_of(name: str) -> str:
     """Return the program of a stranger."""
     return (CORRECT / name / FILE).read_text(encoding="utf-8")
 
 
-def pairs(similar):
+def pairs(similar: Similar) -> list[tuple[str, str]]:
     """Return the names in each pair."""
     return [(pair.left.name, pair.right.name) for pair in similar.pairs]
 
 
-def test_programs_written_independently_are_not_listed():
+def test_programs_written_independently_are_not_listed() -> None:
     """They solve the same exercise, with the same calls."""
     assert pairs(find_similar(strangers(), ())) == []
 
 
 @pytest.mark.parametrize("disguise", copies.DISGUISES)
-def test_disguised_copies_are_listed(disguise):
+def test_disguised_copies_are_listed(disguise: str) -> None:
     """Other names, texts, comments and another order hide none of them, and nobody else is drawn in."""
     copied = STRANGERS[::4]
     made = [handed(f"z {name}", copies.DISGUISES[disguise](text_of(name), 7)) for name in copied]
@@ -60,7 +53,7 @@ def test_disguised_copies_are_listed(disguise):
     assert found.same == ()
 
 
-def test_the_order_of_the_class_changes_nothing():
+def test_the_order_of_the_class_changes_nothing() -> None:
     """The same pairs are found with the same shares."""
     group = [*strangers(), handed("z", copies.renamed(text_of("odom_csv"), 1))]
     there, back = find_similar(group, ()), find_similar(group[::-1], ())
@@ -68,7 +61,8 @@ def test_the_order_of_the_class_changes_nothing():
     assert there.pairs[0].share == back.pairs[0].share
 
 
-def test_the_process_changes_nothing():
+@pytest.mark.slow
+def test_the_process_changes_nothing() -> None:
     """The library's digests differ from process to process; what is found does not."""
     program = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
@@ -88,7 +82,7 @@ def test_the_process_changes_nothing():
     assert said[0].count("similar,") == 1
 
 
-def test_code_that_was_handed_out_does_not_count():
+def test_code_that_was_handed_out_does_not_count() -> None:
     """Two students who filled in the same template are not alike; without the template they would be."""
     template = text_of("odom_yaml_lines")
     ada = handed("ada", template.replace("main()", "print(1)\n    main()"))
@@ -108,7 +102,7 @@ OBVIOUS = {
 }
 
 
-def test_who_fills_the_gaps_of_a_template_in_the_obvious_way_is_not_listed():
+def test_who_fills_the_gaps_of_a_template_in_the_obvious_way_is_not_listed() -> None:
     """There is hardly another way, and two of three in a small class are no crowd whose code is taken out."""
     template = (ROOT / "student_template" / "velocity_publisher.py").read_text(encoding="utf-8")
     before, after = template[: template.index("        # TODO: create a pub")], template[template.index("def main") :]
@@ -120,7 +114,7 @@ def test_who_fills_the_gaps_of_a_template_in_the_obvious_way_is_not_listed():
     assert pairs(find_similar(group, read_given([ROOT / "student_template"]))) == []
 
 
-def test_what_many_write_does_not_count():
+def test_what_many_write_does_not_count() -> None:
     """In a small class, what more than a few have is what everybody writes; byte for byte the same is told anyway."""
     few = [handed(f"friend {k}", text_of("odom_csv")) for k in range(COMMON_LEAST)]
     assert len(find_similar([*strangers(), *few[1:]], ()).pairs) == COMMON_LEAST * (COMMON_LEAST - 1) / 2
@@ -129,7 +123,7 @@ def test_what_many_write_does_not_count():
     assert [(same.file, len(same.holders), same.whole) for same in found.same] == [(FILE, COMMON_LEAST + 1, True)]
 
 
-def test_a_file_handed_in_as_it_was_handed_out_is_told_and_not_compared():
+def test_a_file_handed_in_as_it_was_handed_out_is_told_and_not_compared() -> None:
     """It is nobody's own, so it is neither the same file of two people nor a pair."""
     given = handed("", text_of("odom_json")).programs
     group = [handed(name, text_of("odom_json"), text_of("odom_csv")) for name in ("ada", "bob")]
@@ -139,7 +133,7 @@ def test_a_file_handed_in_as_it_was_handed_out_is_told_and_not_compared():
     assert [one.left.program.name for one in found.pairs[0].likenesses] == ["file_1.py"]
 
 
-def test_two_submissions_of_one_person_are_not_compared():
+def test_two_submissions_of_one_person_are_not_compared() -> None:
     """To hand in twice is nothing to look at."""
     text = text_of("odom_csv")
     twice = [handed("ada", text, own=("ada-2",)), handed("ada-2", text, own=("ada",))]
@@ -148,7 +142,7 @@ def test_two_submissions_of_one_person_are_not_compared():
     assert pairs(find_similar([*twice, handed("bob", text)], ())) == [("ada", "bob"), ("ada-2", "bob")]
 
 
-def test_code_is_found_in_a_file_of_another_name():
+def test_code_is_found_in_a_file_of_another_name() -> None:
     """Where a student put it makes no difference."""
     found = find_similar([handed("ada", text_of("odom_csv")), handed("bob", "", text_of("odom_csv"))], ())
     assert [(one.left.program.name, one.right.program.name) for one in found.pairs[0].likenesses] == [
@@ -156,7 +150,7 @@ def test_code_is_found_in_a_file_of_another_name():
     ]
 
 
-def test_each_file_is_shown_beside_the_one_it_is_most_like():
+def test_each_file_is_shown_beside_the_one_it_is_most_like() -> None:
     """Two files of one student that are alike make no four pairs of files."""
     one = text_of("odom_csv")
     both = (one, copies.reordered(one, 1) + "\nprint([number % 7 for number in range(12) if number > 3])\n" * 3)
@@ -176,7 +170,7 @@ BODY = """
 
 
 @pytest.mark.parametrize("ends", ["\n", "\r\n"])
-def test_the_lines_that_are_alike_are_marked(ends):
+def test_the_lines_that_are_alike_are_marked(ends: str) -> None:
     """Also behind empty lines, a long class name, and with the line ends of Windows."""
     one = f"class A:\n    pass\n{BODY}"
     other = f"\n\n\nimport os\n\n\nclass {'Long' * 20}(dict, metaclass=type):\n    x = 1\n{BODY}\nprint([os.sep])\n"
@@ -204,8 +198,9 @@ HOSTILE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", HOSTILE)
-def test_whatever_is_handed_in_the_others_are_compared(what):
+def test_whatever_is_handed_in_the_others_are_compared(what: str) -> None:
     """What two hand in makes no difference to others."""
     odd = [handed("odd", HOSTILE[what]), handed("odder", HOSTILE[what] + b"\n")]
     copy = handed("z", copies.renamed(text_of("odom_csv"), 1))
@@ -216,13 +211,13 @@ def test_whatever_is_handed_in_the_others_are_compared(what):
     ("content", "why"),
     [(b"\0\1\2" * 100, "not text"), (b"x = 1\n" * 20_000, f"more than {MAX_BYTES >> 10} KiB")],
 )
-def test_what_cannot_be_compared_is_named(content, why):
+def test_what_cannot_be_compared_is_named(content: bytes, why: str) -> None:
     """Nobody is passed over in silence."""
     (one,) = find_similar([handed("odd", content)], ()).handed
     assert one.passed_over == (f"{FILE}: {why}",)
 
 
-def test_a_file_that_takes_too_long_is_named(monkeypatch):
+def test_a_file_that_takes_too_long_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """A program is read in milliseconds; what takes far longer is given up."""
     monkeypatch.setattr(library, "FILE_LIMIT_S", 0.002)
     slow = "".join(f"a{k} = b{k}({k})\n" for k in range(3_000))
@@ -230,14 +225,14 @@ def test_a_file_that_takes_too_long_is_named(monkeypatch):
     assert [one.passed_over for one in found.handed] == [(f"{FILE}: reading its tokens takes too long",), ()]
 
 
-def test_a_submission_that_cannot_be_read_is_named(tmp_path):
+def test_a_submission_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     """So are folders without any Python."""
     assert read_programs(tmp_path / "gone") == ((), ("it cannot be read",))
     (tmp_path / "notes.txt").write_text("x")
     assert read_programs(tmp_path)[0] == ()
 
 
-def test_given_code_has_to_be_there(tmp_path):
+def test_given_code_has_to_be_there(tmp_path: Path) -> None:
     """A folder named by mistake would take out nothing."""
     with pytest.raises(ClassError, match="expected a folder with the Python files"):
         read_given([tmp_path])

@@ -1,11 +1,15 @@
 """The pages and the table of similar submissions: what they show, and that hostile text stays text."""
 
+from __future__ import annotations
+
 import csv
 import io
+from collections.abc import Callable, Sequence
 from html.parser import HTMLParser
+from typing import Any
 
 import pytest
-from test_similarity_finding import handed
+from copies import handed
 
 from grader.similarity import pages
 from grader.similarity.library import Handed, Likeness, Pair, Program, Same, Side, Similar
@@ -17,21 +21,23 @@ EVIL = "<script>document.title='owned'</script>\u202e\x1b[31m=cmd|'/C calc'!A0\"
 class Elements(HTMLParser):
     """Collects the elements of a page, their attributes, and its text."""
 
-    def __init__(self, page):
+    def __init__(self, page: str) -> None:
         super().__init__()
         self.tags, self.attributes, self.text = set(), [], ""
         self.feed(page)
         self.close()
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: Sequence[tuple[str, str]]) -> None:
         self.tags.add(tag)
         self.attributes += attrs
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         self.text += data
 
 
-def similar(name="ada", file="velocity_publisher.py", text="a = 1\nb = 2\n", count=1):
+def similar(
+    name: str = "ada", file: str = "velocity_publisher.py", text: str = "a = 1\nb = 2\n", count: int = 1
+) -> Similar:
     """Return what was found in a class: so many pairs of the same two submissions."""
     sides = [Handed(n, n, (Program(file, text, n),), (f"{n}: not text",), reported=True) for n in (name, "bob")]
     likeness = Likeness(Side(sides[0].programs[0], 0.999, (1,)), Side(sides[1].programs[0], 0.5, (2,)), 90)
@@ -42,7 +48,7 @@ def similar(name="ada", file="velocity_publisher.py", text="a = 1\nb = 2\n", cou
 
 
 @pytest.mark.parametrize("render", [render_overview, lambda found: render_pair(found, 0)])
-def test_hostile_text_stays_text(render):
+def test_hostile_text_stays_text(render: Callable[..., Any]) -> None:
     """Names, file names and programs: no element, attribute or link comes of them, no sign turns the text around."""
     page = render(similar(EVIL, EVIL, f"{EVIL}\n" * 3))
     read = Elements(page)
@@ -54,14 +60,14 @@ def test_hostile_text_stays_text(render):
     assert "\x1b" not in page
 
 
-def test_a_page_runs_nothing_and_asks_for_nothing():
+def test_a_page_runs_nothing_and_asks_for_nothing() -> None:
     """Its policy forbids scripts and whatever lies elsewhere."""
     for page in (render_overview(similar()), render_pair(similar(), 0)):
         assert "default-src 'none'; style-src 'unsafe-inline'" in page
         assert not {"script", "link", "img"} & Elements(page).tags
 
 
-def test_the_words_are_neutral():
+def test_the_words_are_neutral() -> None:
     """Nobody is accused, and it is said that no score depends on it."""
     for page in (render_overview(similar()), render_pair(similar(), 0)):
         text = Elements(page).text.casefold()
@@ -69,7 +75,7 @@ def test_the_words_are_neutral():
         assert not [word for word in ("cheat", "plagiar", "suspicious", "guilt", "copied") if word in text]
 
 
-def test_the_marked_lines_are_those_that_are_alike():
+def test_the_marked_lines_are_those_that_are_alike() -> None:
     """Each side has its own."""
     page = render_pair(similar(), 0)
     assert page.count("<mark>") == 2
@@ -78,7 +84,7 @@ def test_the_marked_lines_are_those_that_are_alike():
     assert "99 %" in page  # what is not all is not shown as all
 
 
-def test_a_long_file_is_shown_around_what_is_alike():
+def test_a_long_file_is_shown_around_what_is_alike() -> None:
     """The rest is counted."""
     text = "".join(f"x{k} = {k}\n" for k in range(1, 1001))
     lines = lines_of(Side(Program("a.py", text, ""), 1.0, (500,)))
@@ -88,7 +94,7 @@ def test_a_long_file_is_shown_around_what_is_alike():
     assert lines[-1] == Line(0, "497 lines not shown")
 
 
-def test_no_file_makes_a_huge_page():
+def test_no_file_makes_a_huge_page() -> None:
     """However much of it is alike."""
     text = "x\n" * 30_000
     lines = lines_of(Side(Program("a.py", text, ""), 1.0, tuple(range(1, 30_001))))
@@ -96,7 +102,7 @@ def test_no_file_makes_a_huge_page():
     assert len(lines_of(Side(Program("a.py", "y" * 60_000, ""), 1.0, (1,)))[0].text) < 500
 
 
-def test_pairs_without_a_page_are_in_the_table(monkeypatch):
+def test_pairs_without_a_page_are_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
     """The overview says how many there are, and leads nowhere else."""
     monkeypatch.setattr(pages, "MOST_PAGES", 2)
     found = similar(count=3)
@@ -108,13 +114,13 @@ def test_pairs_without_a_page_are_in_the_table(monkeypatch):
     assert [row["kind"] for row in rows] == ["similar", "similar", "similar", "identical"]
 
 
-def test_no_cell_of_the_table_is_a_formula():
+def test_no_cell_of_the_table_is_a_formula() -> None:
     """Whatever a student or a file is called."""
     rows = list(csv.reader(io.StringIO(render_table(similar("=1+1", "@SUM(A1).py")))))
     assert not [cell for row in rows for cell in row if cell[:1] in "=+-@" and cell]
 
 
-def test_only_submissions_with_a_report_lead_to_one():
+def test_only_submissions_with_a_report_lead_to_one() -> None:
     """A name leads nowhere but below the folder of the students."""
     assert report_of(handed("ada", "")) == ""
     assert report_of(Handed("ada b", "Ada", (), reported=True)) == "../students/ada%20b/report.html"

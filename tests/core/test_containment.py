@@ -1,5 +1,7 @@
 """How the properties of a sandbox are put into words."""
 
+from __future__ import annotations
+
 import pytest
 
 from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, described, missing, summarised
@@ -8,14 +10,14 @@ ALL = tuple(Property(name, holds=True, mechanism=f"wall {n}") for n, name in enu
 OPEN = (*ALL[:4], Property("net_egress", holds=False, mechanism="no interface but lo", found="eth0"), *ALL[5:])
 
 
-def test_a_tier_is_described_with_every_property_and_its_mechanism():
+def test_a_tier_is_described_with_every_property_and_its_mechanism() -> None:
     """In one line, in the order of the table."""
     text = described("bubblewrap", ALL)
     assert text.startswith("bubblewrap (A1): fs_read by wall 0; fs_write by wall 1; ")
     assert [part.split()[0] for part in text.partition(": ")[2].split("; ")] == list(PROPERTIES)
 
 
-def test_what_is_not_contained_is_said_with_what_was_found():
+def test_what_is_not_contained_is_said_with_what_was_found() -> None:
     """Loudly, in the long form as in the short one."""
     assert "; net_egress NOT CONTAINED (eth0); " in described("landlock", OPEN)
     assert summarised("landlock", OPEN) == "landlock, NOT contained: net_egress"
@@ -23,19 +25,19 @@ def test_what_is_not_contained_is_said_with_what_was_found():
 
 
 @pytest.mark.parametrize("properties", [(), ALL])
-def test_no_walls_are_exactly_none(properties):
+def test_no_walls_are_exactly_none(properties: tuple[Property, ...]) -> None:
     """Programs compare the word; people get more of them."""
     assert described(NO_WALLS, properties) == "none"
     assert "no walls" in summarised(NO_WALLS, properties)
 
 
 @pytest.mark.parametrize("name", PROPERTIES)
-def test_only_what_is_required_is_missed(name):
+def test_only_what_is_required_is_missed(name: str) -> None:
     """In the order of the table."""
     properties = tuple(Property(prop, holds=prop != name, mechanism="a wall") for prop in PROPERTIES)
     assert [found.name for found in missing(properties)] == ([name] if name in REQUIRED else [])
 
 
-def test_every_tier_has_a_letter_of_its_own():
+def test_every_tier_has_a_letter_of_its_own() -> None:
     """Reports and documents use both."""
     assert sorted(TIERS.values()) == ["A1", "A2", "B", "C", "D"]

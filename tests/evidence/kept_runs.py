@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,7 @@ TRACES = st.builds(
 )
 
 
+@cache
 def velocity_exercise() -> Exercise:
     return read_rubric(RUBRICS / "exercise_1.yaml")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -31,7 +32,7 @@ def run(*words: str) -> int:
 
 @pytest.mark.ros
 @pytest.mark.parametrize("path", [ROOT / "reference_solutions", CRASHES], ids=["right", "crashes"])
-def test_every_format_is_the_same_byte_for_byte(tmp_path, path):
+def test_every_format_is_the_same_byte_for_byte(tmp_path: Path, path: Any) -> None:
     """Grading keeps evidence; judging it again writes the same files with the same exit code."""
     graded, again, evidence = tmp_path / "graded", tmp_path / "again", tmp_path / "evidence"
     code = run(str(path), "-o", f"evidence={evidence}", "--exercise", "odom_subscriber", *outputs(graded))
@@ -44,7 +45,7 @@ def test_every_format_is_the_same_byte_for_byte(tmp_path, path):
 
 
 @pytest.mark.ros
-def test_output_names_no_place_of_the_machine(tmp_path):
+def test_output_names_no_place_of_the_machine(tmp_path: Path) -> None:
     """A traceback that a program prints or logs is the same wherever it ran, also without a sandbox."""
     program = (ROOT / "reference_solutions/velocity_publisher.py").read_text(encoding="utf-8")
     assert "publish(" in program
@@ -61,7 +62,7 @@ def test_output_names_no_place_of_the_machine(tmp_path):
 
 
 @pytest.mark.ros
-def test_other_tools_read_what_both_nodes_said(tmp_path):
+def test_other_tools_read_what_both_nodes_said(tmp_path: Path) -> None:
     """Numbers in both directions with their virtual times, log records, output and the graph, all decodable."""
     done = run(
         str(ROOT / "reference_solutions"), "--exercise", "two_node_communication", "-o", f"evidence={tmp_path / 'e'}"

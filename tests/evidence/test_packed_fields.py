@@ -51,7 +51,7 @@ def exactly(data: bytes) -> Any:
         return "refused"
 
 
-def test_long_fields_are_left_as_they_are_and_short_ones_are_not():
+def test_long_fields_are_left_as_they_are_and_short_ones_are_not() -> None:
     """What is worth it stays JSON until somebody looks."""
     long, short = unpack(pack(trace(TWIST, {"data": 1.5}), [False, False])).of(Message)
     assert isinstance(long.value, Fields)
@@ -63,7 +63,7 @@ def test_long_fields_are_left_as_they_are_and_short_ones_are_not():
 
 
 @given(st.dictionaries(st.text(max_size=8), ANY, max_size=6))
-def test_quick_and_exact_way_read_the_same(value: dict[str, Any]):
+def test_quick_and_exact_way_read_the_same(value: dict[str, Any]) -> None:
     """Whatever a message holds, both ways of reading find it, or both refuse it."""
     data = pack(trace({"fields": "f" * 70, **value}), [False])
     assert repr(looked_at(data)) == repr(exactly(data))
@@ -89,12 +89,12 @@ def test_quick_and_exact_way_read_the_same(value: dict[str, Any]):
         '{"x": 1e999}',
     ],
 )
-def test_odd_fields_are_taken_or_refused_as_by_the_exact_way(text: str):
+def test_odd_fields_are_taken_or_refused_as_by_the_exact_way(text: str) -> None:
     """Leaving fields undecoded lets nothing pass that is refused otherwise, and refuses nothing that is taken."""
     assert repr(looked_at(packed(text))) == repr(exactly(packed(text)))
 
 
-def test_odd_numbers_are_numbers_in_long_fields_too():
+def test_odd_numbers_are_numbers_in_long_fields_too() -> None:
     """Not a number and infinity come back wherever they stand."""
     value = {**TWIST, "linear": {"x": math.nan, "y": math.inf, "z": 0.0}}
     (message,) = unpack(pack(trace(value), [False])).of(Message)
@@ -102,7 +102,7 @@ def test_odd_numbers_are_numbers_in_long_fields_too():
     assert message.value["linear"]["y"] == math.inf
 
 
-def test_fields_are_equal_by_what_they_hold():
+def test_fields_are_equal_by_what_they_hold() -> None:
     """The order of the names and the white space make no difference, what is in them does."""
     one, other = Fields(raw('{"a":1,"b":2}')), Fields(raw('{ "b": 2, "a": 1 }'))
     assert one == other == {"a": 1, "b": 2}

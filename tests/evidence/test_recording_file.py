@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
@@ -32,7 +33,7 @@ def as_text(trace: Trace) -> str:
     return json.dumps(trace_to_json(trace))
 
 
-def bag(tmp_path, trace: Trace):
+def bag(tmp_path: Path, trace: Trace) -> Path:
     folder = tmp_path / "a"
     folder.mkdir()
     recording, metadata = recording_bytes(trace, FACTS, "a_0.mcap")
@@ -41,21 +42,21 @@ def bag(tmp_path, trace: Trace):
     return folder
 
 
-def test_every_kind_of_observation_is_tried():
+def test_every_kind_of_observation_is_tried() -> None:
     """A new kind has to be added here, and to what recordings hold."""
     assert set(OBSERVATIONS) == set(get_args(Observation))
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_a_trace_comes_back_as_it_was(trace: Trace):
+def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
     """Bytes of messages included, whatever a student's text or message holds."""
     assert as_text(trace_of(kept(trace), wire=True)) == as_text(trace)
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_judging_is_given_all_but_the_bytes(trace: Trace):
+def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
     """The quick way gives what the exact way gives."""
     quick = json.loads(as_text(trace_of(kept(trace))))
     exact = json.loads(as_text(trace))
@@ -67,20 +68,20 @@ def test_judging_is_given_all_but_the_bytes(trace: Trace):
 
 @settings(deadline=None)
 @given(TRACES)
-def test_other_tools_open_every_recording(trace: Trace):
+def test_other_tools_open_every_recording(trace: Trace) -> None:
     """Every message is there, in order, and can be decoded by its embedded type, whatever it is made of."""
     reader = make_reader(io.BytesIO(kept(trace)), decoder_factories=[DecoderFactory()])
     decoded = list(reader.iter_decoded_messages(log_time_order=False))
     assert len(decoded) == len(trace.observations) + 1
 
 
-def test_the_same_trace_gives_the_same_bytes():
+def test_the_same_trace_gives_the_same_bytes() -> None:
     """Recordings can be compared by their digests."""
     assert recording_bytes(velocity_trace(), FACTS, "a_0.mcap") == recording_bytes(velocity_trace(), FACTS, "a_0.mcap")
 
 
 @pytest.mark.parametrize("inside", ["", "a_0.mcap"])
-def test_rosbags_reads_folder_and_file(tmp_path, inside):
+def test_rosbags_reads_folder_and_file(tmp_path: Path, inside: str) -> None:
     """All messages with their types, their virtual times and their values, without any other type store."""
     source = bag(tmp_path, velocity_trace()) / inside
     with AnyReader([source]) as reader:
@@ -92,7 +93,7 @@ def test_rosbags_reads_folder_and_file(tmp_path, inside):
     assert logs == ["started"]
 
 
-def test_the_metadata_says_what_the_file_holds(tmp_path):
+def test_the_metadata_says_what_the_file_holds(tmp_path: Path) -> None:
     """As a tool that only reads metadata.yaml shows it."""
     folder = bag(tmp_path, velocity_trace())
     with Reader(folder) as whole, Reader(folder / "a_0.mcap") as bare:
@@ -110,7 +111,7 @@ def texts(trace: Trace, topic: str) -> list[Any]:
     return [json.loads(d.decoded_message.data) for d in reader.iter_decoded_messages(topics=[topic])]
 
 
-def test_what_is_no_message_is_told_as_json():
+def test_what_is_no_message_is_told_as_json() -> None:
     """Faults, limits, output and the graph are seen in any viewer."""
     fault = Fault(5, "a.py", FaultKind.EXCEPTION, "ValueError: no", "a.py", 3, ("a.py:3 in main",))
     trace = Trace("s", ClockKind.WALL, 10, (fault, Mark(6, "limit", "too much")), notes=("n",))
@@ -137,7 +138,7 @@ def test_what_is_no_message_is_told_as_json():
     ],
     ids=["malformed", "unknown type", "not kept", "log topic", "forged fault", "line break"],
 )
-def test_what_other_tools_cannot_read_is_told_apart(message):
+def test_what_other_tools_cannot_read_is_told_apart(message: Message) -> None:
     """Malformed bytes, unknown types and forged topics stay out of the topics of the grader."""
     trace = Trace("s", ClockKind.VIRTUAL, 10, (message,))
     told = texts(trace, "/grader/undecoded")
@@ -146,7 +147,7 @@ def test_what_other_tools_cannot_read_is_told_apart(message):
     assert as_text(trace_of(kept(trace), wire=True)) == as_text(trace)
 
 
-def test_a_number_that_the_grader_published_can_be_read():
+def test_a_number_that_the_grader_published_can_be_read() -> None:
     """It is kept as fields; the recording shows it as a message."""
     trace = Trace("s", ClockKind.VIRTUAL, 10, (Delivery(1, "/temperature", "std_msgs/msg/Int32", {"data": 26}),))
     reader = make_reader(io.BytesIO(kept(trace)), decoder_factories=[DecoderFactory()])
@@ -154,7 +155,7 @@ def test_a_number_that_the_grader_published_can_be_read():
     assert (found.decoded_message.data, found.channel.metadata["publisher"]) == (26, "grader")
 
 
-def test_log_records_keep_what_ros_knows_of_them():
+def test_log_records_keep_what_ros_knows_of_them() -> None:
     """Severity, logger, text, file, line and time."""
     record = LogRecord(1_500_000_000, "a.py", "WARN", "node", "text\0 \ud800", "pkg/a.py", 12)
     reader = make_reader(
@@ -178,7 +179,7 @@ WHOLE = kept(Trace("s", ClockKind.VIRTUAL, 10, tuple(twist_message(i) for i in r
 
 @settings(deadline=None)
 @given(st.integers(0, len(WHOLE) - 1), st.binary(max_size=4), st.booleans())
-def test_damage_is_refused_or_harmless(at: int, other: bytes, cut: bool):
+def test_damage_is_refused_or_harmless(at: int, other: bytes, cut: bool) -> None:
     """Whatever stands in a file, the answer is EvidenceError or a trace, never a crash."""
     damaged = WHOLE[:at] if cut else WHOLE[:at] + other + WHOLE[at + len(other) :]
     for wire in (False, True):

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 from kept_runs import RUBRICS, kept_run, velocity_exercise, velocity_run, velocity_trace
 
 from grader.app import rejudge
@@ -18,7 +18,7 @@ from grader.reporting.json_report import dumps
 from grader.rubrics.loader import read_rubric
 
 
-def grade(*words: str | Path):
+def grade(*words: str | Path | int) -> Result:
     return CliRunner().invoke(main.app, ["rejudge", *map(str, words)])
 
 
@@ -42,7 +42,7 @@ def kept_class(folder: Path) -> Path:
 
 @pytest.mark.parametrize("rate_hz", [20, 10])
 @pytest.mark.parametrize("pictures", [False, True])
-def test_the_same_rubric_gives_the_same_report(tmp_path, rate_hz, pictures):
+def test_the_same_rubric_gives_the_same_report(tmp_path: Path, rate_hz: int, pictures: bool) -> None:
     """Every value of it; only the command comes from the command line and not from the recording."""
     run = velocity_run(velocity_trace(rate_hz=rate_hz), source="import rclpy\nperiod = 0.1\n")
     first = judge_run([velocity_exercise()], run, pictures=pictures)
@@ -53,7 +53,7 @@ def test_the_same_rubric_gives_the_same_report(tmp_path, rate_hz, pictures):
     assert dataclasses.replace(again, reproduce=first.reproduce) == first
 
 
-def test_the_report_is_printed_and_written_as_by_grading(tmp_path):
+def test_the_report_is_printed_and_written_as_by_grading(tmp_path: Path) -> None:
     """Text by default, JSON alone where asked for, files beside it, and the exit codes of grading."""
     run = velocity_run(velocity_trace(rate_hz=10))
     kept_run(tmp_path / "e", run)
@@ -65,7 +65,7 @@ def test_the_report_is_printed_and_written_as_by_grading(tmp_path):
     assert "20 of 30 points" in (tmp_path / "r.txt").read_text(encoding="utf-8")
 
 
-def test_a_changed_rubric_gives_other_scores(tmp_path):
+def test_a_changed_rubric_gives_other_scores(tmp_path: Path) -> None:
     """Points, tolerances and checks; the report names the new rubric's digest and the command that gives it."""
     kept_run(tmp_path / "e", velocity_run(velocity_trace(rate_hz=18)))
     path = changed_rubric(tmp_path, ("tolerance: 1 Hz, partly", "tolerance: 2 Hz, partly"), ("points: 5", "points: 7"))
@@ -75,7 +75,7 @@ def test_a_changed_rubric_gives_other_scores(tmp_path):
     assert f"--rubric {path}" in report["reproduce"]["command"]
 
 
-def test_a_class_is_judged_and_the_rest_goes_on(tmp_path):
+def test_a_class_is_judged_and_the_rest_goes_on(tmp_path: Path) -> None:
     """What is damaged is refused by name, and the exit code says so."""
     kept_class(tmp_path)
     right = grade(tmp_path)
@@ -88,7 +88,7 @@ def test_a_class_is_judged_and_the_rest_goes_on(tmp_path):
     assert damaged.output.splitlines()[3] == "judged: 2, refused: 1"
 
 
-def test_changes_are_told_with_dropped_marks_first(tmp_path):
+def test_changes_are_told_with_dropped_marks_first(tmp_path: Path) -> None:
     """By the share of the points, with the old and the new standing of each criterion that changed."""
     kept_class(tmp_path)
     assert grade("--diff", tmp_path).output == "unchanged: 3 of 3\n"
@@ -103,7 +103,7 @@ def test_changes_are_told_with_dropped_marks_first(tmp_path):
     assert lines[-1] == "unchanged: 1 of 3"
 
 
-def test_changes_can_be_read_by_programs(tmp_path):
+def test_changes_can_be_read_by_programs(tmp_path: Path) -> None:
     """The same order, every number, and who was refused or could not be compared."""
     kept_class(tmp_path)
     (tmp_path / "cyd/evidence/report.json").unlink()
@@ -120,7 +120,7 @@ def test_changes_can_be_read_by_programs(tmp_path):
     assert [row["name"] for row in found["refused"]] == ["dan"]
 
 
-def test_added_and_removed_criteria_are_changes(tmp_path):
+def test_added_and_removed_criteria_are_changes(tmp_path: Path) -> None:
     """A criterion that is asked no more took its points along."""
     kept_run(tmp_path / "e", velocity_run(velocity_trace()))
     text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8")
@@ -132,7 +132,7 @@ def test_added_and_removed_criteria_are_changes(tmp_path):
     assert "velocity_publisher/logs: was not asked, is met 4/4" in other
 
 
-def test_reports_of_a_class_are_files_in_a_folder(tmp_path):
+def test_reports_of_a_class_are_files_in_a_folder(tmp_path: Path) -> None:
     """One a submission and format, and the whole class as JSON on standard output."""
     kept_class(tmp_path / "class")
     out = tmp_path / "out"
@@ -144,7 +144,8 @@ def test_reports_of_a_class_are_files_in_a_folder(tmp_path):
     ]
 
 
-def test_many_processes_give_what_one_gives(tmp_path):
+@pytest.mark.slow
+def test_many_processes_give_what_one_gives(tmp_path: Path) -> None:
     """In the same order; enough submissions for a pool."""
     for number in range(rejudge.WORTH_A_POOL * 2):
         kept_run(tmp_path / f"{number:03}", velocity_run(velocity_trace(rate_hz=10) if number % 3 else None))
@@ -155,7 +156,7 @@ def test_many_processes_give_what_one_gives(tmp_path):
     assert [r.name for r in several] == [f"{number:03}" for number in range(rejudge.WORTH_A_POOL * 2)]
 
 
-def test_equal_names_are_told_apart(tmp_path):
+def test_equal_names_are_told_apart(tmp_path: Path) -> None:
     """Two classes may each have an ada."""
     for name in ("one", "two"):
         kept_run(tmp_path / name / "ada", velocity_run(velocity_trace()))
@@ -174,7 +175,7 @@ def test_equal_names_are_told_apart(tmp_path):
     ],
     ids=["none", "exercise", "rubric", "unknown", "output"],
 )
-def test_what_cannot_be_judged_is_told(tmp_path, words, said):
+def test_what_cannot_be_judged_is_told(tmp_path: Path, words: tuple[Path | str, ...], said: str) -> None:
     """Exit code 2 and one line."""
     (tmp_path / "none").mkdir()
     kept_run(tmp_path / "e", velocity_run(velocity_trace()))
@@ -183,7 +184,7 @@ def test_what_cannot_be_judged_is_told(tmp_path, words, said):
     assert said in done.output
 
 
-def test_hostile_names_stay_text(tmp_path):
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
     """A folder's name comes from a student; on a terminal it does nothing."""
     kept_run(tmp_path / "a\x1b[31m\n::error::x" / "evidence", velocity_run(None))
     shown = grade(tmp_path).output
@@ -191,7 +192,7 @@ def test_hostile_names_stay_text(tmp_path):
     assert not any(line.startswith("::") for line in shown.splitlines())
 
 
-def test_verifying_says_the_same_of_sound_evidence(tmp_path):
+def test_verifying_says_the_same_of_sound_evidence(tmp_path: Path) -> None:
     """Slower, and no other result."""
     kept_class(tmp_path)
     assert grade("--verify", tmp_path).output == grade(tmp_path).output

@@ -5,13 +5,16 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from kept_runs import kept_run, velocity_exercise, velocity_run, velocity_trace
 
 from grader.core.errors import EvidenceError
 from grader.core.scenario import MessageStream, Scenario, Span
+from grader.core.trace import Delivery, Message, Request, Response, Trace
 from grader.execution.evidence.manifest import scenario_digest
 from grader.execution.evidence.store import check_place, first_report, found_under, open_evidence, run_of
 
@@ -23,12 +26,13 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-def without_bytes(trace):
-    plain = [dataclasses.replace(o, cdr=b"") if hasattr(o, "cdr") else o for o in trace.observations]
+def without_bytes(trace: Trace) -> Trace:
+    with_bytes = (Message, Delivery, Request, Response)
+    plain = [dataclasses.replace(o, cdr=b"") if isinstance(o, with_bytes) else o for o in trace.observations]
     return dataclasses.replace(trace, observations=tuple(plain))
 
 
-def test_all_that_judging_reads_comes_back(tmp_path):
+def test_all_that_judging_reads_comes_back(tmp_path: Path) -> None:
     """The trace, the sources, the submission but for where it lay, the environment, the seed and the notes."""
     run = velocity_run(velocity_trace())
     kept_run(tmp_path, run)
@@ -40,7 +44,7 @@ def test_all_that_judging_reads_comes_back(tmp_path):
     assert dataclasses.replace(found.submission, root=run.submission.root) == run.submission
 
 
-def test_a_scenario_that_could_not_be_recorded_stays_so(tmp_path):
+def test_a_scenario_that_could_not_be_recorded_stays_so(tmp_path: Path) -> None:
     """A missing file is no damage."""
     kept_run(tmp_path, velocity_run(None))
     found = run_of(open_evidence(tmp_path), [velocity_exercise()])
@@ -48,14 +52,14 @@ def test_a_scenario_that_could_not_be_recorded_stays_so(tmp_path):
     assert found.submission.files["velocity_publisher.py"].found is None
 
 
-def test_the_same_run_gives_the_same_files(tmp_path):
+def test_the_same_run_gives_the_same_files(tmp_path: Path) -> None:
     """Byte for byte, so that evidence can be compared."""
     for name in ("a", "b"):
         kept_run(tmp_path / name, velocity_run(velocity_trace()))
     assert {n: (tmp_path / "a" / n).read_bytes() for n in OWN} == {n: (tmp_path / "b" / n).read_bytes() for n in OWN}
 
 
-def test_what_was_kept_before_is_replaced_and_nothing_else(tmp_path):
+def test_what_was_kept_before_is_replaced_and_nothing_else(tmp_path: Path) -> None:
     """Recordings that the new run lacks are gone; files of others stay as they are."""
     kept_run(tmp_path, velocity_run(velocity_trace()))
     (tmp_path / "notes.txt").write_text("mine")
@@ -65,7 +69,7 @@ def test_what_was_kept_before_is_replaced_and_nothing_else(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["evidence.json", "report.json"])
-def test_files_of_others_are_refused_before_grading(tmp_path, name):
+def test_files_of_others_are_refused_before_grading(tmp_path: Path, name: str) -> None:
     """What is not the grader's is never replaced, whatever it is called."""
     (tmp_path / name).write_text("{}")
     with pytest.raises(EvidenceError, match=f"{name}: expected nothing or evidence kept before"):
@@ -73,7 +77,7 @@ def test_files_of_others_are_refused_before_grading(tmp_path, name):
     assert (tmp_path / name).read_text() == "{}"
 
 
-def test_a_recording_of_others_is_refused(tmp_path):
+def test_a_recording_of_others_is_refused(tmp_path: Path) -> None:
     """Also where it has the very name of a recording, or is reached through a link."""
     (tmp_path / "a" / RECORDING).parent.mkdir(parents=True)
     (tmp_path / "a" / RECORDING).write_text("mine")
@@ -88,7 +92,7 @@ def test_a_recording_of_others_is_refused(tmp_path):
     assert files(tmp_path / "elsewhere") == set()
 
 
-def test_a_forged_manifest_makes_nothing_ours(tmp_path):
+def test_a_forged_manifest_makes_nothing_ours(tmp_path: Path) -> None:
     """Names that the grader never writes are not removed, whatever a manifest claims."""
     kept_run(tmp_path / "a", velocity_run(velocity_trace()))
     manifest = json.loads((tmp_path / "a" / "evidence.json").read_text())
@@ -101,7 +105,7 @@ def test_a_forged_manifest_makes_nothing_ours(tmp_path):
     assert (tmp_path / "a" / "mine.txt").exists()
 
 
-def test_a_file_is_no_folder(tmp_path):
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
     """The mistake is told before anything runs."""
     (tmp_path / "file").write_text("")
     with pytest.raises(EvidenceError, match="expected a folder for the evidence, found a file"):
@@ -133,7 +137,7 @@ def refused(folder: Path, *, verify: bool = False) -> str:
     ],
     ids=["cut", "changed", "gone", "no manifest", "cut manifest", "deep", "version", "wrong type", "unfinished"],
 )
-def test_damage_is_refused_by_name(tmp_path, name, damage, said):
+def test_damage_is_refused_by_name(tmp_path: Path, name: str, damage: Callable[..., Any] | None, said: str) -> None:
     """The file is named, and what was expected of it."""
     kept_run(tmp_path, velocity_run(velocity_trace()))
     path = tmp_path / name
@@ -146,7 +150,7 @@ def test_damage_is_refused_by_name(tmp_path, name, damage, said):
     assert str(tmp_path) in message
 
 
-def test_a_recording_that_shows_something_else_is_found(tmp_path):
+def test_a_recording_that_shows_something_else_is_found(tmp_path: Path) -> None:
     """Who changes what other tools see, and mends the digest, is found by comparing it with what is judged."""
     kept_run(tmp_path / "a", velocity_run(velocity_trace()))
     kept_run(tmp_path / "b", velocity_run(velocity_trace(forward=0.7)))
@@ -175,17 +179,18 @@ def spliced(shown: bytes, judged: bytes) -> bytes:
     writer.start(profile="ros2", library="forger")
     ids = {}
     for schema, channel, message in make_reader(io.BytesIO(shown)).iter_messages(log_time_order=False):
+        assert schema is not None
         if channel.id not in ids:
             number = writer.register_schema(schema.name, schema.encoding, schema.data)
             ids[channel.id] = writer.register_channel(channel.topic, "cdr", number, channel.metadata)
         writer.add_message(ids[channel.id], message.log_time, message.data, message.publish_time, message.sequence)
     for attachment in make_reader(io.BytesIO(judged)).iter_attachments():
         writer.add_attachment(0, 0, attachment.name, attachment.media_type, attachment.data)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
 
-def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path):
+def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
     """Reading does not wait for a writer."""
     kept_run(tmp_path, velocity_run(velocity_trace()))
     (tmp_path / RECORDING).unlink()
@@ -193,7 +198,7 @@ def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path):
     assert "no plain one" in refused(tmp_path)
 
 
-def test_a_recording_answers_only_what_was_asked(tmp_path):
+def test_a_recording_answers_only_what_was_asked(tmp_path: Path) -> None:
     """A scenario that a rubric describes otherwise now forbids judging and says why."""
     kept_run(tmp_path, velocity_run(velocity_trace()))
     exercise = velocity_exercise()
@@ -203,17 +208,19 @@ def test_a_recording_answers_only_what_was_asked(tmp_path):
     assert "describes the scenario alone otherwise than when it was recorded" in trace.harness_problem
 
 
-def test_the_digest_of_a_scenario_is_of_what_differs_from_defaults():
+def test_the_digest_of_a_scenario_is_of_what_differs_from_defaults() -> None:
     """A new field with a default does not make all evidence worthless."""
     scenario = velocity_exercise().scenarios[0]
     assert scenario_digest(scenario) == scenario_digest(dataclasses.replace(scenario, stimuli=()))
     assert scenario_digest(scenario) != scenario_digest(dataclasses.replace(scenario, processes=("x.py",)))
 
 
-def test_the_first_report_may_be_gone(tmp_path):
+def test_the_first_report_may_be_gone(tmp_path: Path) -> None:
     """Judging does not need it."""
     kept_run(tmp_path, velocity_run(velocity_trace()))
-    assert first_report(open_evidence(tmp_path))["score"] == 30
+    first = first_report(open_evidence(tmp_path))
+    assert first is not None
+    assert first["score"] == 30
     for content in ("[]", "{", None):
         (tmp_path / "report.json").unlink()
         if content is not None:
@@ -221,7 +228,7 @@ def test_the_first_report_may_be_gone(tmp_path):
         assert first_report(open_evidence(tmp_path)) is None
 
 
-def test_evidence_is_found_at_any_depth(tmp_path):
+def test_evidence_is_found_at_any_depth(tmp_path: Path) -> None:
     """Also what lost its manifest, which is then refused by name and not passed over."""
     for name in ("b/evidence", "a", "c/d/e"):
         kept_run(tmp_path / name, velocity_run(velocity_trace()))
@@ -230,7 +237,7 @@ def test_evidence_is_found_at_any_depth(tmp_path):
     assert found_under(tmp_path) == [tmp_path / name for name in ("a", "b/evidence", "c/d/e")]
 
 
-def test_nothing_of_the_machine_is_kept(tmp_path):
+def test_nothing_of_the_machine_is_kept(tmp_path: Path) -> None:
     """The folder that the submission was staged in is no part of evidence."""
     run = velocity_run(velocity_trace())
     secret = Path("/somewhere/on/this/machine")
@@ -238,7 +245,7 @@ def test_nothing_of_the_machine_is_kept(tmp_path):
     assert [name for name in files(tmp_path) if b"somewhere" in (tmp_path / name).read_bytes()] == []
 
 
-def test_scenarios_with_messages_have_digests_too():
+def test_scenarios_with_messages_have_digests_too() -> None:
     """Fields of messages are mappings; the same ones give the same digest, others another."""
     spans = [{"data": "a"}, {"data": "a"}, {"data": "b"}]
     streams = [MessageStream("/t", "std_msgs/msg/String", (value,), period_ns=1) for value in spans]

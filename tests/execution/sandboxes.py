@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import shutil
@@ -166,21 +167,20 @@ def unreachable(start_as: tuple[str, ...], ros: RosInstallation) -> str:
     """Return why another user cannot run the interpreter of these tests; empty if it can."""
     if shutil.which("setpriv") is None or shutil.which("unshare") is None:
         return "the programs of util-linux are not installed"
-    tried = subprocess.run(
-        (
-            *start_as,
-            str(ros.runtime.executable),
-            "-I",
-            "-S",
-            "-c",
-            "import sys; open(sys.argv[1])",
-            str(HOST / "launcher.py"),
-        ),
-        env={"LD_LIBRARY_PATH": ":".join(map(str, ros.runtime.library_paths))},
-        capture_output=True,
-        check=False,
+    libraries = ":".join(map(str, ros.runtime.library_paths))
+    return (
+        ""
+        if _runs(start_as, ros.runtime.executable, libraries)
+        else f"user {USER} cannot reach {ros.runtime.executable}"
     )
-    return "" if tried.returncode == 0 else f"user {USER} cannot reach {ros.runtime.executable}"
+
+
+@functools.cache
+def _runs(start_as: tuple[str, ...], executable: Path, libraries: str) -> bool:
+    code = "import sys; open(sys.argv[1])"
+    command = (*start_as, str(executable), "-I", "-S", "-c", code, str(HOST / "launcher.py"))
+    tried = subprocess.run(command, env={"LD_LIBRARY_PATH": libraries}, capture_output=True, check=False)
+    return tried.returncode == 0
 
 
 def make_submission() -> Path:

@@ -27,7 +27,7 @@ from scripted import (
 
 from grader.core.limits import Limits
 from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
-from grader.execution import machine, trace_recorder, virtual_time_suitability
+from grader.execution import discovery, machine, trace_recorder, virtual_time_suitability
 from grader.execution import virtual_runner as module
 from grader.execution.plan import PlannedRecording
 from grader.execution.virtual_runner import Conductor
@@ -37,7 +37,7 @@ from grader.student_host import clock as host_clock
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
     """Nothing in these tests is on its way in real time."""
-    monkeypatch.setattr(machine, "SETTLE_S", 0.0)
+    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.0))
     monkeypatch.setattr(machine, "BRIEF_S", 0.0)
 
 

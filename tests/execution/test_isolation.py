@@ -23,6 +23,8 @@ from grader.core.errors import EnvironmentFault, HarnessError
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.protocol import Limits, StudentProcess
 
+pytestmark = pytest.mark.sandbox
+
 MIB = 1 << 20
 
 

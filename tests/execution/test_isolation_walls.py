@@ -21,6 +21,8 @@ from grader.execution.sandbox.landlock import Landlock
 from grader.execution.sandbox.protocol import Limits, StudentProcess
 from grader.execution.sandbox.start import OUTGROWN, SPARE
 
+pytestmark = pytest.mark.sandbox
+
 MIB = 1 << 20
 PACKAGE = Path(grader.__file__).resolve().parent
 

@@ -10,6 +10,8 @@ from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import find_ros
 from grader.execution.usage import families, scratch_names
 
+pytestmark = pytest.mark.sandbox
+
 CODE = """
 import os, time
 for number in range(700):

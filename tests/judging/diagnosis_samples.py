@@ -26,7 +26,7 @@ from tracing import (
 from grader.core.exercise import Exercise
 from grader.core.report import ExerciseReport, Verdict
 from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind, Trace
+from grader.core.trace import Delivery, FaultKind, LogRecord, Trace
 from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
@@ -183,8 +183,8 @@ def complaining(line: int = 0) -> Recording:
 
 
 def _at(rec: Recording, line: int, delay_s: float = 0.0) -> Recording:
-    logs = [o for o in rec.items if hasattr(o, "severity")]
-    rec.items = [o for o in rec.items if not hasattr(o, "severity")]
+    logs = [o for o in rec.items if isinstance(o, LogRecord)]
+    rec.items = [o for o in rec.items if not isinstance(o, LogRecord)]
     for log in logs:
         rec.log(log.t_ns / 1e9 + delay_s, log.text, line=line)
     return rec
@@ -193,16 +193,16 @@ def _at(rec: Recording, line: int, delay_s: float = 0.0) -> Recording:
 def sensing(what: str = "drawn", period: float = 0.2, topic: str = "/temperature") -> Recording:
     """A sensor alone, which never hears of a fan."""
     rng = random.Random(5)
-    values = {
+    values: dict[str, Callable[[int], float]] = {
         "drawn": lambda _: rng.uniform(20, 30),
         "wide": lambda _: rng.uniform(15, 35),
         "constant": lambda _: 26.0,
         "alternating": lambda k: 22.0 + 6 * (k % 2),
-    }[what]
+    }
     rec = Recording(period + 12, process="temperature_sensor.py")
     rec.endpoint("publisher", topic, FLOAT32, "/temperature_sensor")
     for k in range(int(12 / period)):
-        rec.number(period * (k + 1), topic, values(k))
+        rec.number(period * (k + 1), topic, values[what](k))
     return rec
 
 
@@ -239,7 +239,7 @@ def answering(rule: str = "right", topic: str = "/fan_speed", hears: str = "/tem
     rec = scripted()
     rec.endpoint("publisher", topic, FLOAT32, "/fan_controller")
     rec.endpoint("subscription", hears, FLOAT32, "/fan_controller")
-    for delivery in [o for o in rec.items if hasattr(o, "cdr") and hears == "/temperature"]:
+    for delivery in [o for o in rec.items if isinstance(o, Delivery) and hears == "/temperature"]:
         answer = _RULES[rule](delivery.value["data"])
         if answer is not None:
             rec.number(delivery.t_ns / 1e9, topic, answer)
@@ -280,7 +280,7 @@ def answering_behind(messages: int) -> Recording:
 def latching(until: float = 0.0) -> Recording:
     """A controller that switches off below a limit only."""
     rec, on = mute(), False
-    for delivery in [o for o in rec.items if hasattr(o, "cdr")]:
+    for delivery in [o for o in rec.items if isinstance(o, Delivery)]:
         value = delivery.value["data"]
         on = value > 25 or (on and value >= until)
         rec.number(delivery.t_ns / 1e9, "/fan_speed", 100.0 if on else 0.0)

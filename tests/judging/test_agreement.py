@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 
 import pytest
 
@@ -13,17 +14,29 @@ from grader.judging.agreement import Aspect, differences, sentence
 from grader.testing import TraceBuilder
 
 TWIST, FLOAT = "geometry_msgs/msg/Twist", "std_msgs/msg/Float32"
+#: Adds to a recording what a program does; the number is that of the run.
+Program = Callable[[TraceBuilder, int], TraceBuilder]
 
 
-def virtual(stop_s=10.0):
+def virtual(stop_s: float = 10.0) -> TraceBuilder:
     return TraceBuilder("a.py", stop_s=stop_s)
 
 
-def wall(stop_s=6.0):
+def wall(stop_s: float = 6.0) -> TraceBuilder:
     return TraceBuilder("a.py", stop_s=stop_s, clock=ClockKind.WALL)
 
 
-def publishing(builder, value, *, rate_hz=20.0, start_s=0.0, stop_s=None, topic="/x", seed=0, jitter_s=0.0):
+def publishing(
+    builder: TraceBuilder,
+    value: Callable[[float, random.Random], float] | float,
+    *,
+    rate_hz: float = 20.0,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+    topic: str = "/x",
+    seed: int = 0,
+    jitter_s: float = 0.0,
+) -> TraceBuilder:
     """Add messages whose number is `value`, or what it gives for the time of the message."""
     chance = random.Random(seed)
     t_s = start_s
@@ -34,11 +47,11 @@ def publishing(builder, value, *, rate_hz=20.0, start_s=0.0, stop_s=None, topic=
     return builder
 
 
-def aspects(one, other, **options):
-    return [d.aspect for d in differences(one.trace(), other.trace(), **options)]
+def aspects(one: TraceBuilder, other: TraceBuilder, first_message_on: str = "") -> list[Aspect]:
+    return [d.aspect for d in differences(one.trace(), other.trace(), first_message_on)]
 
 
-AGREE = {
+AGREE: dict[str, Program] = {
     "a constant": lambda b, s: publishing(b, 0.5),
     "random numbers": lambda b, s: publishing(b, lambda t, chance: chance.uniform(20, 30), seed=s),
     "random decisions": lambda b, s: publishing(b, lambda t, chance: float(chance.choice((0, 100))), seed=s),
@@ -55,12 +68,12 @@ AGREE = {
 
 
 @pytest.mark.parametrize("program", AGREE.values(), ids=AGREE)
-def test_a_program_that_is_the_same_agrees(program):
+def test_a_program_that_is_the_same_agrees(program: Program) -> None:
     """Chance, jitter, the time of day and what nobody had subscribed to yet are no differences."""
     assert aspects(program(virtual(), 0), program(wall(), 1)) == []
 
 
-DIFFER = {
+DIFFER: dict[str, tuple[Aspect, Program]] = {
     "another rate": (Aspect.RATE, lambda b, s: publishing(b, 0.5, rate_hz=1.0 if s else 20.0)),
     "zeros": (Aspect.VALUE, lambda b, s: publishing(b, 0.0 if s else 0.5)),
     "silence": (Aspect.SILENT, lambda b, s: b if s else publishing(b, 0.5)),
@@ -74,21 +87,21 @@ DIFFER = {
 }
 
 
-def _logging(builder):
+def _logging(builder: TraceBuilder) -> TraceBuilder:
     for second in range(1, 20):
         builder.log(second / 4, "driving")
     return builder
 
 
 @pytest.mark.parametrize(("aspect", "program"), DIFFER.values(), ids=DIFFER)
-def test_a_program_that_is_another_differs(aspect, program):
+def test_a_program_that_is_another_differs(aspect: Aspect, program: Program) -> None:
     """The first difference is of the kind that shows it, and is told in one sentence."""
     found = differences(program(virtual(), 0).trace(), program(wall(), 1).trace())
     assert aspect in [d.aspect for d in found]
     assert sentence(found[0], ClockKind.VIRTUAL).startswith("the node behaved differently on the wall clock: ")
 
 
-def _controlled(builder, answer, *, late_s):
+def _controlled(builder: TraceBuilder, answer: Callable[[float], float], *, late_s: float) -> TraceBuilder:
     """A program that answers each temperature, which is held for two seconds."""
     for step, temperature in enumerate((20.0, 30.0, 22.0, 28.0)):
         for n in range(10):
@@ -98,7 +111,7 @@ def _controlled(builder, answer, *, late_s):
     return builder
 
 
-def test_answers_to_the_same_input_are_compared():
+def test_answers_to_the_same_input_are_compared() -> None:
     """What a program makes of a value is not the same because it publishes as often."""
     right = lambda t: 100.0 if t > 25 else 0.0  # noqa: E731
     wrong = lambda t: 0.0 if t > 25 else 100.0  # noqa: E731
@@ -109,7 +122,7 @@ def test_answers_to_the_same_input_are_compared():
     assert (found[0].virtual, found[0].wall) in {(0.0, 100.0), (100.0, 0.0)}
 
 
-def test_a_value_in_another_type_is_no_other_input():
+def test_a_value_in_another_type_is_no_other_input() -> None:
     """Until a program's own type is known, the first value goes out as the rubric's: it shifts no answer."""
     right = lambda t: 100.0 if t > 25 else 0.0  # noqa: E731
     one = _controlled(virtual(9.0), right, late_s=0.0)
@@ -117,7 +130,7 @@ def test_a_value_in_another_type_is_no_other_input():
     assert aspects(one, other) == []
 
 
-def test_what_comes_by_chance_has_no_rate():
+def test_what_comes_by_chance_has_no_rate() -> None:
     """A program that publishes where a random number crosses a limit does so more or less often."""
     one, other = virtual(), wall()
     for builder, times in ((one, (0.1, 0.2, 0.9, 1.0, 1.4, 2.0, 2.1, 3.3, 4.0, 4.2, 5.0)), (other, range(6))):
@@ -128,14 +141,14 @@ def test_what_comes_by_chance_has_no_rate():
     assert aspects(one, other) == []
 
 
-def test_the_first_message_begins_the_window():
+def test_the_first_message_begins_the_window() -> None:
     """A slow start moves the window; it changes no count."""
     one = publishing(virtual(18.0), 0.5, start_s=8.0)
     other = publishing(wall(9.0), 0.5, start_s=3.0)
     assert aspects(one, other, first_message_on="/x") == []
 
 
-def test_a_sentence_has_both_numbers():
+def test_a_sentence_has_both_numbers() -> None:
     """As a reader needs them to see which clock was right."""
     one, other = publishing(virtual(), 0.5), publishing(wall(), 0.5, rate_hz=1.0)
     (found, *_) = differences(one.trace(), other.trace())

@@ -11,13 +11,21 @@ import pytest
 from check_instances import INSTANCES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_client_checks import asking, chapter, deciding
-from test_fan_check import HONEST, WRONG
-from test_fan_check import each as each_temperature
-from test_graph_check import graph
-from test_sensor_checks import drawn, hearing, sensed
-from test_server_checks import BATTERY, answering
-from test_together_check import each
+from nodes import (
+    BATTERY,
+    HONEST_FANS,
+    WRONG_FANS,
+    answering,
+    asking,
+    chapter,
+    deciding,
+    drawn,
+    each_speed,
+    graph,
+    hearing,
+    sensed,
+    together,
+)
 from tracing import FLOAT32, ODOMETRY, TWIST, Recording, position_logs, twist, velocity
 from wordings import RIGHT
 from wordings import WRONG as WRONG_POSITIONS
@@ -52,9 +60,9 @@ TRACES = {
     "swapped positions": position_logs(WRONG_POSITIONS["swapped"][0]),
     "sensor": sensed(drawn()),
     "sensor that listens": hearing(str),
-    "controller": HONEST["each temperature"],
-    "inverted controller": each_temperature(WRONG["inverted"][0]),
-    "together": each(),
+    "controller": HONEST_FANS["each temperature"],
+    "inverted controller": each_speed(WRONG_FANS["inverted"][0]),
+    "together": together(),
     "graph": graph(),
     "battery server": answering(60, clients=3),
     "battery client": asking(chapter),

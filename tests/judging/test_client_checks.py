@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from nodes import BATTERY, CLIENT, FAILED, UNREADABLE, Answer, Said, asking, battery, chapter, deciding, level_of
 from tracing import TRIGGER, Recording
 
 from grader.core.errors import HarnessError
@@ -17,82 +18,12 @@ from grader.core.trace import ClockKind, Request
 from grader.judging.checks.clients import NoGoWithoutAnswer, ReactsToResponses, ServiceCalls, WaitsForService
 from grader.judging.findings import FAULT_KEY
 
-BATTERY = "/battery/get_status"
-FILE = "battery_service_client.py"
 CALLS = ServiceCalls(BATTERY, 5, period=NS_PER_S, tolerance=300 * NS_PER_MS)
-WAITS = WaitsForService(FILE, BATTERY)
-REACTS = ReactsToResponses(FILE, BATTERY, 20.0)
-ABOVE = ReactsToResponses(FILE, BATTERY, 20.0, "above")
-BELOW = ReactsToResponses(FILE, BATTERY, 20.0, "at_or_below")
-STILL = NoGoWithoutAnswer(FILE, BATTERY, 20.0)
-
-#: What a client writes: (level, text); `print` is a printed line, `at_end LEVEL` comes once the pause is over.
-Said = Sequence[tuple[str, str]]
-Answer = tuple[bool, str] | None
-
-
-def battery(level: float) -> Answer:
-    return True, f"Battery: {level:.1f}% remaining"
-
-
-FAILED: Answer = (False, "Battery: 60.0% remaining")
-UNREADABLE: Answer = (True, "sensor fault")
-ANSWERS = (battery(84.5), battery(20.1), battery(20.0), FAILED, UNREADABLE, None, battery(15.0), battery(63.0))
-
-
-def level_of(answer: Answer) -> float | None:
-    if answer is None or not answer[0] or "%" not in answer[1]:
-        return None
-    return float(answer[1].split(":")[1].split("%")[0])
-
-
-def asking(
-    write: Callable[[Answer], Said],
-    answers: Sequence[Answer] = ANSWERS,
-    header: str = "== run {} ==",
-    pause_s: float = 1.0,
-    delay_s: float = 0.1,
-    waiting: Said = (("INFO", "nobody there yet"),),
-    appears_s: float = 3.0,
-    clock: ClockKind = ClockKind.VIRTUAL,
-) -> Recording:
-    """A client that waits until its server appears, and asks again a pause after each answer."""
-    rec = Recording(30.0, clock, FILE).service("client", BATTERY, TRIGGER, "/mission_planner")
-    rec.mark(appears_s, "server_starts", BATTERY)
-    for k in range(1, 3):
-        say(rec, float(k), waiting)
-    t = appears_s + 0.25
-    say(rec, t, [("INFO", "planner is up")])
-    for place, answer in enumerate(answers, 1):
-        say(rec, t, [("INFO", header.format(place))] if header else [])
-        rec.request(t, BATTERY, place, sender="student")
-        at = t + (delay_s if answer is not None else 2.0)
-        if answer is not None:
-            rec.response(at, BATTERY, place, {"success": answer[0], "message": answer[1]}, sender="grader")
-        texts = write(answer)
-        say(rec, at, [x for x in texts if not x[0].startswith("at_end")])
-        t = at + pause_s
-        say(rec, t, [(level[7:], text) for level, text in texts if level.startswith("at_end")])
-    return rec
-
-
-def say(rec: Recording, t_s: float, texts: Said) -> None:
-    for level, text in texts:
-        if level == "print":
-            rec.line(t_s, text)
-        else:
-            rec.log(t_s, text, level)
-
-
-def chapter(answer: Answer) -> Said:
-    said = [("INFO", f"the answer: {answer[1]}")] if answer else [("ERROR", "no answer came")]
-    level = level_of(answer)
-    if level is None:
-        return said
-    return [
-        *said,
-        ("INFO", "charge is fine, off it goes") if level > 20 else ("WARN", "charge is low, it stays"),
-    ]
+WAITS = WaitsForService(CLIENT, BATTERY)
+REACTS = ReactsToResponses(CLIENT, BATTERY, 20.0)
+ABOVE = ReactsToResponses(CLIENT, BATTERY, 20.0, "above")
+BELOW = ReactsToResponses(CLIENT, BATTERY, 20.0, "at_or_below")
+STILL = NoGoWithoutAnswer(CLIENT, BATTERY, 20.0)
 
 
 def with_numbers(answer: Answer) -> Said:
@@ -145,20 +76,6 @@ def test_right_clients_meet_everything(check: Check, rec: Recording) -> None:
     """Whatever the words, and whenever the answer comes."""
     finding = check.judge(rec.trace())
     assert finding.credit == 1, finding.reason
-
-
-def deciding(go: Callable[[float], bool], unknown: float | None = None) -> Callable[[Answer], Said]:
-    """A client by another rule, with the number that it takes for an answer that it cannot use."""
-
-    def write(answer: Answer) -> Said:
-        level = level_of(answer)
-        level = unknown if level is None else level
-        if level is None:
-            return chapter(answer)
-        said = [("INFO", f"the answer: {answer[1]}")] if answer else [("ERROR", "no answer came")]
-        return [*said, ("INFO", "charge is fine, off it goes") if go(level) else ("WARN", "low, it stays")]
-
-    return write
 
 
 def low_is_info(answer: Answer) -> Said:
@@ -260,7 +177,7 @@ def test_an_answer_that_is_not_waited_for_is_no_going_on() -> None:
 def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
     """The client ended, crashed, hangs at a lost response, or our server never sent such an answer."""
     only_good = (battery(84.5), battery(63.0))
-    ended = asking(chapter, only_good).mark(6.0, "exited", FILE)
+    ended = asking(chapter, only_good).mark(6.0, "exited", CLIENT)
     crashed = asking(chapter, only_good).crashed(6.0)
     hangs = asking(chapter, (battery(84.5), None))
     for check in (BELOW, REACTS, STILL):
@@ -277,8 +194,8 @@ def test_what_was_never_asked_is_not_judged_by_guesses() -> None:
 def test_no_client_is_explained() -> None:
     """By a crash, by another name, by nothing."""
     for check in (CALLS, REACTS, STILL):
-        assert FAULT_KEY in check.judge(Recording(9, process=FILE).crashed(0.0, process=FILE).trace()).evidence
-        other = check.judge(Recording(9, process=FILE).service("client", "/get_status", TRIGGER).trace())
+        assert FAULT_KEY in check.judge(Recording(9, process=CLIENT).crashed(0.0, process=CLIENT).trace()).evidence
+        other = check.judge(Recording(9, process=CLIENT).service("client", "/get_status", TRIGGER).trace())
         assert "asks /get_status" in other.reason
         assert check.judge(Recording(9).trace()).credit == 0
 
@@ -300,7 +217,7 @@ def five(**kw: Any) -> Recording:
         (five(pause_s=0.0, delay_s=0.0), 0, "0.000 s from number 1"),
         (five(pause_s=3.0), 0, "3.100 s from number 1"),
         (five(pause_s=1.5, clock=ClockKind.WALL), 1, ""),
-        (asking(chapter, [battery(84.5)] * 4).mark(7.0, "exited", FILE), 0, "4 requests, expected 5; battery"),
+        (asking(chapter, [battery(84.5)] * 4).mark(7.0, "exited", CLIENT), 0, "4 requests, expected 5; battery"),
         (asking(chapter, [battery(84.5)] * 6), 0, "6 requests, expected 5"),
         (asking(chapter, [battery(84.5)] * 3).crashed(8.0), 0, "3 requests, expected 5; battery_service_client.py:12"),
         (asking(chapter, [battery(84.5), None]), 0, "2 requests, expected 5; the last one got no response"),
@@ -339,7 +256,7 @@ def test_waiting_may_be_said_once_or_as_a_warning() -> None:
 
 
 def waiting_only(**kw: Any) -> Recording:
-    rec = Recording(20.0, process=FILE).service("client", BATTERY, TRIGGER, "/mission_planner")
+    rec = Recording(20.0, process=CLIENT).service("client", BATTERY, TRIGGER, "/mission_planner")
     return rec.log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
 
 
@@ -348,20 +265,20 @@ def test_giving_up_is_not_waiting() -> None:
     raised = WAITS.judge(waiting_only().crashed(1.0, "SystemExit: 1").trace())
     assert "while /battery/get_status was not there" in raised.reason
     assert FAULT_KEY in raised.evidence
-    early = Recording(1.0, process=FILE).log(0.5, "waiting").crashed(1.0)
+    early = Recording(1.0, process=CLIENT).log(0.5, "waiting").crashed(1.0)
     assert FAULT_KEY in WAITS.judge(early.trace()).evidence
-    ended = WAITS.judge(waiting_only().mark(2.0, "exited", FILE).trace())
+    ended = WAITS.judge(waiting_only().mark(2.0, "exited", CLIENT).trace())
     assert "ended at t = 2.000 s" in ended.reason
     never = WAITS.judge(waiting_only().trace())
     assert "no request came, expected one within 5.0 s" in never.reason
     late = WAITS.judge(waiting_only().request(9.0, BATTERY, 1, "student").trace())
     assert "the first request came at t = 9.000 s" in late.reason
-    deaf = Recording(20.0, process=FILE).log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
+    deaf = Recording(20.0, process=CLIENT).log(0.5, "waiting").mark(3.0, "server_starts", BATTERY)
     assert WAITS.judge(deaf.trace()).blocked_by == "service_calls"
 
 
 def test_a_recording_without_a_wait_is_ours() -> None:
     """The server was there from the start, or never came."""
-    for rec in (Recording(9, process=FILE), Recording(9, process=FILE).mark(0.0, "server_starts", BATTERY)):
+    for rec in (Recording(9, process=CLIENT), Recording(9, process=CLIENT).mark(0.0, "server_starts", BATTERY)):
         with pytest.raises(HarnessError):
             WAITS.judge(rec.trace())

@@ -112,7 +112,9 @@ def test_no_cause_is_found_in_the_words_of_a_reason(row: Row, monkeypatch: pytes
     assert list(explained(row, traces).verdicts) == known
 
 
-def test_a_rule_that_fails_is_logged_and_passed_over(monkeypatch, caplog) -> None:
+def test_a_rule_that_fails_is_logged_and_passed_over(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     """The others are looked for all the same; elsewhere in these tests the log makes the test fail."""
 
     def fails(case: Case) -> None:
@@ -208,6 +210,7 @@ def right_programs(file: str) -> dict[str, str]:
     return {p.parent.name: text for p in found if (text := source_text(p)) is not None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file", "name", "arguments"), OTHERWISE)
 def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str, Any]) -> None:
     """Even where a recording says that they did wrong, what is right in the text is not called wrong."""
@@ -215,7 +218,7 @@ def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str
     traces = {scenario: build(**arguments).trace(scenario)}
     programs = right_programs(file)
     assert len(programs) >= 10
-    blamed = {}
+    blamed: dict[str, set[Any]] = {}
     for folder, text in programs.items():
         texts = {**dict.fromkeys(exercise_of(file).files, ""), file: text}
         found = {v.evidence["diagnosis"] for v in lost(report(file, traces, texts))} & TEXTUAL

@@ -56,7 +56,7 @@ def test_a_depth_that_nobody_tells_is_not_judged() -> None:
     assert Qos("/a", "publisher", "best_effort", depth=10).judge(with_end(depth=0).trace()).credit == 0
     assert Qos("/a", "publisher", deadline=NS_PER_S).judge(with_end(deadline_ns=NS_PER_S).trace()).credit == 1
     for kind in ("publisher", "subscription"):
-        assert FAULT_KEY in Qos("/a", kind).judge(Recording().crashed(0).trace()).evidence  # type: ignore[arg-type]
+        assert FAULT_KEY in Qos("/a", kind).judge(Recording().crashed(0).trace()).evidence
 
 
 @pytest.mark.parametrize(

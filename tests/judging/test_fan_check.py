@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nodes import HONEST_FANS, WRONG_FANS, Rule, each_speed, on_change, right_speed, timed
 from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
@@ -16,42 +16,6 @@ from grader.judging.checks.fan import ThresholdResponse
 
 ON = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "above")
 OFF = ThresholdResponse("/temperature", "/fan_speed", 25, 100, 0, "at_or_below")
-Rule = Callable[[float], float]
-
-
-def right(value: float) -> float:
-    return 100.0 if value > 25 else 0.0
-
-
-def each(rule: Rule, values: tuple[float, ...] = FAN_VALUES, delay: float = 0.0) -> Recording:
-    """Answers each temperature."""
-    rec = scripted(values)
-    for k in range(10 * len(values)):
-        rec.number(0.5 + 0.2 * k + delay, "/fan_speed", rule(values[k // 10]))
-    return rec
-
-
-def on_change(rule: Rule, first: float | None = None, values: tuple[float, ...] = FAN_VALUES) -> Recording:
-    """Publishes on change only; `first` is the state that it starts in without saying so."""
-    rec = scripted(values)
-    state = first
-    for k in range(len(values)):
-        if rule(values[k]) != state:
-            state = rule(values[k])
-            rec.number(0.5 + 2 * k, "/fan_speed", state)
-    return rec
-
-
-def timed(
-    rule: Rule, period: float, phase: float = 0.0, lag: float = 0.0, values: tuple[float, ...] = FAN_VALUES
-) -> Recording:
-    """Publishes on a timer, from what it had `lag` seconds before: at one instant the timer may come first."""
-    rec = scripted(values)
-    for t in itertools.takewhile(lambda t: t < 17, (phase + k * period for k in range(400))):
-        value = held_at(t - lag, values)
-        if value is not None:
-            rec.number(t, "/fan_speed", rule(value))
-    return rec
 
 
 def both(rec: Recording) -> tuple[Finding, Finding]:
@@ -63,52 +27,18 @@ def earned(rec: Recording) -> tuple[int, int]:
     return tuple(int(f.credit) for f in both(rec))  # type: ignore[return-value]
 
 
-HONEST = {
-    "each temperature": each(right),
-    "each, 50 ms later": each(right, delay=0.05),
-    "on change": on_change(right),
-    "on change, says its state at the start": on_change(right, 0.0).number(0.0, "/fan_speed", 0.0),
-    "timer 0.1 s": timed(right, 0.1),
-    "timer 0.1 s, one behind": timed(right, 0.1, lag=0.001),
-    "timer 0.2 s, in step and behind": timed(right, 0.2, phase=0.1, lag=0.2),
-    "timer 0.5 s, in step and behind": timed(right, 0.5, lag=0.001),
-    "timer 0.5 s, nearly a period behind": timed(right, 0.5, phase=0.4, lag=0.45),
-    "timer 1 s": timed(right, 1.0),
-    "timer 1 s, in step and behind": timed(right, 1.0, phase=0.5, lag=0.001),
-    "old and new at one instant": timed(right, 0.2, 0.5, 0.001).add(*each(right).trace().messages()),
-    "a state of its own at the first instant": scripted()
-    .number(0.5, "/fan_speed", 100.0)
-    .add(*each(right).trace().messages()),
-    "says off before any temperature": each(right).number(0.1, "/fan_speed", 0.0),
-}
-
-
-@pytest.mark.parametrize("rec", HONEST.values(), ids=HONEST)
+@pytest.mark.parametrize("rec", HONEST_FANS.values(), ids=HONEST_FANS)
 def test_every_honest_way_of_answering_is_met(rec: Recording) -> None:
     """Each temperature, on change, on timers up to a second, and a timer that still has the old one at that instant."""
     for finding in both(rec):
         assert finding.credit == 1, finding.reason
 
 
-WRONG: dict[str, tuple[Rule, tuple[int, int]]] = {
-    ">= at 25": (lambda v: 100.0 if v >= 25 else 0.0, (1, 0)),
-    "> 26": (lambda v: 100.0 if v > 26 else 0.0, (0, 1)),
-    "whole numbers": (lambda v: 100.0 if int(v) > 25 else 0.0, (0, 1)),
-    "rounded up": (lambda v: 100.0 if round(v + 0.5) > 25 else 0.0, (1, 0)),
-    "inverted": (lambda v: 0.0 if v > 25 else 100.0, (0, 0)),
-    "always on": (lambda v: 100.0, (1, 0)),
-    "always off": (lambda v: 0.0, (0, 1)),
-    "1 for 100": (lambda v: 1.0 if v > 25 else 0.0, (0, 1)),
-    "hysteresis-like": (lambda v: 100.0 if v > 27 else 0.0, (0, 1)),
-    "nan": (lambda v: float("nan"), (0, 0)),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-@pytest.mark.parametrize("way", [each, on_change, lambda r: timed(r, 0.5), lambda r: timed(r, 1.0, lag=0.001)])
+@pytest.mark.parametrize("name", WRONG_FANS)
+@pytest.mark.parametrize("way", [each_speed, on_change, lambda r: timed(r, 0.5), lambda r: timed(r, 1.0, lag=0.001)])
 def test_every_wrong_rule_loses_the_side_it_gets_wrong(name: str, way: Callable[[Rule], Recording]) -> None:
     """Whatever the way of answering."""
-    rule, expected = WRONG[name]
+    rule, expected = WRONG_FANS[name]
     assert earned(way(rule)) == expected
 
 
@@ -142,7 +72,7 @@ def test_answers_that_alternate_are_wrong_on_both_sides() -> None:
 
 def test_the_first_violation_is_named_with_its_temperature() -> None:
     """>= at exactly 25 has its own hint."""
-    finding = both(each(WRONG[">= at 25"][0]))[1]
+    finding = both(each_speed(WRONG_FANS[">= at 25"][0]))[1]
     assert finding.reason == "t = 2.500 s, /fan_speed: 100 for 25 °C on /temperature, expected 0"
     assert finding.hint == "25 °C itself is not above 25 °C: compare with > and not with >="
 
@@ -158,17 +88,17 @@ def test_the_first_violation_is_named_with_its_temperature() -> None:
 )
 def test_wrong_logic_is_recognised(name: str, side: int, said: str) -> None:
     """Inverted and constant answers are said to be so."""
-    assert said in both(each(WRONG[name][0]))[side].reason
+    assert said in both(each_speed(WRONG_FANS[name][0]))[side].reason
 
 
 def test_rounding_is_recognised() -> None:
     """Only the temperature just above 25 is wrong: it is cut off."""
-    assert "without rounding" in both(each(WRONG["whole numbers"][0]))[0].hint
+    assert "without rounding" in both(each_speed(WRONG_FANS["whole numbers"][0]))[0].hint
 
 
 def test_an_unsaid_first_state_must_be_said() -> None:
     """Before any message nobody knows the state; the first temperature at or below must be answered."""
-    on, off = both(on_change(right, 0.0))
+    on, off = both(on_change(right_speed, 0.0))
     assert on.credit == 1
     assert off.credit == 0
     assert "no answer for 21.7 °C" in off.reason
@@ -176,7 +106,7 @@ def test_an_unsaid_first_state_must_be_said() -> None:
 
 def test_a_controller_that_stops_answering_loses() -> None:
     """Stuck after 5 s: what it said last is no answer to later temperatures."""
-    rec = each(right)
+    rec = each_speed(right_speed)
     rec.items = [o for o in rec.items if type(o).__name__ != "Message" or o.t_ns < 5_000_000_000]
     assert earned(rec) == (0, 0)
     assert "no answer" in both(rec)[0].reason
@@ -184,7 +114,7 @@ def test_a_controller_that_stops_answering_loses() -> None:
 
 def test_a_controller_that_died_carries_no_state() -> None:
     """An exit is the reason, also for one that publishes on change."""
-    rec = on_change(right)
+    rec = on_change(right_speed)
     rec.items = [o for o in rec.items if type(o).__name__ != "Message" or o.t_ns < 5_000_000_000]
     on, off = both(rec.crashed(5.0, "ZeroDivisionError: division by zero", 17))
     assert (on.credit, off.credit) == (0, 0)
@@ -194,8 +124,8 @@ def test_a_controller_that_died_carries_no_state() -> None:
 def test_whole_number_types_are_tried_at_their_own_steps() -> None:
     """25 and 26 as integers."""
     values = (22, 25, 26, 29, 24, 28, 25, 21)
-    assert earned(each(right, values)) == (1, 1)
-    assert earned(each(lambda v: 100.0 if v > 26 else 0.0, values)) == (0, 1)
+    assert earned(each_speed(right_speed, values)) == (1, 1)
+    assert earned(each_speed(lambda v: 100.0 if v > 26 else 0.0, values)) == (0, 1)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +158,7 @@ def test_temperatures_sent_before_it_listened_are_not_asked_for() -> None:
     for k in range(80):
         t = 0.5 + 0.2 * k
         if t >= 3.0:
-            rec.number(t, "/fan_speed", right(FAN_VALUES[k // 10]))
+            rec.number(t, "/fan_speed", right_speed(FAN_VALUES[k // 10]))
     assert earned(rec) == (1, 1)
 
 
@@ -244,14 +174,14 @@ def test_a_recording_without_the_question_cannot_be_judged() -> None:
 @given(st.floats(0.0, 0.19))
 def test_a_short_delay_changes_nothing(delay: float) -> None:
     """An answer within its own period is an answer."""
-    assert earned(each(right, delay=delay)) == (1, 1)
+    assert earned(each_speed(right_speed, delay=delay)) == (1, 1)
 
 
 @given(st.floats(0.1, 1.0), st.floats(0.0, 1.0))
 def test_any_timer_up_to_a_second_is_met(period: float, phase: float) -> None:
     """Whatever its period and phase."""
-    assert earned(timed(right, period, phase, lag=0.001)) == (1, 1)
-    assert earned(timed(lambda v: 100.0 - right(v), period, phase, lag=0.001)) == (0, 0)
+    assert earned(timed(right_speed, period, phase, lag=0.001)) == (1, 1)
+    assert earned(timed(lambda v: 100.0 - right_speed(v), period, phase, lag=0.001)) == (0, 0)
 
 
 @pytest.mark.parametrize("lag", [0.6, 1.0, 3.0, 6.2])
@@ -260,7 +190,7 @@ def test_answers_that_come_late_are_called_late(lag: float) -> None:
     rec = scripted()
     for k in range(80):
         value = held_at(0.5 + 0.2 * k - lag)
-        rec.number(0.5 + 0.2 * k, "/fan_speed", right(value if value is not None else FAN_VALUES[0]))
+        rec.number(0.5 + 0.2 * k, "/fan_speed", right_speed(value if value is not None else FAN_VALUES[0]))
     for finding in both(rec):
         assert finding.credit == 0
         assert f"right for what was published {lag} s before" in finding.reason
@@ -270,12 +200,12 @@ def test_answers_that_come_late_are_called_late(lag: float) -> None:
 @pytest.mark.parametrize("rule", [lambda v: 100.0 if v >= 25 else 0.0, lambda v: 100.0 if v > 26 else 0.0])
 def test_a_wrong_limit_is_not_called_late(rule: Rule) -> None:
     """No lag makes those answers right."""
-    assert not any("before" in finding.reason for finding in both(each(rule)))
+    assert not any("before" in finding.reason for finding in both(each_speed(rule)))
 
 
 def test_wrong_answers_away_from_the_threshold_do_not_blame_the_comparison() -> None:
     """The hint names the whole rule where 23 °C is answered wrongly; > for >= is not the matter."""
-    off = both(each(lambda v: 100.0 if v > 22 else 0.0))[1]
+    off = both(each_speed(lambda v: 100.0 if v > 22 else 0.0))[1]
     assert off.credit == 0
     assert off.hint == "publish 100 above 25 °C and 0 at or below it"
 
@@ -285,7 +215,7 @@ def behind(start_s: float, pace_s: float) -> Recording:
     rec = scripted(FAN_VALUES)
     sent = [(0.5 + 0.2 * k, FAN_VALUES[k // 10]) for k in range(10 * len(FAN_VALUES))]
     for k, (t, _) in enumerate(sent):
-        rec.number(t if not pace_s else start_s + pace_s * k, "/fan_speed", right(sent[max(0, k - 1)][1]))
+        rec.number(t if not pace_s else start_s + pace_s * k, "/fan_speed", right_speed(sent[max(0, k - 1)][1]))
     return rec
 
 

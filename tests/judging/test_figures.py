@@ -1,7 +1,11 @@
 """Figures: what is drawn from which check, what they say in words, and that floods stay small."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from tracing import (
@@ -17,12 +21,14 @@ from tracing import (
     velocity,
 )
 
-from grader.core.chart import GraphFigure, Look, Tone
+from grader.core.chart import Chart, GraphFigure, Look, Tone
+from grader.core.exercise import Exercise
 from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind, Mark, Request, Response
+from grader.core.trace import FaultKind, Mark, Request, Response, Trace
 from grader.judging.charts import expectation, figures_of, illustrated
 from grader.judging.charts.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
 from grader.judging.checks import CHECKS
+from grader.judging.checks.rate import TopicRate
 from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
@@ -31,16 +37,16 @@ EXERCISES = {path.stem: read_rubric(path) for path in builtin_rubrics().values()
 ONE, TWO, THREE = (EXERCISES[f"exercise_{n}"] for n in (1, 2, 3))
 
 
-def submission_of(exercise, tmp_path):
+def submission_of(exercise: Exercise, tmp_path: Path) -> Submission:
     files = {name: StudentFile(name, name) for name in exercise.files}
     return Submission("ada", "./ada", tmp_path, "sha256:" + "0" * 64, files)
 
 
-def titled(figures, start):
-    return next(f for f in figures if f.title.startswith(start))
+def titled(figures: Iterable[Chart | GraphFigure], start: str) -> Chart:
+    return next(f for f in figures if isinstance(f, Chart) and f.title.startswith(start))
 
 
-def test_a_rate_is_drawn_with_its_bands_and_its_intervals():
+def test_a_rate_is_drawn_with_its_bands_and_its_intervals() -> None:
     """The rate over the last second, the accepted bands, and every interval with the expected one."""
     chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "How often")
     rate, interval = chart.panels
@@ -52,7 +58,7 @@ def test_a_rate_is_drawn_with_its_bands_and_its_intervals():
     assert "200 messages on /cmd_vel within 9.9 s, at 20.000 Hz on average" in chart.about
 
 
-def test_a_rate_that_changes_is_seen():
+def test_a_rate_that_changes_is_seen() -> None:
     """What an average hides shows in the picture."""
     rec = Recording(10.05, process="velocity_publisher.py")
     for k in range(100):
@@ -62,7 +68,7 @@ def test_a_rate_that_changes_is_seen():
     assert min(rates) < 14
 
 
-def test_linear_and_angular_velocity_share_one_picture():
+def test_linear_and_angular_velocity_share_one_picture() -> None:
     """Two criteria on one topic make one chart with two panels."""
     chart = titled(figures_of(ONE, {"alone": velocity().trace()}), "Commanded")
     assert chart.criteria == ("linear_velocity", "angular_velocity")
@@ -70,7 +76,7 @@ def test_linear_and_angular_velocity_share_one_picture():
     assert {level.value for level in chart.panels[0].levels} == {0.5, 0.0}
 
 
-def test_logged_positions_lie_on_the_path():
+def test_logged_positions_lie_on_the_path() -> None:
     """Right positions are good dots on the path, with what was logged."""
     trace = position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
@@ -83,14 +89,14 @@ def test_logged_positions_lie_on_the_path():
     assert "18 of 18 logged pairs" in chart.about
 
 
-def test_wrong_positions_are_drawn_as_wrong():
+def test_wrong_positions_are_drawn_as_wrong() -> None:
     """Swapped x and y are off the path, and say so."""
     trace = position_logs(lambda x, y: f"x={y:.3f} y={x:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
     assert [s.tone for s in chart.panels[0].series] == [Tone.FAINT, Tone.BAD]
 
 
-def test_a_position_far_away_does_not_shrink_the_path():
+def test_a_position_far_away_does_not_shrink_the_path() -> None:
     """It is told in words."""
     trace = position_logs(lambda x, y: f"x={1000 * x + 9000:.3f} y={y:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
@@ -98,7 +104,7 @@ def test_a_position_far_away_does_not_shrink_the_path():
     assert "too far away to be drawn" in chart.about
 
 
-def test_log_times_stand_on_the_grid_of_the_period():
+def test_log_times_stand_on_the_grid_of_the_period() -> None:
     """The grid begins at the first log; intervals are compared with the accepted band."""
     trace = position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "When positions")
@@ -110,22 +116,22 @@ def test_log_times_stand_on_the_grid_of_the_period():
     assert [m.label for m in chart.moments] == ["/odom begins", "/odom ends"]
 
 
-def test_answers_stand_under_what_they_answer():
+def test_answers_stand_under_what_they_answer() -> None:
     """Temperature with its threshold, the fan speed and what was expected under it, once for both sides."""
     rec = scripted()
     for k in range(80):
-        value = held_at(0.5 + 0.2 * k)
+        value = held_at(0.5 + 0.2 * k) or 0.0
         rec.number(0.51 + 0.2 * k, "/fan_speed", 100.0 if value > 25 else 0.0)
     figures = figures_of(THREE, {"controller_alone": rec.trace("controller_alone")})
-    charts = [f for f in figures if f.title.startswith("Answers")]
-    assert len(charts) == 1
-    upper, lower = charts[0].panels
-    assert charts[0].criteria == ("fan_on_above_25", "fan_off_at_or_below_25")
+    chart = titled(figures, "Answers")
+    assert len([f for f in figures if f.title.startswith("Answers")]) == 1
+    upper, lower = chart.panels
+    assert chart.criteria == ("fan_on_above_25", "fan_off_at_or_below_25")
     assert (upper.title, upper.unit, upper.levels[0].value) == ("temperature", "°C", 25)
     assert [s.name for s in lower.series] == ["expected", "fan speed"]
 
 
-def test_the_graph_is_shown_before_and_after():
+def test_the_graph_is_shown_before_and_after() -> None:
     """Each file alone, then both together; topics that every node has are left out."""
     sensor = Recording(12).endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor")
     sensor.endpoint("publisher", "/rosout", "rcl_interfaces/msg/Log", "/temperature_sensor")
@@ -139,7 +145,7 @@ def test_the_graph_is_shown_before_and_after():
     assert graph.criteria == ("bidirectional_graph",)
 
 
-def test_the_timeline_has_a_row_for_each_kind_of_thing():
+def test_the_timeline_has_a_row_for_each_kind_of_thing() -> None:
     """Logs by severity, printed lines, faults and limits; nothing is left to a silent node but its row."""
     rec = Recording(10, process="velocity_publisher.py").log(1, "hello").log(2, "oh", "ERROR").line(3, "printed")
     rec.crashed(4).mark(5, "limit", "more than 3 lines")
@@ -157,7 +163,7 @@ def test_the_timeline_has_a_row_for_each_kind_of_thing():
     assert silent.panels[0].lanes == ("velocity_publisher.py: logged",)
 
 
-def test_the_timeline_has_a_row_for_each_service_that_was_called():
+def test_the_timeline_has_a_row_for_each_service_that_was_called() -> None:
     """Requests and responses with what they say, and when servers and processes came and went."""
     kind, value = "std_srvs/srv/Trigger", {"message": "85.0"}
     asked = Request(10**9, "/battery", kind, 1, "grader", 1, {})
@@ -173,7 +179,7 @@ def test_the_timeline_has_a_row_for_each_service_that_was_called():
     assert [m.label for m in chart.moments] == ["/other: server appears", "late.py starts", "end"]
 
 
-def test_a_flood_becomes_a_picture_of_bounded_size():
+def test_a_flood_becomes_a_picture_of_bounded_size() -> None:
     """A hundred thousand messages and logs are drawn with about as many points as a screen has columns."""
     rec = Recording(10, process="velocity_publisher.py")
     for k in range(20_000):
@@ -185,7 +191,7 @@ def test_a_flood_becomes_a_picture_of_bounded_size():
     assert max(len(text) for s in series for text in s.texts) <= 200
 
 
-def test_thinning_keeps_the_extremes():
+def test_thinning_keeps_the_extremes() -> None:
     """A single outlier among many values stays in the picture."""
     values = [0.0] * 10_000
     values[6789], values[1234] = 5.0, -5.0
@@ -196,7 +202,7 @@ def test_thinning_keeps_the_extremes():
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf"), 1e308])
-def test_strange_numbers_are_drawn_or_left_out(value):
+def test_strange_numbers_are_drawn_or_left_out(value: float) -> None:
     """No figure fails for what a student publishes."""
     rec = Recording(10).number(1, "/temperature", value).number(2, "/temperature", value)
     rec.number(1.5, "/fan_speed", value)
@@ -205,7 +211,7 @@ def test_strange_numbers_are_drawn_or_left_out(value):
 
 
 @pytest.mark.parametrize("exercise", [ONE, TWO, THREE], ids=lambda e: e.id)
-def test_a_node_that_does_nothing_has_figures_too(exercise, tmp_path):
+def test_a_node_that_does_nothing_has_figures_too(exercise: Exercise, tmp_path: Path) -> None:
     """An empty recording, and none at all."""
     submission = submission_of(exercise, tmp_path)
     for traces in ({}, {s.id: Recording(5).trace(s.id) for s in exercise.scenarios}):
@@ -213,10 +219,10 @@ def test_a_node_that_does_nothing_has_figures_too(exercise, tmp_path):
         assert len(illustrated(report, exercise, traces, submission, {}).figures) == len(traces)
 
 
-def test_a_picture_that_fails_costs_only_itself(monkeypatch):
+def test_a_picture_that_fails_costs_only_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """The other figures are there all the same."""
 
-    def broken(check, trace):
+    def broken(check: TopicRate, trace: Trace) -> None:
         raise ZeroDivisionError
 
     monkeypatch.setattr(CHECKS["topic_rate"], "chart", broken)
@@ -225,13 +231,13 @@ def test_a_picture_that_fails_costs_only_itself(monkeypatch):
     assert len(titles) == 3
 
 
-def test_figure_ids_are_unique_and_of_their_exercise():
+def test_figure_ids_are_unique_and_of_their_exercise() -> None:
     """A page with several exercises can link to each."""
     ids = [f.id for f in figures_of(ONE, {"alone": velocity().trace()})]
     assert ids == ["velocity_publisher-1", "velocity_publisher-2", "velocity_publisher-3", "velocity_publisher-4"]
 
 
-def test_every_check_says_what_it_expects():
+def test_every_check_says_what_it_expects() -> None:
     """With the numbers of its rubric; no criterion of ours is without a phrase."""
     said = {c.id: expectation(c.check) for e in (ONE, TWO, THREE) for c in e.criteria}
     assert all(said.values())
@@ -241,7 +247,7 @@ def test_every_check_says_what_it_expects():
     assert asked <= set(CHECKS.values())
 
 
-def test_the_source_around_a_fault_is_shown(tmp_path):
+def test_the_source_around_a_fault_is_shown(tmp_path: Path) -> None:
     """Three lines before and after, tabs widened, the file's name as handed in."""
     rec = velocity(stop_s=4).fault(
         3, FaultKind.EXCEPTION, "ValueError: no", line=5, process="velocity_publisher.py", frames=("a",)
@@ -256,7 +262,7 @@ def test_the_source_around_a_fault_is_shown(tmp_path):
 
 
 @pytest.mark.parametrize("line", [0, -1, 9, 10**9])
-def test_a_line_that_the_source_does_not_have_is_not_shown(line, tmp_path):
+def test_a_line_that_the_source_does_not_have_is_not_shown(line: int, tmp_path: Path) -> None:
     """A forged traceback can name any."""
     rec = velocity(stop_s=4).fault(3, FaultKind.EXCEPTION, "E: x", line=5, process="velocity_publisher.py")
     fault = replace(rec.trace().faults()[0], line=line)
@@ -267,7 +273,7 @@ def test_a_line_that_the_source_does_not_have_is_not_shown(line, tmp_path):
     assert report.excerpts == ()
 
 
-def test_driving_alone_has_no_dots():
+def test_driving_alone_has_no_dots() -> None:
     """A node that logs nothing leaves the path without positions."""
     chart = titled(figures_of(TWO, {"waiting_then_driving": driving().trace("waiting_then_driving")}), "The path")
     assert len(chart.panels[0].series) == 1

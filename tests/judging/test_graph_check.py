@@ -3,25 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from tracing import FLOAT32, FLOAT64, Recording
+from nodes import graph
+from tracing import FLOAT64, Recording
 
 from grader.judging.checks.graph import BidirectionalGraph
 
 CHECK = BidirectionalGraph("/temperature", "/fan_speed")
-
-
-def graph(*left_out: int, back_type: str = FLOAT32, controller: int = 2, wall: float = 1.0) -> Recording:
-    rec = Recording()
-    ends = [
-        ("publisher", "/temperature", FLOAT32, "/temperature_sensor", 1),
-        ("subscription", "/fan_speed", back_type, "/temperature_sensor", 1),
-        ("subscription", "/temperature", FLOAT32, "/fan_controller", controller),
-        ("publisher", "/fan_speed", FLOAT32, "/fan_controller", controller),
-    ]
-    for k, end in enumerate(ends):
-        if k not in left_out:
-            rec.endpoint(*end, t_s=k * wall)
-    return rec
 
 
 def test_both_directions_between_two_processes_are_met() -> None:

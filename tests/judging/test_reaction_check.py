@@ -94,7 +94,10 @@ def test_the_old_goal_may_go_on_until_the_next_period() -> None:
     ("plan", "said"),
     [
         (lambda w: [(0.0, goal(y, x)) for _, v in at_once(w) for x, y in [right(w) or (0, 0)]], "x is 1.5, expected 2"),
-        (lambda w: [(0.0, goal(*(right(w) or (0, 0)), "odom")) for _ in at_once(w)], "frame_id is 'odom', expected"),
+        (
+            lambda w: [(0.0, goal(x, y, "odom")) for _ in at_once(w) for x, y in [right(w) or (0, 0)]],
+            "frame_id is 'odom', expected",
+        ),
         (lambda w: [(0.0, goal(2.0, 1.5))] if right(w) else [], "after data = go to the office on /voice_command"),
         (lambda w: [(1.2, v) for _, v in at_once(w)], "came after 1.200 s, expected within 1.0 s"),
         (lambda w: at_once(w) or [(0.0, goal(0, 0))], "a message came, expected none"),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
-from tracing import FLOAT32, Recording, held_at, scripted
+from nodes import SPEEDS, drawn, hearing, sensed
+from tracing import Recording, held_at, scripted
 
 from grader.core.errors import HarnessError
 from grader.judging.checks.fields import RandomInRange
@@ -16,19 +16,6 @@ from grader.judging.checks.received import LogsReceived
 
 RANGE = RandomInRange("/temperature", 20, 30)
 LOGS = LogsReceived("temperature_sensor.py", "/fan_speed")
-SPEEDS = (100.0, 0.0, 63.271, 17.448, 100.0)
-
-
-def sensed(values: list[float], **kw: str) -> Recording:
-    rec = Recording(12.2, process="temperature_sensor.py")
-    for k, value in enumerate(values):
-        rec.number(0.2 + k * 0.2, "/temperature", value, **kw)
-    return rec
-
-
-def drawn(count: int = 60) -> list[float]:
-    rng = random.Random(7)
-    return [rng.uniform(20, 30) for _ in range(count)]
 
 
 def test_drawn_values_in_the_range_are_met() -> None:
@@ -104,18 +91,6 @@ def test_a_string_is_no_temperature() -> None:
     finding = RANGE.judge(rec.trace())
     assert finding.credit == 0
     assert "std_msgs/msg/String carries no number" in finding.reason
-
-
-def hearing(write: Callable[[float], str], times: list[float] | None = None, printed: bool = False) -> Recording:
-    """A sensor that writes the newest fan speed."""
-    rec = scripted(SPEEDS, "/fan_speed", 12.2)
-    rec.process = "temperature_sensor.py"
-    rec.endpoint("subscription", "/fan_speed", FLOAT32, "/temperature_sensor")
-    for t in times if times is not None else [0.5 + 0.2 * k for k in range(50)]:
-        value = held_at(t, SPEEDS)
-        if value is not None:
-            (rec.line if printed else rec.log)(t, write(value))
-    return rec
 
 
 ON_CHANGE = [0.5, 2.5, 4.5, 6.5, 8.5]

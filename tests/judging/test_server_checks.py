@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import pytest
+from nodes import BATTERY, answering, asked, levels, status
 from tracing import TRIGGER, Recording
 
 from grader.core.errors import HarnessError
@@ -16,43 +16,11 @@ from grader.judging.checks.services import ServiceAnswersAll, ServiceAvailable, 
 from grader.judging.findings import FAULT_KEY
 from grader.judging.values import FieldRule
 
-BATTERY = "/battery/get_status"
 FORM = FieldRule(pattern=r"Battery: [0-9]+\.[0-9]% remaining", example="Battery: 84.5% remaining")
 AVAILABLE = ServiceAvailable(BATTERY, TRIGGER)
 RESPONSE = ServiceResponse(BATTERY, {"success": True, "message": FORM})
 SEQUENCE = ServiceSequence(BATTERY, first=84.5, step=-0.5, floor=0.0, reset_to=100.0)
 ALL = ServiceAnswersAll(BATTERY, NS_PER_S)
-
-
-def levels(start: float = 85.0, step: float = 0.5, reset: float = 100.0) -> Iterator[float]:
-    level = start
-    while True:
-        level -= step
-        if level < 0:
-            level = reset
-        yield level
-
-
-def status(level: float) -> dict[str, Any]:
-    return {"success": True, "message": f"Battery: {level:.1f}% remaining"}
-
-
-def asked(
-    values: Iterable[Mapping[str, Any] | None], clients: int = 1, period_s: float = 0.05, late_s: float = 0.0
-) -> Recording:
-    """A server that is asked from t = 1 s on, by several clients at the same instants; None is no response."""
-    rec = Recording(30.0, process="battery_service_server.py").service("service", BATTERY, TRIGGER, "/battery_monitor")
-    for k, value in enumerate(values):
-        t = 1.0 + period_s * (k // clients)
-        rec.request(t, BATTERY, k + 1, client=k % clients + 1)
-        if value is not None:
-            rec.response(t + late_s, BATTERY, k + 1, value, client=k % clients + 1)
-    return rec
-
-
-def answering(count: int = 210, write: Any = status, source: Iterator[float] | None = None, **kw: Any) -> Recording:
-    chosen = source or levels()
-    return asked([write(next(chosen)) for _ in range(count)], **kw)
 
 
 def test_the_chapters_server_meets_everything() -> None:

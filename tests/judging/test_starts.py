@@ -18,7 +18,7 @@ from grader.judging.judge_run import started
         (StartWay.ENTRY_POINT, "p.a:go", ("p/a.py: run as `ros2 run` does: the entry point p.a:go",)),
     ],
 )
-def test_only_what_is_not_ordinary_is_noted(way, target, notes):
+def test_only_what_is_not_ordinary_is_noted(way: StartWay, target: str, notes: tuple[str, ...]) -> None:
     """A script that was run as a script needs no line."""
     trace = Trace("alone", ClockKind.VIRTUAL, 0, (), starts=(Start("a.py", "p/a.py", way, target),))
     assert started(trace) == notes
@@ -33,6 +33,6 @@ def test_only_what_is_not_ordinary_is_noted(way, target, notes):
         ("KeyboardInterrupt", "a.py:3: KeyboardInterrupt"),
     ],
 )
-def test_a_message_that_reads_like_parts_of_a_reason_is_quoted(text, told):
+def test_a_message_that_reads_like_parts_of_a_reason_is_quoted(text: str, told: str) -> None:
     """A semicolon separates what the grader says: an exception cannot go on in its place."""
     assert fault_sentence(Fault(0, "a.py", FaultKind.EXCEPTION, text, "a.py", 3)) == told

@@ -6,10 +6,12 @@ import itertools
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nodes import right_speed, sensor, together
 from tracing import FLOAT32, FLOAT64, Recording
 
 from grader.core.trace import ClockKind
@@ -18,30 +20,8 @@ from grader.judging.checks.together import AnswersTogether
 CHECK = AnswersTogether("/temperature", "/fan_speed", 25, 100, 0)
 
 
-def right(value: float) -> float:
-    return 100.0 if value > 25 else 0.0
-
-
-def sensor(seed: int = 3, stop_s: float = 20.2, until: float = 99.0) -> tuple[Recording, list[tuple[float, float]]]:
-    rng = random.Random(seed)
-    rec = Recording(stop_s, process="temperature_sensor.py")
-    sent = [(0.2 + 0.2 * k, rng.uniform(20, 30)) for k in range(100)]
-    sent = [(t, v) for t, v in sent if t < min(stop_s - 1e-9, until)]
-    for t, v in sent:
-        rec.number(t, "/temperature", v)
-    return rec, sent
-
-
-def each(rule: Callable[[float], float] = right, seed: int = 3, until: float = 99.0, delay: float = 0.0) -> Recording:
-    rec, sent = sensor(seed)
-    for t, v in sent:
-        if t < until:
-            rec.number(t + delay, "/fan_speed", rule(v))
-    return rec
-
-
 def on_change(
-    rule: Callable[[float], float] = right, seed: int = 3, until: float = 99.0, first: float = -1
+    rule: Callable[[float], float] = right_speed, seed: int = 3, until: float = 99.0, first: float = -1
 ) -> Recording:
     rec, sent = sensor(seed)
     state = first
@@ -52,7 +32,9 @@ def on_change(
     return rec
 
 
-def timed(rule: Callable[[float], float] = right, period: float = 1.0, phase: float = 0.0, seed: int = 3) -> Recording:
+def timed(
+    rule: Callable[[float], float] = right_speed, period: float = 1.0, phase: float = 0.0, seed: int = 3
+) -> Recording:
     rec, sent = sensor(seed)
     for t in itertools.takewhile(lambda t: t < 20.2, (phase + k * period for k in itertools.count())):
         seen = [v for at, v in sent if at < t]
@@ -67,8 +49,8 @@ def timed(rule: Callable[[float], float] = right, period: float = 1.0, phase: fl
 def test_every_honest_way_of_answering_is_met(seed: int, way: str, period: float) -> None:
     """Whatever the sensor draws."""
     rec = {
-        "each": lambda: each(seed=seed),
-        "delayed": lambda: each(seed=seed, delay=0.05),
+        "each": lambda: together(seed=seed),
+        "delayed": lambda: together(seed=seed, delay=0.05),
         "change": lambda: on_change(seed=seed),
         "silent start": lambda: on_change(seed=seed, first=0.0),
         "timer": lambda: timed(seed=seed, period=period, phase=0.3),
@@ -78,12 +60,14 @@ def test_every_honest_way_of_answering_is_met(seed: int, way: str, period: float
 
 
 @given(
-    st.integers(0, 200), st.sampled_from([each, on_change, timed]), st.sampled_from(["inverted", "> 28", "on", "nan"])
+    st.integers(0, 200),
+    st.sampled_from([together, on_change, timed]),
+    st.sampled_from(["inverted", "> 28", "on", "nan"]),
 )
 def test_every_wrong_rule_is_found(seed: int, way: Callable[..., Recording], name: str) -> None:
     """Whatever the sensor draws and however it is answered."""
     rule = {
-        "inverted": lambda v: 100.0 - right(v),
+        "inverted": lambda v: 100.0 - right_speed(v),
         "> 28": lambda v: 100.0 if v > 28 else 0.0,
         "on": lambda v: 100.0,
         "nan": lambda v: float("nan"),
@@ -93,7 +77,7 @@ def test_every_wrong_rule_is_found(seed: int, way: Callable[..., Recording], nam
         assert CHECK.judge(way(rule, seed=seed).trace()).credit == 0
 
 
-@pytest.mark.parametrize("way", [each, on_change])
+@pytest.mark.parametrize("way", [together, on_change])
 @pytest.mark.parametrize("until", [0.3, 5.0, 15.0])
 def test_a_controller_that_stops_is_found(way: Callable[..., Recording], until: float) -> None:
     """What it said last does not fit for long."""
@@ -117,7 +101,7 @@ def test_a_sensor_that_exits_is_found() -> None:
     """The exit is the reason."""
     rec, sent = sensor(until=5.0)
     for t, v in sent:
-        rec.number(t, "/fan_speed", right(v))
+        rec.number(t, "/fan_speed", right_speed(v))
     finding = CHECK.judge(rec.exited(5.1).trace())
     assert finding.credit == 0
     assert "temperature_sensor.py exited after 5.1 s" in finding.reason
@@ -125,7 +109,7 @@ def test_a_sensor_that_exits_is_found() -> None:
 
 def test_the_first_wrong_answer_is_named() -> None:
     """With its temperature and what was expected."""
-    finding = CHECK.judge(each(lambda v: 55.0).trace())
+    finding = CHECK.judge(together(lambda v: 55.0).trace())
     assert finding.reason.startswith("t = 0.200 s, /fan_speed: 55 for ")
     assert "expected" in finding.reason
 
@@ -156,7 +140,7 @@ def test_policies_that_differ_are_said_exactly() -> None:
 def answered(values: list[float]) -> Recording:
     rec = Recording(20.2, process="temperature_sensor.py")
     for k, value in enumerate(values):
-        rec.number(0.2 + 0.2 * k, "/temperature", value).number(0.2 + 0.2 * k, "/fan_speed", right(value))
+        rec.number(0.2 + 0.2 * k, "/temperature", value).number(0.2 + 0.2 * k, "/fan_speed", right_speed(value))
     return rec
 
 
@@ -185,9 +169,9 @@ def test_a_slow_random_walk_need_not_reach_the_threshold(seed: int, step: float)
         ({"type_": FLOAT64}, "/b publishes std_msgs/msg/Float64, /a subscribes std_msgs/msg/Float32: they cannot talk"),
     ],
 )
-def test_right_answers_that_the_sensor_cannot_hear_are_not_enough(offered: dict[str, str], said: str) -> None:
+def test_right_answers_that_the_sensor_cannot_hear_are_not_enough(offered: dict[str, Any], said: str) -> None:
     """Each file alone is right, but the two cannot talk in both directions."""
-    rec = each()
+    rec = together()
     rec.endpoint("subscription", "/fan_speed", FLOAT32, "/a", 1)
     rec.endpoint("publisher", "/fan_speed", **{"type_": FLOAT32, **offered}, node="/b", participant=2)
     finding = CHECK.judge(rec.trace())
@@ -197,7 +181,7 @@ def test_right_answers_that_the_sensor_cannot_hear_are_not_enough(offered: dict[
 
 def test_one_way_in_which_the_sensor_hears_the_answers_is_enough() -> None:
     """A second subscription that does not fit takes nothing away."""
-    rec = each()
+    rec = together()
     rec.endpoint("subscription", "/fan_speed", FLOAT32, "/a", 1)
     rec.endpoint("subscription", "/fan_speed", FLOAT64, "/a", 1)
     rec.endpoint("publisher", "/fan_speed", FLOAT32, "/b", 2)
@@ -220,7 +204,9 @@ def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> N
     """A controller that compares what it stored last time is told so."""
     rec, sent = sensor()
     for k, (t, _) in enumerate(sent):
-        rec.number(t, "/fan_speed", right(sent[k - behind][1]) if k >= behind else 100.0 - right(sent[0][1]))
+        rec.number(
+            t, "/fan_speed", right_speed(sent[k - behind][1]) if k >= behind else 100.0 - right_speed(sent[0][1])
+        )
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
     assert f"the answers are right for what came {said}" in finding.reason
@@ -231,28 +217,28 @@ def test_one_value_behind_is_told_from_a_timer_by_the_check_of_the_controller_al
     """A timer of the sensor's own pace answers like this, and what it says first is of before the first value."""
     rec, sent = sensor()
     for k, (t, _) in enumerate(sent):
-        rec.number(t, "/fan_speed", right(sent[k - 1][1]) if k else 100.0 - right(sent[0][1]))
+        rec.number(t, "/fan_speed", right_speed(sent[k - 1][1]) if k else 100.0 - right_speed(sent[0][1]))
     assert CHECK.judge(rec.trace()).credit == 1
 
 
 def test_wrong_answers_are_not_called_late() -> None:
     """Inverted logic fits no earlier value."""
-    finding = CHECK.judge(each(lambda v: 100.0 - right(v)).trace())
+    finding = CHECK.judge(together(lambda v: 100.0 - right_speed(v)).trace())
     assert finding.credit == 0
     assert "before" not in finding.reason
 
 
-def test_on_the_wall_clock_an_answer_may_be_seen_before_its_input():
+def test_on_the_wall_clock_an_answer_may_be_seen_before_its_input() -> None:
     """The sensor sends to the controller first, and is held up before it sends to the observer; not so virtually."""
-    assert CHECK.judge(replace(each(delay=-0.02).trace(), clock=ClockKind.WALL)).credit == 1
-    assert CHECK.judge(each(delay=-0.02).trace()).credit == 0
-    assert CHECK.judge(replace(each(delay=-0.08).trace(), clock=ClockKind.WALL)).credit == 0
+    assert CHECK.judge(replace(together(delay=-0.02).trace(), clock=ClockKind.WALL)).credit == 1
+    assert CHECK.judge(together(delay=-0.02).trace()).credit == 0
+    assert CHECK.judge(replace(together(delay=-0.08).trace(), clock=ClockKind.WALL)).credit == 0
 
 
 @pytest.mark.parametrize("last", [0.0, 100.0])
 def test_two_answers_at_one_instant_are_contradictory(last: float) -> None:
     """The last one is not right by luck."""
-    rec = each(lambda _v: 100.0 - last).add(*each(lambda _v: last).trace().messages("/fan_speed"))
+    rec = together(lambda _v: 100.0 - last).add(*together(lambda _v: last).trace().messages("/fan_speed"))
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
     assert "0 and 100 at one instant" in finding.reason
@@ -261,5 +247,5 @@ def test_two_answers_at_one_instant_are_contradictory(last: float) -> None:
 
 def test_a_timer_may_still_have_the_old_answer_at_the_instant_of_a_new_one() -> None:
     """It belongs to the temperature before."""
-    rec = timed(period=0.2, phase=0.4).add(*each().trace().messages("/fan_speed"))
+    rec = timed(period=0.2, phase=0.4).add(*together().trace().messages("/fan_speed"))
     assert CHECK.judge(rec.trace()).credit == 1

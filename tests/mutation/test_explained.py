@@ -1,12 +1,14 @@
 """Notes on self-tests: what they say, and how their mistakes are told."""
 
+from __future__ import annotations
+
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from grader.core.errors import RubricError
-from grader.mutation.explained import beside, read_explained
+from grader.mutation.explained import Explained, beside, read_explained
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import NOTES, read_rubric
 
@@ -30,20 +32,22 @@ criteria:
 """
 
 
-def read(tmp_path, text):
+def read(tmp_path: Path, text: str) -> Explained:
     """Return what notes of this text say."""
     path = tmp_path / "a.selftest.yaml"
     path.write_text(text, encoding="utf-8")
-    return read_explained(path, EXERCISE)
+    explained = read_explained(path, EXERCISE)
+    assert explained is not None
+    return explained
 
 
-def test_notes_lie_beside_their_rubric():
+def test_notes_lie_beside_their_rubric() -> None:
     """Their name ends as that of no rubric does."""
     assert beside(Path("x/a.yaml")) == Path("x/a.selftest.yaml")
     assert beside(Path("a.yaml")).name.endswith(NOTES)
 
 
-def test_what_notes_say(tmp_path):
+def test_what_notes_say(tmp_path: Path) -> None:
     """Folders are relative to the file, sentences are one line, and each explanation knows its place."""
     said = read(tmp_path, GOOD)
     assert (said.reference, said.template) == (tmp_path / "../right", tmp_path / "start")
@@ -58,7 +62,7 @@ def test_what_notes_say(tmp_path):
     assert said.criteria == {"logging": "nobody forgets it"}
 
 
-def test_without_a_file_nothing_is_said(tmp_path):
+def test_without_a_file_nothing_is_said(tmp_path: Path) -> None:
     """A rubric needs no notes."""
     assert read_explained(tmp_path / "none.selftest.yaml", EXERCISE).survivors == ()
 
@@ -81,14 +85,14 @@ def test_without_a_file_nothing_is_said(tmp_path):
         ("schema: [\n", "2:1: not valid YAML"),
     ],
 )
-def test_mistakes_are_told_with_their_place(tmp_path, text, told):
+def test_mistakes_are_told_with_their_place(tmp_path: Path, text: str, told: str) -> None:
     """Line and column, as in rubrics."""
     with pytest.raises(RubricError) as error:
         read(tmp_path, text)
     assert f"a.selftest.yaml:{told}" in error.value.message
 
 
-def test_notes_that_cannot_be_read_are_refused(tmp_path):
+def test_notes_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     """Another encoding, and a folder."""
     path = tmp_path / "a.selftest.yaml"
     path.write_bytes(b"schema: \xff\n")
@@ -99,7 +103,7 @@ def test_notes_that_cannot_be_read_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("rubric", builtin_rubrics().values(), ids=lambda path: path.stem)
-def test_our_own_notes_can_be_read(rubric):
+def test_our_own_notes_can_be_read(rubric: Path) -> None:
     """Each rubric that comes with the grader has notes that name its reference and its template."""
     said = read_explained(beside(rubric), read_rubric(rubric))
     assert said.reference is not None

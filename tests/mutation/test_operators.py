@@ -1,10 +1,13 @@
 """What each operator makes of a small program: source in, source out."""
 
+from __future__ import annotations
+
 import ast
+from collections.abc import Sequence
 
 import pytest
 
-from grader.mutation.operators.mutants import OPERATORS, mutants_of
+from grader.mutation.operators.mutants import OPERATORS, Mutant, mutants_of
 from grader.mutation.results import one_line_change
 
 #: A program with a publisher, a subscription and a timer.
@@ -142,19 +145,19 @@ CASES = {
 }
 
 
-def made(name, source):
+def made(name: str, source: str) -> tuple[Mutant, ...]:
     """Return what one operator makes of a program."""
     return mutants_of(source, "node.py", {name: OPERATORS[name]})
 
 
-def test_every_operator_has_a_case_and_says_what_it_imitates():
+def test_every_operator_has_a_case_and_says_what_it_imitates() -> None:
     """A new operator comes with a test here, and with the mistake it stands for."""
     assert set(CASES) == set(OPERATORS)
     assert all(operator.__doc__ for operator in OPERATORS.values())
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_an_operator_finds_its_places(name):
+def test_an_operator_finds_its_places(name: str) -> None:
     """It finds all of them and no others, names each, and leaves Python behind that means something else."""
     source, details = CASES[name]
     mutants = made(name, source)
@@ -210,13 +213,13 @@ CHANGES = [
 
 
 @pytest.mark.parametrize(("name", "source", "parts"), CHANGES)
-def test_the_first_mutant_of_an_operator_reads_like_the_mistake(name, source, parts):
+def test_the_first_mutant_of_an_operator_reads_like_the_mistake(name: str, source: str, parts: Sequence[str]) -> None:
     """What is written in the end is what a student would have written."""
     change = one_line_change(source, made(name, source)[0].source)
     assert [part for part in parts if part not in change] == [], change
 
 
-def test_a_mutant_that_means_the_same_is_left_out():
+def test_a_mutant_that_means_the_same_is_left_out() -> None:
     """Two operators that come to the same program make one mutant, of the first; layout and comments do not count."""
     source = "a = 2  # two\nb = a / 2\n"
     by_both = mutants_of(source, "a.py", {name: OPERATORS[name] for name in ("constant", "counter_step", "constant")})
@@ -225,20 +228,20 @@ def test_a_mutant_that_means_the_same_is_left_out():
     assert swapped == ()
 
 
-def test_ids_name_file_line_operator_and_detail_and_are_never_the_same():
+def test_ids_name_file_line_operator_and_detail_and_are_never_the_same() -> None:
     """Two equal changes of one line are counted."""
     ids = [mutant.id for mutant in made("constant", "a = 1\nb = [2, 2]\n")]
     assert ids == ["node.py:1:constant:1 -> 2", "node.py:2:constant:2 -> 3", "node.py:2:constant:2 -> 3 #2"]
 
 
-def test_what_is_no_python_any_more_is_no_mutant():
+def test_what_is_no_python_any_more_is_no_mutant() -> None:
     """`return` at the top of a file cannot be compiled."""
     source = "def f():\n    global x\n    x = 1\n    global y\n"
     for mutant in mutants_of(source, "a.py"):
         compile(mutant.source, "a.py", "exec")
 
 
-def test_a_long_detail_stays_one_short_line():
+def test_a_long_detail_stays_one_short_line() -> None:
     """Ids are read by people."""
     (mutant,) = made("missing_call", "call(\n    'a long text that goes on and on',\n    'and on and on and on')\n")
     assert "\n" not in mutant.id

@@ -1,9 +1,12 @@
 """What results of a self-test count as, and how they are shown."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -17,7 +20,7 @@ MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
 SCHEMA = json.loads((Path(grader.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
 
 
-def standing(rate=MET, speed=MET):
+def standing(rate: Outcome = MET, speed: Outcome = MET) -> Standing:
     """Return what a program is worth under two criteria."""
     outcomes = {"rate": rate, "speed": speed}
     reasons = {id_: f"{id_} is {outcome.value}" for id_, outcome in outcomes.items() if outcome is not MET}
@@ -25,16 +28,21 @@ def standing(rate=MET, speed=MET):
     return Standing(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
 
 
-def trial(number, **attributes):
+def trial(number: int, **attributes: Any) -> Trial:
     """Return a mutant."""
     outcomes = {name: attributes.pop(name) for name in ("rate", "speed") if name in attributes}
     return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", standing(**outcomes), **attributes)
 
 
-def result(*mutants, **attributes):
+def result(*mutants: Trial, **attributes: Any) -> Result:
     """Return what came of a rubric whose every criterion was turned once."""
     always = (trial(1, rate=NOT_MET), trial(2, speed=PARTLY))
-    given = {"template": standing(NOT_MET, BLOCKED), "baseline": Fraction(0), "variants": (), **attributes}
+    given: dict[str, Any] = {
+        "template": standing(NOT_MET, BLOCKED),
+        "baseline": Fraction(0),
+        "variants": (),
+        **attributes,
+    }
     return Result(
         "r.yaml", "fan", ("rate", "speed"), given.pop("reference", standing()), mutants=(*always, *mutants), **given
     )
@@ -50,12 +58,12 @@ def result(*mutants, **attributes):
         ((UNDECIDED, MET), Fate.UNDECIDED),
     ],
 )
-def test_what_becomes_of_a_mutant(outcomes, fate):
+def test_what_becomes_of_a_mutant(outcomes: tuple[Outcome, Outcome], fate: Fate) -> None:
     """A trouble of the grader's neither kills it nor lets it survive."""
     assert standing(*outcomes).fate is fate
 
 
-def test_a_rubric_without_a_known_hole_passes():
+def test_a_rubric_without_a_known_hole_passes() -> None:
     """Everything was noticed, or the author says why not."""
     assert result(trial(3, because="it is the same")).passed
 
@@ -71,12 +79,12 @@ def test_a_rubric_without_a_known_hole_passes():
     ],
     ids=["survivor", "reference", "template", "variant", "never turned"],
 )
-def test_a_hole_is_a_hole(holed):
+def test_a_hole_is_a_hole(holed: Result) -> None:
     """A survivor, a reference or a variant that loses points, another baseline, a criterion that never turned."""
     assert not holed.passed
 
 
-def test_undecided_mutants_are_set_apart():
+def test_undecided_mutants_are_set_apart() -> None:
     """They are no survivors, and turn nothing."""
     found = replace(result(), mutants=(trial(1, rate=NOT_MET), trial(2, speed=UNDECIDED)))
     assert [t.id for t in found.undecided] == ["a.py:2:period:x"]
@@ -84,19 +92,19 @@ def test_undecided_mutants_are_set_apart():
     assert found.never_turned == ("speed",)
 
 
-def test_a_part_of_the_mutants_says_nothing_about_what_never_turned():
+def test_a_part_of_the_mutants_says_nothing_about_what_never_turned() -> None:
     """The others may turn it."""
     assert replace(result(), mutants=(), whole=False).never_turned == ()
 
 
-def test_a_criterion_that_nothing_turns_may_be_explained():
+def test_a_criterion_that_nothing_turns_may_be_explained() -> None:
     """The text shows why."""
     found = replace(result(), mutants=(trial(1, rate=NOT_MET),), unturned={"speed": "it is the last"})
     assert found.passed
     assert "speed is turned by no mutant because it is the last" in render_results([found], width=80, colour=False)
 
 
-def test_only_a_named_criterion_kills_as_expected():
+def test_only_a_named_criterion_kills_as_expected() -> None:
     """Where the author names some, one of them has to be turned."""
     assert trial(1, rate=NOT_MET, expected=("rate", "speed")).as_expected
     assert not trial(1, rate=NOT_MET, speed=BLOCKED, expected=("speed",)).as_expected
@@ -113,12 +121,12 @@ def test_only_a_named_criterion_kills_as_expected():
         ("a\nb\n", "b\na\n", "moved: b"),
     ],
 )
-def test_a_change_fits_on_one_line(before, after, change):
+def test_a_change_fits_on_one_line(before: str, after: str, change: str) -> None:
     """Old lines, then new ones, without indentation."""
     assert one_line_change(before, after) == change
 
 
-def everything():
+def everything() -> Result:
     """Return a result with something of every kind, and hostile text."""
     hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", standing())
     return result(
@@ -131,7 +139,7 @@ def everything():
     )
 
 
-def test_the_text_names_every_kind():
+def test_the_text_names_every_kind() -> None:
     """Survivors with their change, explanations, other killers, what is undecided, and idle patterns."""
     text = render_results([everything()], width=100, colour=False)
     assert "fan (r.yaml): HAS HOLES" in text
@@ -144,14 +152,14 @@ def test_the_text_names_every_kind():
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_without_a_right_reference_the_text_says_why_nothing_was_tried():
+def test_without_a_right_reference_the_text_says_why_nothing_was_tried() -> None:
     """And which criteria it lost."""
     text = render_results([replace(result(reference=standing(rate=PARTLY)), mutants=())], width=80, colour=False)
     assert "none tried" in text
     assert "rate: rate is partly" in text
 
 
-def test_the_json_fits_its_schema():
+def test_the_json_fits_its_schema() -> None:
     """Also with hostile text and with nothing at all."""
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     for found in (everything(), replace(result(), mutants=(), template=None, baseline=None)):

@@ -1,5 +1,7 @@
 """What each rewriter makes of a program: another text, the same behaviour."""
 
+from __future__ import annotations
+
 import ast
 
 import pytest
@@ -72,14 +74,14 @@ WRITTEN = {
 }
 
 
-def test_every_rewriter_has_a_case_and_says_how_it_differs():
+def test_every_rewriter_has_a_case_and_says_how_it_differs() -> None:
     """A new one comes with a test here."""
     assert set(WRITTEN) == set(VARIANTS)
     assert all(rewriter.__doc__ for rewriter in VARIANTS.values())
 
 
 @pytest.mark.parametrize("name", WRITTEN)
-def test_a_rewriter_writes_the_same_thing_otherwise(name):
+def test_a_rewriter_writes_the_same_thing_otherwise(name: str) -> None:
     """What it writes is Python, has the parts it should, and lost nothing but what it replaced."""
     text = VARIANTS[name](Program(NODE))
     ast.parse(text)
@@ -90,17 +92,17 @@ def test_a_rewriter_writes_the_same_thing_otherwise(name):
     assert text != NODE
 
 
-def test_variants_are_named_by_file_and_rewriter():
+def test_variants_are_named_by_file_and_rewriter() -> None:
     """Their order is that of the table."""
     assert [variant.id for variant in variants_of(NODE, "fan.py")] == [f"fan.py:{name}" for name in VARIANTS]
 
 
-def test_a_program_that_gives_nothing_to_vary_has_no_variants():
+def test_a_program_that_gives_nothing_to_vary_has_no_variants() -> None:
     """Except for the ends of its lines."""
     assert [variant.name for variant in variants_of("print(1)\n", "a.py")] == ["windows_lines"]
 
 
-def test_fields_of_messages_and_imports_keep_their_names():
+def test_fields_of_messages_and_imports_keep_their_names() -> None:
     """They are not the program's own."""
     source = "from a import b\n\n\ndef f(msg):\n    data = b(data=msg.data)\n    return data\n"
     text = VARIANTS["renamed_variables"](Program(source))
@@ -109,7 +111,7 @@ def test_fields_of_messages_and_imports_keep_their_names():
     )
 
 
-def test_a_variable_and_a_method_of_one_name_are_two_things():
+def test_a_variable_and_a_method_of_one_name_are_two_things() -> None:
     """Each is renamed where it is meant, also through a variable that holds the object."""
     source = "class A:\n    def b(self):\n        b = self.b()\n        return b\n\n\nx = A()\nx.b(b=1)\ny.b()\n"
     assert VARIANTS["renamed_methods"](Program(source)) == source.replace("def b", "def do_b").replace(
@@ -118,7 +120,7 @@ def test_a_variable_and_a_method_of_one_name_are_two_things():
     assert "def b(self)" in VARIANTS["renamed_variables"](Program(source))
 
 
-def test_a_timer_that_the_program_keeps_is_no_loop():
+def test_a_timer_that_the_program_keeps_is_no_loop() -> None:
     """Its name may be used elsewhere."""
     source = NODE.replace("        self.create_timer", "        self.timer = self.create_timer")
     assert VARIANTS["loop_in_thread"](Program(source)) == source

@@ -1,13 +1,19 @@
 """The rubrics that come with the grader hold the criteria and points that are promised, and editors can check them."""
 
+from __future__ import annotations
+
 import json
 import re
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
+from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import OdometryStream, longest_course_ns, shortest
 from grader.judging.checks import CHECKS
@@ -57,11 +63,17 @@ POINTS = {
 PROJECTS = ("joint_publisher", "joint_subscriber", "battery_service")
 
 
-def exercise(name):
+@cache
+def exercise(name: str) -> Exercise:
     return read_rubric(builtin_rubrics()[name])
 
 
-def test_the_criteria_and_points_are_the_promised_ones():
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return rubric_schema()
+
+
+def test_the_criteria_and_points_are_the_promised_ones() -> None:
     """Ids, points and order are fixed: other programs read them."""
     got = {name: {c.id: c.points for c in read_rubric(path).criteria} for name, path in builtin_rubrics().items()}
     assert got == POINTS
@@ -72,7 +84,7 @@ def test_the_criteria_and_points_are_the_promised_ones():
     assert [name for name in got if exercise(name).by_request] == list(PROJECTS)
 
 
-def test_the_header_of_a_rubric_is_what_the_whole_of_it_says():
+def test_the_header_of_a_rubric_is_what_the_whole_of_it_says() -> None:
     """The scenarios need not be read to know what a rubric is about."""
     for header in builtin_headers():
         whole = read_rubric(header.path)
@@ -80,31 +92,32 @@ def test_the_header_of_a_rubric_is_what_the_whole_of_it_says():
 
 
 @pytest.mark.parametrize("name", list(POINTS))
-def test_every_lost_criterion_has_something_to_say(name):
+def test_every_lost_criterion_has_something_to_say(name: str) -> None:
     """Each criterion has a short title and a hint of one line."""
     for criterion in exercise(name).criteria:
         assert 0 < len(criterion.title) <= 50
         assert 0 < len(criterion.hint) <= 110
 
 
-def test_odometry_comes_late_and_goes_early():
+def test_odometry_comes_late_and_goes_early() -> None:
     """Exercise 2 is observed for 24 s: at least 5 s of silence, 15 s of odometry and 1 s of silence."""
     (scenario,) = exercise("odom_subscriber").scenarios
     (stream,) = scenario.stimuli
     assert isinstance(stream, OdometryStream)
     assert shortest(stream.start_ns) == 5 * NS_PER_S
     assert shortest(stream.duration_ns) == 15 * NS_PER_S
+    assert isinstance(scenario.span.duration_ns, int)
     assert scenario.span.duration_ns - longest_course_ns(stream) >= NS_PER_S
 
 
-def test_every_scripted_number_is_held_for_its_whole_time():
+def test_every_scripted_number_is_held_for_its_whole_time() -> None:
     """No scripted value of exercise 3 is cut off by the end of its scenario."""
     for scenario in exercise("two_node_communication").scenarios:
         for stream in scenario.stimuli:
             assert longest_course_ns(stream) <= shortest(scenario.span.duration_ns)
 
 
-def test_the_shipped_schema_is_up_to_date():
+def test_the_shipped_schema_is_up_to_date() -> None:
     """`python -m grader.rubrics.schema > rubrics/rubric.schema.json` was run after the last change."""
     assert (RUBRICS / "rubric.schema.json").read_text(encoding="utf-8") == schema_text()
 
@@ -112,16 +125,15 @@ def test_the_shipped_schema_is_up_to_date():
 @pytest.mark.parametrize(
     "path", [p for p in sorted(RUBRICS.glob("*.yaml")) if not p.name.endswith(NOTES)], ids=lambda path: path.name
 )
-def test_each_rubric_names_the_schema_and_fits_it(path):
+def test_each_rubric_names_the_schema_and_fits_it(path: Path, schema: Mapping[str, Any]) -> None:
     """An editor that knows JSON Schema finds nothing wrong."""
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# yaml-language-server: $schema=rubric.schema.json\n")
-    jsonschema.Draft202012Validator(rubric_schema()).validate(YAML(typ="safe", pure=True).load(text))
+    jsonschema.Draft202012Validator(schema).validate(YAML(typ="safe", pure=True).load(text))
 
 
-def test_the_schema_knows_every_check_and_parameter():
+def test_the_schema_knows_every_check_and_parameter(schema: Mapping[str, Any]) -> None:
     """Editors complete the checks with their parameters, and mark what is missing or unknown."""
-    schema = rubric_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     check = schema["$defs"]["Check"]
     assert set(check["properties"]) == set(CHECKS)
@@ -141,15 +153,15 @@ def test_the_schema_knows_every_check_and_parameter():
         ("title: Logs", "titel: Logs"),
     ],
 )
-def test_the_schema_refuses_what_the_reader_refuses(old, new):
+def test_the_schema_refuses_what_the_reader_refuses(old: str, new: str, schema: Mapping[str, Any]) -> None:
     """An editor marks a missing unit, points of 0, an unknown check and an unknown key."""
     text = (RUBRICS / "exercise_1.yaml").read_text(encoding="utf-8").replace(old, new, 1)
     data = YAML(typ="safe", pure=True).load(text)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(data, rubric_schema())
+        jsonschema.Draft202012Validator(schema).validate(data)
 
 
-def defaults_in(node):
+def defaults_in(node: Any) -> Iterator[Any]:
     if isinstance(node, dict):
         if "default" in node and "type" in node:
             yield node["default"], node
@@ -160,21 +172,20 @@ def defaults_in(node):
             yield from defaults_in(value)
 
 
-def test_every_default_in_the_schema_could_be_written():
+def test_every_default_in_the_schema_could_be_written(schema: Mapping[str, Any]) -> None:
     """An editor never completes nanoseconds where `60 s` belongs."""
-    schema = rubric_schema()
     found = list(defaults_in(schema))
     assert found
     for default, node in found:
-        jsonschema.validate(default, {"$defs": schema["$defs"], **node})
+        jsonschema.Draft202012Validator({"$defs": schema["$defs"], **node}).validate(default)
 
 
-def test_the_schema_is_plain_json():
+def test_the_schema_is_plain_json(schema: Mapping[str, Any]) -> None:
     """The text of the schema reads back as the schema."""
-    assert json.loads(schema_text()) == rubric_schema()
+    assert json.loads(schema_text()) == schema
 
 
-def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatch):
+def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the package's code, exercise 2 before exercise 10."""
     rubrics = tmp_path / "grader" / "shipped" / "rubrics"
     rubrics.mkdir(parents=True)
@@ -187,7 +198,7 @@ def test_rubrics_are_found_in_a_wheel_and_ordered_by_number(tmp_path, monkeypatc
     assert list(builtin_rubrics()) == ["c", "a", "b"]
 
 
-def test_every_criterion_says_which_part_of_the_chapter_asks_for_it():
+def test_every_criterion_says_which_part_of_the_chapter_asks_for_it() -> None:
     """By the exercise's number and that of the criterion or task there; by the project's, and a name in its listing."""
     for path in builtin_rubrics().values():
         exercise = read_rubric(path)

@@ -1,6 +1,9 @@
 """Parameters of checks that are formulas, patterns, types, lists and mappings: read strictly, each with its place."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,7 +34,7 @@ criteria:
 """
 
 
-def read(tmp_path: Path, check: str):
+def read(tmp_path: Path, check: str) -> Any:
     path = tmp_path / "r.yaml"
     path.write_text(RUBRIC.replace("CHECK", check), encoding="utf-8")
     return read_rubric(path).criteria[0].check
@@ -81,7 +84,7 @@ def read(tmp_path: Path, check: str):
         ("silence: {topic: /a, after: stream_stops, of: /b}", Silence("/a", "stream_stops", of="/b")),
     ],
 )
-def test_parameters_of_every_kind_are_read(tmp_path, written, wanted):
+def test_parameters_of_every_kind_are_read(tmp_path: Path, written: str, wanted: Any) -> None:
     """Formulas, factors, rules short and long, cases, edges."""
     assert read(tmp_path, written) == wanted
 
@@ -101,7 +104,7 @@ def test_parameters_of_every_kind_are_read(tmp_path, written, wanted):
         ("qos: {topic: /a, kind: server}", "12:30: "),
     ],
 )
-def test_what_cannot_be_read_is_refused_at_its_place(tmp_path, written, said):
+def test_what_cannot_be_read_is_refused_at_its_place(tmp_path: Path, written: str, said: str) -> None:
     """Line and column, and what should stand there."""
     with pytest.raises(RubricError) as raised:
         read(tmp_path, written)

@@ -1,5 +1,7 @@
 """What reaches for the insides of its process: attacks do, and ordinary programs do not."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest
@@ -71,25 +73,25 @@ ORDINARY = {
 
 
 @pytest.mark.parametrize("text", SUSPICIOUS.values(), ids=SUSPICIOUS)
-def test_what_looks_at_its_process_is_found(text):
+def test_what_looks_at_its_process_is_found(text: str) -> None:
     """Under any name that it was imported as."""
     assert reaching(text) != ()
 
 
 @pytest.mark.parametrize("text", ORDINARY.values(), ids=ORDINARY)
-def test_what_students_write_is_not(text):
+def test_what_students_write_is_not(text: str) -> None:
     """Ordinary programs cost nothing more."""
     assert reaching(text) == ()
 
 
-def test_few_right_programs_are_suspected():
+def test_few_right_programs_are_suspected() -> None:
     """Of the programs with full marks, at most one in twenty is recorded twice."""
     folders = [f for group in ("correct", "threads") for f in (ROOT / "tests/submissions" / group).iterdir()]
     suspected = [f.name for f in folders if f.is_dir() and read_reaches(f)]
     assert len(suspected) <= len(folders) / 20
 
 
-def test_every_file_of_a_submission_counts(tmp_path):
+def test_every_file_of_a_submission_counts(tmp_path: Path) -> None:
     """A helper module is part of the program, and one without source is not looked through."""
     (tmp_path / "node.py").write_text("import helper\n")
     assert read_reaches(tmp_path) == ()

@@ -1,5 +1,7 @@
 """Foreign text becomes one short printable line."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,7 +10,7 @@ from grader.submissions.collected import listed, shown
 
 
 @given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))
-def test_shown_text_is_one_short_printable_line(text, limit):
+def test_shown_text_is_one_short_printable_line(text: str, limit: int) -> None:
     """Whatever goes in, lone surrogates too, the result is printable, encodable and no longer than asked."""
     line = shown(text, limit)
     assert line.isprintable()
@@ -26,12 +28,12 @@ def test_shown_text_is_one_short_printable_line(text, limit):
         ("0123456789" * 3, "0123456789…123456789"),
     ],
 )
-def test_what_is_shown(text, line):
+def test_what_is_shown(text: str, line: str) -> None:
     """Letters of any language stay; control characters and surrogates are spelt out; long text loses its middle."""
     assert shown(text, 20) == line
 
 
 @pytest.mark.parametrize(("names", "phrase"), [(["a"], "a"), (["a", "b"], "a or b"), (["a", "b", "c"], "a, b or c")])
-def test_a_list_reads_as_a_phrase(names, phrase):
+def test_a_list_reads_as_a_phrase(names: list[str], phrase: str) -> None:
     """Names are joined as people write them."""
     assert listed(names) == phrase

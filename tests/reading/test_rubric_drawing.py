@@ -1,9 +1,15 @@
 """What a rubric leaves to the seed besides values: how it is written, and what is said of a mistake in it."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from grader.core.errors import RubricError
-from grader.core.scenario import AnyOrder, Between, CountBetween, InOrder, SomeOf, TimeBetween
+from grader.core.scenario import AnyOrder, Between, CountBetween, InOrder, Scenario, SomeOf, TimeBetween
 from grader.rubrics.loader import read_rubric
 
 MS, S = 1_000_000, 1_000_000_000
@@ -40,10 +46,10 @@ stimuli:
 
 
 @pytest.fixture
-def scenario(tmp_path):
+def scenario(tmp_path: Path) -> Callable[..., Any]:
     """Read the scenario of a rubric with some more lines in it."""
 
-    def read(lines):
+    def read(lines: str) -> Scenario | None:
         folded = "".join(f"    {line}\n" for line in lines.splitlines())
         (tmp_path / "r.yaml").write_text(HEAD + folded + TAIL, encoding="utf-8")
         return read_rubric(tmp_path / "r.yaml").scenarios[0]
@@ -51,7 +57,7 @@ def scenario(tmp_path):
     return read
 
 
-def test_times_are_drawn_between_two(scenario):
+def test_times_are_drawn_between_two(scenario: Callable[..., Any]) -> None:
     """Of the observation, of a process, of a stimulus, and for how long each number is held."""
     found = scenario("""\
 observe: {duration: {between: [19 s, 21.5 s]}}
@@ -70,7 +76,7 @@ stimuli:
     assert server.delay_ns == TimeBetween(10 * MS, 20 * MS)
 
 
-def test_counts_are_drawn_between_two(scenario):
+def test_counts_are_drawn_between_two(scenario: Callable[..., Any]) -> None:
     """Of calls, of repeats, and of answers before a server goes."""
     found = scenario("""\
 observe: {duration: 20 s}
@@ -84,7 +90,7 @@ stimuli:
     assert drawn == (CountBetween(3, 5), CountBetween(1, 2), CountBetween(2, 3))
 
 
-def test_cases_come_in_a_drawn_order(scenario):
+def test_cases_come_in_a_drawn_order(scenario: Callable[..., Any]) -> None:
     """Some of them together, and some of them a drawn number of times."""
     written = "{any_order: [1, {in_order: [{between: [2, 3]}, 4]}, {some_of: [5, 6], count: {between: [0, 2]}}]}"
     (numbers,) = scenario(NUMBERS % f"values: [{written}, 7], hold: 1 s").stimuli
@@ -92,7 +98,7 @@ def test_cases_come_in_a_drawn_order(scenario):
     assert numbers.values == (AnyOrder((1.0, InOrder((Between(2, 3), 4.0)), some)), 7.0)
 
 
-def test_messages_come_in_a_drawn_order_too(scenario):
+def test_messages_come_in_a_drawn_order_too(scenario: Callable[..., Any]) -> None:
     """And requests, and responses; a field may be called as it likes."""
     written = "responses: [{any_order: [{success: true}, {message: x}]}, {success: false}]"
     (server,) = scenario(SERVER % written).stimuli
@@ -131,7 +137,7 @@ CUT = "so that every case comes whatever is drawn, found"
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_place(scenario, lines, message, hint):
+def test_a_mistake_is_named_with_its_place(scenario: Callable[..., Any], lines: str, message: str, hint: str) -> None:
     """Line and column of what is wrong, here behind the bar, and what was likely meant."""
     before = lines.partition("|")[0].split("\n")
     place = f"{HEAD.count(chr(10)) + len(before)}:{5 + len(before[-1])}"
@@ -141,6 +147,6 @@ def test_a_mistake_is_named_with_its_place(scenario, lines, message, hint):
     assert hint in refused.value.hint
 
 
-def test_a_rubric_in_which_nothing_is_open_may_cut_its_stimuli_off(scenario):
+def test_a_rubric_in_which_nothing_is_open_may_cut_its_stimuli_off(scenario: Callable[..., Any]) -> None:
     """As before: what its author wrote down is what happens."""
     assert scenario(NUMBERS % "values: [1, 2, 3], hold: 9 s").span.duration_ns == 20 * S

@@ -1,9 +1,13 @@
 """Rubric files become exercises; every mistake in one is named with its line and column."""
 
+from __future__ import annotations
+
 import os
 import random
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ruamel.yaml import YAML
@@ -12,7 +16,7 @@ from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, T
 from grader.core.errors import RubricError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.scenario import Between, JustAbove, JustBelow, NumberStream, OdometryStream, Scenario, Span
-from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, read_rubric
+from grader.rubrics.loader import MAX_BYTES, MAX_MISTAKES, RubricMistakes, read_rubric
 
 GOOD = """\
 schema: grader/rubric/v1
@@ -65,11 +69,11 @@ criteria:
 
 
 @pytest.fixture
-def rubric(tmp_path, monkeypatch):
+def rubric(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Write a rubric and read it under the short name `r.yaml`."""
     monkeypatch.chdir(tmp_path)
 
-    def read(content, **keywords):
+    def read(content: bytes | str, **keywords: Any) -> Exercise | None:
         path = Path("r.yaml")
         path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass"))
         return read_rubric(path, **{"checks": CHECKS, **keywords})
@@ -77,13 +81,18 @@ def rubric(tmp_path, monkeypatch):
     return read
 
 
-def refused(rubric, content):
+def refused(rubric: Callable[..., Any], content: bytes | str) -> RubricError | RubricMistakes:
     with pytest.raises(RubricError) as caught:
         rubric(content)
     return caught.value
 
 
-def test_a_rubric_becomes_an_exercise(rubric):
+def criterion(*values: Any) -> Criterion:
+    """Return a criterion; the stand-ins are no checks, for they judge nothing."""
+    return Criterion(*values)
+
+
+def test_a_rubric_becomes_an_exercise(rubric: Callable[..., Any]) -> None:
     """Every key arrives in the model, units converted, points exact, defaults kept."""
     exercise = rubric(GOOD)
     numbers = NumberStream(
@@ -107,9 +116,9 @@ def test_a_rubric_becomes_an_exercise(rubric):
             Scenario("both", ("pump.py", "valve.py"), Span(20_000_000_000)),
         ),
         criteria=(
-            Criterion("flows", "Publishes the flow", Fraction(6), "alone", Publishes("/flow", "std_msgs/msg/Float32")),
-            Criterion("rate", "At 5 Hz", Fraction(5, 2), "alone", rate, ("flows",), "a period is one over a rate"),
-            Criterion(
+            criterion("flows", "Publishes the flow", Fraction(6), "alone", Publishes("/flow", "std_msgs/msg/Float32")),
+            criterion("rate", "At 5 Hz", Fraction(5, 2), "alone", rate, ("flows",), "a period is one over a rate"),
+            criterion(
                 "values",
                 "Right values",
                 Fraction(1, 3),
@@ -117,24 +126,24 @@ def test_a_rubric_becomes_an_exercise(rubric):
                 FieldValues("/flow", {"data": 1.0, "a.b": -0.0025}, 0.1),
                 ("flows", "rate"),
             ),
-            Criterion("logs", "Logs", Fraction(1), "both", UsesLogger("valve.py")),
+            criterion("logs", "Logs", Fraction(1), "both", UsesLogger("valve.py")),
         ),
         digest=exercise.digest,
     )
 
 
-def test_the_digest_is_of_the_files_bytes(rubric):
+def test_the_digest_is_of_the_files_bytes(rubric: Callable[..., Any]) -> None:
     """One more blank is another rubric; the name of the file is not part of it."""
     assert rubric(GOOD).digest == rubric(GOOD).digest != rubric(GOOD + "\n").digest
 
 
-def test_line_ends_and_a_byte_order_mark_do_not_matter(rubric):
+def test_line_ends_and_a_byte_order_mark_do_not_matter(rubric: Callable[..., Any]) -> None:
     """A rubric saved on Windows reads the same."""
     crlf = b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode()
     assert rubric(crlf).criteria == rubric(GOOD).criteria
 
 
-def test_an_anchor_saves_typing(rubric):
+def test_an_anchor_saves_typing(rubric: Callable[..., Any]) -> None:
     """A part that is written once may be used twice."""
     text = GOOD.replace("observe: {duration: 2 min,", "observe: &o {duration: 2 min,")
     text = text.replace("observe: {duration: 20 s}", "observe: *o")
@@ -142,11 +151,11 @@ def test_an_anchor_saves_typing(rubric):
     assert scenarios[0].span == scenarios[1].span
 
 
-def with_everything(parameters):
+def with_everything(parameters: str) -> str:
     return GOOD.replace("uses_logger: {process: valve.py}", f"everything: {parameters}")
 
 
-def test_every_kind_of_parameter_can_be_written(rubric):
+def test_every_kind_of_parameter_can_be_written(rubric: Callable[..., Any]) -> None:
     """Text, numbers, flags, choices, pairs, lists, nested values and durations inside them."""
     text = "{word: a, count: 3, flag: true, side: above, pair: [1, b], many: [{x: 1, after: 2 s}, {x: 2}], "
     text += "one: {x: 3}, copy: c, times: [1 s, 2 ms]}"
@@ -156,7 +165,7 @@ def test_every_kind_of_parameter_can_be_written(rubric):
     assert criterion.check == want
 
 
-def test_what_is_left_out_keeps_the_checks_default(rubric):
+def test_what_is_left_out_keeps_the_checks_default(rubric: Callable[..., Any]) -> None:
     """Defaults live in the check alone."""
     (*_, criterion) = rubric(with_everything("{word: a, count: 3, flag: false, side: above, pair: [1, b]}")).criteria
     assert criterion.check == Everything("a", 3, False, "above", (1.0, "b"))
@@ -166,21 +175,21 @@ BAD = YAML(typ="safe", pure=True).load(Path(__file__).with_name("bad_rubrics.yam
 
 
 @pytest.mark.parametrize("bad", BAD, ids=[bad["new"].strip()[:40] for bad in BAD])
-def test_a_mistake_is_named_with_its_place_and_remedy(rubric, bad):
+def test_a_mistake_is_named_with_its_place_and_remedy(rubric: Callable[..., Any], bad: Mapping[str, str]) -> None:
     """`file:line:column: expected, found`, and a hint where one is very likely right."""
     assert bad["old"] in GOOD
     error = refused(rubric, GOOD.replace(bad["old"], bad["new"], 1))
     assert (error.message, error.hint) == (bad["message"], bad["hint"])
 
 
-def test_a_number_of_five_thousand_digits_is_refused(rubric):
+def test_a_number_of_five_thousand_digits_is_refused(rubric: Callable[..., Any]) -> None:
     """Python itself refuses to read such a number; the message is short all the same."""
     error = refused(rubric, GOOD.replace("points: 1\n", "points: " + "9" * 5000 + "\n"))
     assert error.message.startswith("r.yaml:43:13: expected a value of the kind !!int, found `999")
     assert len(error.message) < 200
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(rubric):
+def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(rubric: Callable[..., Any]) -> None:
     """One line each; with several, a hint says which line it is for."""
     text = (
         GOOD.replace("points: 6", "points: x").replace("rate: 5 Hz", "rate: 5").replace("pump, number", "Pump, number")
@@ -194,7 +203,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(rubric):
     assert error.hint == "30:46: write `5 Hz`"
 
 
-def test_a_file_full_of_mistakes_is_cut_short(rubric):
+def test_a_file_full_of_mistakes_is_cut_short(rubric: Callable[..., Any]) -> None:
     """A page of messages helps nobody."""
     text = GOOD + "".join(f"key{number}: 1\n" for number in range(50))
     assert len(refused(rubric, text).message.splitlines()) == MAX_MISTAKES + 1
@@ -217,19 +226,19 @@ def test_a_file_full_of_mistakes_is_cut_short(rubric):
         (b'a: "\\U00110000"', "r.yaml:1:1: not valid YAML"),
     ],
 )
-def test_what_is_no_rubric_at_all_is_one_line(rubric, content, message):
+def test_what_is_no_rubric_at_all_is_one_line(rubric: Callable[..., Any], content: bytes, message: str) -> None:
     """Empty, too large, not UTF-8, not a mapping, endless: one line each."""
     assert refused(rubric, content).message.startswith(message)
 
 
-def test_aliases_that_multiply_are_refused(rubric):
+def test_aliases_that_multiply_are_refused(rubric: Callable[..., Any]) -> None:
     """A small file that stands for a billion values is not unfolded."""
     rows = ["a: &a [x, x, x, x, x, x, x, x, x, x]"]
     rows += [f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]" for a, b in zip("abcdefgh", "bcdefghi", strict=True)]
     assert "found aliases that multiply it" in refused(rubric, "\n".join(rows)).message
 
 
-def test_a_path_that_cannot_be_read_is_one_line(tmp_path, monkeypatch):
+def test_a_path_that_cannot_be_read_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A missing file, a folder, a pipe, a file as a folder, a null character."""
     monkeypatch.chdir(tmp_path)
     Path("folder").mkdir()
@@ -274,7 +283,7 @@ NOISE = (
 )
 
 
-def mutated(random_, text):
+def mutated(random_: random.Random, text: str) -> str:
     """Return a rubric after a few accidents of an editor."""
     lines = text.splitlines(keepends=True)
     for _ in range(random_.randint(1, 3)):
@@ -286,7 +295,7 @@ def mutated(random_, text):
     return "".join(lines)
 
 
-def refusal(rubric, text):
+def refusal(rubric: Callable[..., Any], text: str) -> RubricError | None:
     """Return the error of a rubric, or None if it can be read."""
     try:
         rubric(text)
@@ -295,7 +304,7 @@ def refusal(rubric, text):
     return None
 
 
-def test_no_accident_gives_a_traceback(rubric):
+def test_no_accident_gives_a_traceback(rubric: Callable[..., Any]) -> None:
     """Three hundred damaged rubrics: each is read, or refused with a place."""
     random_ = random.Random(7)
     errors = [error for _ in range(300) if (error := refusal(rubric, mutated(random_, GOOD)))]

@@ -1,6 +1,10 @@
 """The limits of a rubric: what they come to, and what their author is told about a mistake in them."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -8,6 +12,7 @@ from hypothesis import strategies as st
 from stand_in_checks import CHECKS
 
 from grader.core.errors import RubricError
+from grader.core.exercise import Exercise
 from grader.core.limits import Limits
 from grader.core.quantities import KIB, MIB, NS_PER_S, Unit
 from grader.rubrics.loader import read_rubric
@@ -28,18 +33,18 @@ criteria:
 
 
 @pytest.fixture
-def read(tmp_path, monkeypatch):
+def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Read a rubric with some limits, under the short name `r.yaml`."""
     monkeypatch.chdir(tmp_path)
 
-    def read_one(limits):
+    def read_one(limits: str) -> Exercise | None:
         Path("r.yaml").write_text(RUBRIC.format(limits=limits), encoding="utf-8")
         return read_rubric(Path("r.yaml"), checks=CHECKS)
 
     return read_one
 
 
-def test_every_limit_can_be_set_and_holds_for_every_scenario(read):
+def test_every_limit_can_be_set_and_holds_for_every_scenario(read: Callable[..., Any]) -> None:
     """What is written with its unit arrives as the number that counts."""
     exercise = read(
         "{memory: 1 GiB, processor_time: 90 s, processes: 100, output: 2 MiB, lines: 10, open_files: 64, "
@@ -64,7 +69,7 @@ def test_every_limit_can_be_set_and_holds_for_every_scenario(read):
     assert [scenario.limits for scenario in exercise.scenarios] == [wanted, wanted]
 
 
-def test_what_is_not_named_stays_as_usual(read):
+def test_what_is_not_named_stays_as_usual(read: Callable[..., Any]) -> None:
     """A rubric names only what it needs otherwise."""
     (first, _) = read("{messages: 7}").scenarios
     assert first.limits == Limits(messages=7)
@@ -89,7 +94,7 @@ def test_what_is_not_named_stays_as_usual(read):
         ("many", "4:9: expected a mapping (`key: value`), found `many`", ""),
     ],
 )
-def test_a_mistake_is_named_with_its_place(read, limits, message, hint):
+def test_a_mistake_is_named_with_its_place(read: Callable[..., Any], limits: str, message: str, hint: str) -> None:
     """Line, column, what was expected and what was found."""
     with pytest.raises(RubricError) as caught:
         read(limits)
@@ -99,18 +104,18 @@ def test_a_mistake_is_named_with_its_place(read, limits, message, hint):
 
 
 @given(st.integers(min_value=0, max_value=1 << 50))
-def test_sizes_survive_being_written(count):
+def test_sizes_survive_being_written(count: int) -> None:
     """A size is printed as it can be read, with nothing lost."""
     assert parse_quantity(format_quantity(count, BYTES), BYTES) == count
 
 
 @pytest.mark.parametrize(("text", "count"), [("64 KiB", 64 * KIB), ("1.5KiB", 1536), (" 7 B ", 7), ("0 GiB", 0)])
-def test_a_size_is_whole_bytes(text, count):
+def test_a_size_is_whole_bytes(text: str, count: int) -> None:
     """Sizes in every unit become exact integers."""
     assert parse_quantity(text, BYTES) == count
 
 
-def test_a_size_in_no_unit_of_size_is_refused():
+def test_a_size_in_no_unit_of_size_is_refused() -> None:
     """Seconds are no bytes."""
     with pytest.raises(QuantityError, match="a size in GiB, MiB, KiB or B"):
         parse_quantity("10 s", BYTES)

@@ -1,11 +1,25 @@
 """Stimuli and scenarios of rubric files: what can be written, and what is said of a mistake, with its place."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from grader.core.errors import RubricError
-from grader.core.scenario import ActionGoal, Between, Choose, MessageStream, ServiceCalls, ServiceServer, Written
+from grader.core.scenario import (
+    ActionGoal,
+    Between,
+    Choose,
+    MessageStream,
+    Scenario,
+    ServiceCalls,
+    ServiceServer,
+    Written,
+)
 from grader.rubrics.loader import read_rubric
 
 MS, S = 1_000_000, 1_000_000_000
@@ -25,10 +39,10 @@ criteria:
 
 
 @pytest.fixture
-def scenario(tmp_path):
+def scenario(tmp_path: Path) -> Callable[..., Any]:
     """Read the scenario of a rubric with some more lines in it."""
 
-    def read(lines):
+    def read(lines: str) -> Scenario | None:
         path = tmp_path / "r.yaml"
         folded = "".join(f"    {line}\n" for line in lines.splitlines())
         path.write_text(HEAD + folded + TAIL, encoding="utf-8")
@@ -37,7 +51,7 @@ def scenario(tmp_path):
     return read
 
 
-def test_a_server_is_written_with_its_responses(scenario):
+def test_a_server_is_written_with_its_responses(scenario: Callable[..., Any]) -> None:
     """Texts may hold a drawn number; a server without responses never answers."""
     found = scenario("""\
 stimuli:
@@ -55,13 +69,13 @@ stimuli:
   - server: {service: /mute, type: std_srvs/srv/Empty, responses: []}
 """).stimuli
     answer = Written("Battery: {}% remaining", Between(30.0, 90.0), 1)
-    responses = ({"success": True, "message": answer}, {"success": Choose((True, False)), "message": "no"})
-    told = {"start_ns": 3 * S, "stop_ns": 9 * S, "delay_ns": 100 * MS, "cycle": True, "answers": 4}
+    responses: Any = ({"success": True, "message": answer}, {"success": Choose((True, False)), "message": "no"})
+    told: dict[str, Any] = {"start_ns": 3 * S, "stop_ns": 9 * S, "delay_ns": 100 * MS, "cycle": True, "answers": 4}
     assert found[0] == ServiceServer("/battery/get_status", "std_srvs/srv/Trigger", responses, **told)
     assert found[1] == ServiceServer("/mute", "std_srvs/srv/Empty", ())
 
 
-def test_calls_are_written_with_their_requests(scenario):
+def test_calls_are_written_with_their_requests(scenario: Callable[..., Any]) -> None:
     """What is left out: an empty request, one call of one client."""
     found = scenario("""\
 stimuli:
@@ -72,7 +86,7 @@ stimuli:
     assert found[1] == ServiceCalls("/b", "std_srvs/srv/SetBool", ({"data": True},), 5, 3, 2 * S)
 
 
-def test_messages_are_written_with_their_fields(scenario):
+def test_messages_are_written_with_their_fields(scenario: Callable[..., Any]) -> None:
     """Nested, in lists, not a number, and drawn."""
     (found,) = scenario("""\
 stimuli:
@@ -84,14 +98,15 @@ stimuli:
       best_effort: true
 """).stimuli
     assert isinstance(found, MessageStream)
-    first, nan, drawn = found.values[0]["ranges"]
+    values: Any = found.values
+    first, nan, drawn = values[0]["ranges"]
     assert (first, math.isnan(nan), drawn) == (1, True, Between(0.5, 2.0))
     assert type(first) is int
-    assert found.values[0]["header"] == {"frame_id": "base"}
+    assert values[0]["header"] == {"frame_id": "base"}
     assert (found.period_ns, found.repeats, found.best_effort, found.latched) == (S, 2, True, False)
 
 
-def test_parameters_and_transitions_are_calls(scenario):
+def test_parameters_and_transitions_are_calls(scenario: Callable[..., Any]) -> None:
     """Of the services behind them; without a node it is the only one."""
     found = scenario("""\
 stimuli:
@@ -121,7 +136,7 @@ stimuli:
     assert (found[6].service, found[6].type, found[6].start_ns) == ("/car/get_state", "lifecycle_msgs/srv/GetState", S)
 
 
-def test_a_goal_is_written_with_its_fields(scenario):
+def test_a_goal_is_written_with_its_fields(scenario: Callable[..., Any]) -> None:
     """It may be cancelled."""
     (found,) = scenario("""\
 stimuli:
@@ -130,7 +145,7 @@ stimuli:
     assert found == ActionGoal("/count", "test_msgs/action/Fibonacci", {"order": Between(5, 9)}, 0, 2 * S)
 
 
-def test_processes_may_start_late_end_and_be_stopped(scenario):
+def test_processes_may_start_late_end_and_be_stopped(scenario: Callable[..., Any]) -> None:
     """And usually do none of it."""
     usual = scenario("")
     assert (usual.starts_ns, usual.may_exit, usual.shutdown_ns) == ((), (), 0)
@@ -164,7 +179,7 @@ CALLS = "stimuli:\n  - calls: {service: /a, type: std_srvs/srv/Trigger, %s}"
         ("stimuli:\n  - transition: {to: |fly}", "expected `configure`, `activate`, `deactivate`, `cleanup` or"),
     ],
 )
-def test_a_mistake_is_named_with_its_place(scenario, lines, message):
+def test_a_mistake_is_named_with_its_place(scenario: Callable[..., Any], lines: str, message: str) -> None:
     """Line and column of what is wrong, here behind the bar, and what should stand there."""
     before = lines.partition("|")[0].split("\n")
     place = f"{HEAD.count(chr(10)) + len(before)}:{5 + len(before[-1])}"

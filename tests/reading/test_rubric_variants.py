@@ -1,7 +1,11 @@
 """Variants in a rubric: values stand where they are used, places stay right, every value that may come is tried."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -9,7 +13,7 @@ from ruamel.yaml import YAML
 from stand_in_checks import CHECKS
 
 from grader.core.errors import RubricError
-from grader.core.exercise import Drawn, Variant
+from grader.core.exercise import Drawn, Exercise, Variant
 from grader.core.scenario import NumberStream
 from grader.rubrics.loader import read_rubric
 from grader.rubrics.schema import rubric_schema
@@ -50,26 +54,26 @@ class Nth:
 
     student = "ada"
 
-    def __init__(self, index):
+    def __init__(self, index: int) -> None:
         self.index = index
 
-    def value(self, exercise, options):
+    def value(self, exercise: str, options: Options) -> float | str:
         return options.value(self.index % options.count)
 
 
 @pytest.fixture
-def read(tmp_path, monkeypatch):
+def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Read a rubric under the short name `r.yaml`."""
     monkeypatch.chdir(tmp_path)
 
-    def reader(content=RUBRIC, draw=None):
+    def reader(content: str = RUBRIC, draw: Any = None) -> Exercise | None:
         Path("r.yaml").write_text(content, encoding="utf-8")
         return read_rubric(Path("r.yaml"), checks=CHECKS, draw=draw)
 
     return reader
 
 
-def test_a_value_stands_wherever_its_variant_is_named(read):
+def test_a_value_stands_wherever_its_variant_is_named(read: Callable[..., Any]) -> None:
     """In a scenario and in checks, as if it had been written there."""
     exercise = read(draw=Nth(-1))
     assert exercise.variant == Variant("ada", (("rate", "10 Hz"), ("speed", 0.8), ("topic", "/stream")))
@@ -80,7 +84,7 @@ def test_a_value_stands_wherever_its_variant_is_named(read):
     assert (stimulus.topic, stimulus.values) == ("/stream", (0.8, 1.0))
 
 
-def test_it_is_the_rubric_with_the_values_written_out(read):
+def test_it_is_the_rubric_with_the_values_written_out(read: Callable[..., Any]) -> None:
     """But for the digest, which covers file and values."""
     plain = RUBRIC.replace(VARIANTS, "")
     for name, value in (("topic", "/flow"), ("rate", "5 Hz"), ("speed", "0.2")):
@@ -91,7 +95,7 @@ def test_it_is_the_rubric_with_the_values_written_out(read):
     assert read(draw=Nth(1)).digest == read(draw=Nth(1)).digest
 
 
-def test_without_a_student_such_a_rubric_is_refused(read):
+def test_without_a_student_such_a_rubric_is_refused(read: Callable[..., Any]) -> None:
     """The message says what to add."""
     with pytest.raises(RubricError) as refusal:
         read()
@@ -99,7 +103,7 @@ def test_without_a_student_such_a_rubric_is_refused(read):
     assert "--student ID --variant-key FILE" in refusal.value.hint
 
 
-def test_what_was_graded_can_be_judged_without_the_key(read):
+def test_what_was_graded_can_be_judged_without_the_key(read: Callable[..., Any]) -> None:
     """Kept values are taken as they are; one that was not kept is told by name."""
     graded = read(draw=Nth(3))
     kept = {"pump": dict(graded.variant.values)}
@@ -118,12 +122,14 @@ def test_what_was_graded_can_be_judged_without_the_key(read):
         ("{between: [10 Hz, 12 Hz], step: 0.5 Hz}", 5, "10.0 Hz", "12.0 Hz"),
     ],
 )
-def test_values_between_two_are_exact(read, written, count, first, last):
+def test_values_between_two_are_exact(
+    read: Callable[..., Any], written: str, count: int, first: float | str, last: float | str
+) -> None:
     """No step is lost or gained in floating point, and a unit stays."""
     seen = {}
 
     class Spy(First):
-        def value(self, exercise, options: Options):
+        def value(self, exercise: str, options: Options) -> float | str:
             seen[options.name] = [options.value(index) for index in range(options.count)]
             return options.value(0)
 
@@ -157,14 +163,14 @@ def test_values_between_two_are_exact(read, written, count, first, last):
         (VARIANTS, "", "9:26: expected text, found a mapping with `variant`"),
     ],
 )
-def test_a_mistake_is_named_with_its_place(read, old, new, message):
+def test_a_mistake_is_named_with_its_place(read: Callable[..., Any], old: str, new: str, message: str) -> None:
     """Whichever value is drawn: a rubric that only some students could be graded by is none."""
     with pytest.raises(RubricError) as refusal:
         read(RUBRIC.replace(old, new), draw=First())
     assert f"r.yaml:{message}" in refusal.value.message
 
 
-def test_the_schema_admits_variants_where_reading_does():
+def test_the_schema_admits_variants_where_reading_does() -> None:
     """Editors complete and check such rubrics; points never vary."""
     validator = jsonschema.Draft202012Validator(rubric_schema(CHECKS))
     assert list(validator.iter_errors(YAML(typ="safe").load(RUBRIC))) == []

@@ -1,10 +1,14 @@
 """Submissions are copied within limits, and the wanted files are found in them."""
 
+from __future__ import annotations
+
 import os
 import re
 import socket
 import stat
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -18,34 +22,34 @@ WANTED = ("velocity_publisher.py", "odom_subscriber.py", "temperature_sensor.py"
 
 
 @pytest.fixture
-def into(tmp_path):
+def into(tmp_path: Path) -> Path:
     folder = tmp_path / "into"
     folder.mkdir()
     return folder
 
 
 @pytest.fixture
-def work(tmp_path):
+def work(tmp_path: Path) -> Path:
     folder = tmp_path / "alice"
     folder.mkdir()
     return folder
 
 
-def put(folder, relative, content="x = 1\n"):
+def put(folder: Path, relative: str, content: bytes | str = "x = 1\n") -> Path:
     path = folder / relative
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
 
 
-def staged_files(root):
+def staged_files(root: Path) -> list[str]:
     return sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file())
 
 
 @pytest.mark.parametrize(
     "place", ["", "homework/", "a/b/c/", "src/pkg/pkg/", "ros2_ws/src/my_pkg/my_pkg/", "with space/", "-dash/"]
 )
-def test_a_wanted_file_is_found_wherever_it_lies(work, into, place):
+def test_a_wanted_file_is_found_wherever_it_lies(work: Path, into: Path, place: str) -> None:
     """A file at the top, in any subfolder or in a ROS package is found, byte for byte."""
     content = b"\xef\xbb\xbf# \xe9 latin\r\nx = 1\r\n"
     put(work, f"{place}velocity_publisher.py", content)
@@ -59,7 +63,7 @@ def test_a_wanted_file_is_found_wherever_it_lies(work, into, place):
     assert submission.notes == ()
 
 
-def test_of_several_the_one_nearest_the_top_is_taken(work, into):
+def test_of_several_the_one_nearest_the_top_is_taken(work: Path, into: Path) -> None:
     """Depth decides, then the alphabet, and a note names the others."""
     for place in ("z/y/", "old/", "b/", ""):
         put(work, f"{place}fan_controller.py", place)
@@ -91,7 +95,7 @@ def test_of_several_the_one_nearest_the_top_is_taken(work, into):
         "velocity_publisher_node.py",
     ],
 )
-def test_a_misspelt_file_is_named_and_not_taken(work, into, name):
+def test_a_misspelt_file_is_named_and_not_taken(work: Path, into: Path, name: str) -> None:
     """A name that only looks right is similar, never found."""
     put(work, "main.py")
     put(work, f"sub/{name}")
@@ -102,14 +106,14 @@ def test_a_misspelt_file_is_named_and_not_taken(work, into, name):
 @pytest.mark.parametrize(
     "name", ["setup.py", "__init__.py", "main.py", "position_publisher.py", "velocity_publisher.md", "publisher.py"]
 )
-def test_another_file_is_not_taken_for_a_misspelling(work, into, name):
+def test_another_file_is_not_taken_for_a_misspelling(work: Path, into: Path, name: str) -> None:
     """Names that are far, or of another kind of file, are not offered."""
     put(work, "x.py")
     put(work, name)
     assert stage_submission(str(work), WANTED, into).files["velocity_publisher.py"].similar == ()
 
 
-def test_a_file_of_another_exercise_is_no_misspelling(work, into):
+def test_a_file_of_another_exercise_is_no_misspelling(work: Path, into: Path) -> None:
     """`fan_controller2.py` stands beside `fan_controller.py`: neither is offered for the other."""
     put(work, "fan_controller.py")
     put(work, "fan_controller2.py")
@@ -119,7 +123,7 @@ def test_a_file_of_another_exercise_is_no_misspelling(work, into):
     assert files["fan_controllers.py"].similar == ("fan_controller2.py",)
 
 
-def test_the_nearest_misspelling_comes_first(work, into):
+def test_the_nearest_misspelling_comes_first(work: Path, into: Path) -> None:
     """Likeness decides before depth, and at most three are named."""
     for name in (
         "fan_kontrol.py",
@@ -134,7 +138,7 @@ def test_the_nearest_misspelling_comes_first(work, into):
     assert len(similar) == 3
 
 
-def test_one_file_counts_as_a_folder_that_holds_only_it(work, tmp_path, into):
+def test_one_file_counts_as_a_folder_that_holds_only_it(work: Path, tmp_path: Path, into: Path) -> None:
     """A single file is found, and has the digest of a folder with the same content."""
     file = put(work, "odom_subscriber.py", "import rclpy\n")
     single = stage_submission(str(file), WANTED, into)
@@ -147,7 +151,7 @@ def test_one_file_counts_as_a_folder_that_holds_only_it(work, tmp_path, into):
     assert staged_files(into) == ["odom_subscriber.py"]
 
 
-def test_a_misnamed_single_file_is_similar_at_most(work, into):
+def test_a_misnamed_single_file_is_similar_at_most(work: Path, into: Path) -> None:
     """A file given directly is not graded under a name it does not have."""
     file = put(work, "odomsubscriber.py")
     files = stage_submission(str(file), WANTED, into).files
@@ -155,7 +159,7 @@ def test_a_misnamed_single_file_is_similar_at_most(work, into):
     assert files["odom_subscriber.py"].similar == ("odomsubscriber.py",)
 
 
-def test_a_named_link_is_followed(work, tmp_path, into):
+def test_a_named_link_is_followed(work: Path, tmp_path: Path, into: Path) -> None:
     """A link on the command line was chosen by the user: its own name counts."""
     link = tmp_path / "velocity_publisher.py"
     link.symlink_to(put(work, "something_else.py", "y = 2\n"))
@@ -164,10 +168,10 @@ def test_a_named_link_is_followed(work, tmp_path, into):
     assert (into / "velocity_publisher.py").read_text() == "y = 2\n"
 
 
-def test_the_digest_is_of_names_and_contents_only(tmp_path):
+def test_the_digest_is_of_names_and_contents_only(tmp_path: Path) -> None:
     """Place, top name, times and skipped folders do not matter; names, layout and content do."""
 
-    def digest(number, files):
+    def digest(number: int, files: Mapping[str, str]) -> str:
         folder, into = tmp_path / f"s{number}", tmp_path / f"t{number}"
         into.mkdir()
         for name, content in files.items():
@@ -182,7 +186,7 @@ def test_the_digest_is_of_names_and_contents_only(tmp_path):
     assert len({base, *digests}) == 5
 
 
-def test_folders_of_tools_are_left_out(work, into):
+def test_folders_of_tools_are_left_out(work: Path, into: Path) -> None:
     """Version control, caches, environments and build results are not the student's work."""
     put(work, "velocity_publisher.py")
     folders = (".git", "__pycache__", ".venv", "venv", "node_modules", ".hidden", "__MACOSX", "deep/er/.cache")
@@ -201,7 +205,7 @@ def test_folders_of_tools_are_left_out(work, into):
     )
 
 
-def test_links_and_special_files_are_neither_followed_nor_copied(work, tmp_path, into):
+def test_links_and_special_files_are_neither_followed_nor_copied(work: Path, tmp_path: Path, into: Path) -> None:
     """A link to a secret, a link to a folder, a pipe and a socket: notes, no content, no waiting."""
     put(work, "velocity_publisher.py")
     secret = put(tmp_path, "secret.py", "secret")
@@ -226,12 +230,12 @@ def test_links_and_special_files_are_neither_followed_nor_copied(work, tmp_path,
     ]
 
 
-def test_the_students_folder_is_never_written_to(work, into):
+def test_the_students_folder_is_never_written_to(work: Path, into: Path) -> None:
     """Not a byte, not a time stamp, not a mode changes."""
     put(work, "src/p/p/velocity_publisher.py")
     put(work, "helper.py")
 
-    def state():
+    def state() -> list[tuple[str, int, int, int]]:
         return sorted((str(p), p.stat().st_mtime_ns, p.stat().st_mode, p.stat().st_size) for p in work.rglob("*"))
 
     before = state()
@@ -239,7 +243,7 @@ def test_the_students_folder_is_never_written_to(work, into):
     assert state() == before
 
 
-def test_a_staging_folder_inside_the_submission_is_not_staged(work):
+def test_a_staging_folder_inside_the_submission_is_not_staged(work: Path) -> None:
     """`grade .` in the folder of temporary files does not copy the copy."""
     put(work, "velocity_publisher.py")
     into = work / "staging"
@@ -248,7 +252,7 @@ def test_a_staging_folder_inside_the_submission_is_not_staged(work):
     assert staged_files(into) == ["velocity_publisher.py"]
 
 
-def test_the_copy_is_readable_by_every_user(work, into):
+def test_the_copy_is_readable_by_every_user(work: Path, into: Path) -> None:
     """A node runs as another user, whatever the caller's umask and the student's modes are."""
     put(work, "a/b/velocity_publisher.py").chmod(0o600)
     old = os.umask(0o077)
@@ -270,7 +274,9 @@ def test_the_copy_is_readable_by_every_user(work, into):
         ("MAX_TOTAL_BYTES", 1 << 20, ["a.py", "b.py"], "expected at most 1 MiB in all, found more"),
     ],
 )
-def test_a_limit_exceeded_is_one_clear_error(work, into, monkeypatch, limit, value, files, found):
+def test_a_limit_exceeded_is_one_clear_error(
+    work: Path, into: Path, monkeypatch: pytest.MonkeyPatch, limit: str, value: int, files: Sequence[str], found: str
+) -> None:
     """Too many files, entries, levels or bytes: an error with the number."""
     monkeypatch.setattr(staging, limit, value)
     for name in files:
@@ -281,7 +287,7 @@ def test_a_limit_exceeded_is_one_clear_error(work, into, monkeypatch, limit, val
     assert caught.value.hint
 
 
-def test_what_just_fits_is_taken(work, into):
+def test_what_just_fits_is_taken(work: Path, into: Path) -> None:
     """2,000 files, 20 levels and 8 MiB are inside the limits."""
     put(work, "/".join("d" * 20) + "/velocity_publisher.py")
     put(work, "big.bin", b"0" * (8 << 20))
@@ -292,7 +298,7 @@ def test_what_just_fits_is_taken(work, into):
     assert submission.notes == ()
 
 
-def test_a_file_that_is_too_large_is_skipped_with_a_note(work, into):
+def test_a_file_that_is_too_large_is_skipped_with_a_note(work: Path, into: Path) -> None:
     """A recording beside the work costs nothing, not even when it only pretends its size."""
     put(work, "velocity_publisher.py")
     with put(work, "bag.mcap").open("wb") as file:
@@ -303,7 +309,7 @@ def test_a_file_that_is_too_large_is_skipped_with_a_note(work, into):
     assert submission.notes == ("not copied: bag.mcap and over.bin (larger than 8 MiB)",)
 
 
-def test_a_single_file_that_is_too_large_is_an_error(work, into):
+def test_a_single_file_that_is_too_large_is_an_error(work: Path, into: Path) -> None:
     """There is nothing else to grade."""
     file = put(work, "velocity_publisher.py", b"#" * ((8 << 20) + 1))
     with pytest.raises(SubmissionError, match="expected at most 8 MiB, found more"):
@@ -332,7 +338,9 @@ def test_a_single_file_that_is_too_large_is_an_error(work, into):
         ("d/.git/x.py", "d", "d: expected at least one .py file, found none", ""),
     ],
 )
-def test_what_cannot_be_graded_is_one_clear_line(tmp_path, monkeypatch, into, make, typed, message, hint):
+def test_what_cannot_be_graded_is_one_clear_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, into: Path, make: str | None, typed: str, message: str, hint: str
+) -> None:
     """Each wrong path gives one line with the path as typed, and a remedy where there is one."""
     if make:
         put(tmp_path, make)
@@ -344,20 +352,20 @@ def test_what_cannot_be_graded_is_one_clear_line(tmp_path, monkeypatch, into, ma
     assert "\n" not in caught.value.message + caught.value.hint
 
 
-def test_an_empty_folder_is_an_error(work, into):
+def test_an_empty_folder_is_an_error(work: Path, into: Path) -> None:
     """A folder without any file has no .py file either."""
     with pytest.raises(SubmissionError, match="expected at least one \\.py file, found none"):
         stage_submission(str(work), WANTED, into)
 
 
-def test_a_pipe_named_like_a_file_does_not_block(tmp_path, into):
+def test_a_pipe_named_like_a_file_does_not_block(tmp_path: Path, into: Path) -> None:
     """A pipe given directly is refused at once."""
     os.mkfifo(tmp_path / "velocity_publisher.py")
     with pytest.raises(SubmissionError, match="found a device, pipe or socket"):
         stage_submission(str(tmp_path / "velocity_publisher.py"), WANTED, into)
 
 
-def test_a_link_that_leads_to_itself_is_an_error(tmp_path, into):
+def test_a_link_that_leads_to_itself_is_an_error(tmp_path: Path, into: Path) -> None:
     """A loop of links on the command line ends in one line."""
     (tmp_path / "a").symlink_to("b")
     (tmp_path / "b").symlink_to("a")
@@ -366,7 +374,9 @@ def test_a_link_that_leads_to_itself_is_an_error(tmp_path, into):
 
 
 @pytest.mark.parametrize(("typed", "name"), [(".", "alice"), ("./", "alice"), ("..", "alice"), ("../alice", "alice")])
-def test_the_name_is_the_folders_also_for_dots(work, into, monkeypatch, typed, name):
+def test_the_name_is_the_folders_also_for_dots(
+    work: Path, into: Path, monkeypatch: pytest.MonkeyPatch, typed: str, name: str
+) -> None:
     """`grade .` shows the folder's name and keeps the path as typed."""
     put(work, "sub/x.py")
     monkeypatch.chdir(work / "sub" if typed == ".." else work)
@@ -374,7 +384,7 @@ def test_the_name_is_the_folders_also_for_dots(work, into, monkeypatch, typed, n
     assert (submission.name, submission.path) == (name, typed)
 
 
-def test_hostile_names_break_nothing(work, into):
+def test_hostile_names_break_nothing(work: Path, into: Path) -> None:
     """Line breaks, escapes, undecodable bytes and the longest names are copied and shown in one line."""
     names = ["new\nline", "esc\x1b[31m", os.fsdecode(b"byte\xff"), "\u202eevil", "n" * 252, "'quote\"", "[red]", "é"]
     for number, name in enumerate(names):
@@ -394,7 +404,7 @@ def test_hostile_names_break_nothing(work, into):
     assert "\x1b" not in caught.value.message
 
 
-def test_a_path_too_long_to_copy_is_skipped(work, into):
+def test_a_path_too_long_to_copy_is_skipped(work: Path, into: Path) -> None:
     """Twenty folders with names of 200 bytes each: left out with a note, the rest is graded."""
     put(work, "velocity_publisher.py")
     descriptor = os.open(work, os.O_RDONLY)
@@ -410,19 +420,21 @@ def test_a_path_too_long_to_copy_is_skipped(work, into):
     assert [note.endswith("(the path is too long)") for note in submission.notes] == [True]
 
 
-def refuse(monkeypatch, target):
+def refuse(monkeypatch: pytest.MonkeyPatch, target: str) -> None:
     """Make one name unreadable, as the system would for anybody but root."""
     real = os.open
 
-    def opened(path, *arguments, **keywords):
+    def opened(path: Path | str, *arguments: int, **keywords: int) -> int | None:
         if Path(os.fspath(path)).name == target:
             raise PermissionError(13, "Permission denied")
         return real(path, *arguments, **keywords)
 
-    monkeypatch.setattr(staging.os, "open", opened)
+    monkeypatch.setattr(os, "open", opened)
 
 
-def test_an_unreadable_file_or_folder_is_skipped_with_a_note(work, into, monkeypatch):
+def test_an_unreadable_file_or_folder_is_skipped_with_a_note(
+    work: Path, into: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One locked file does not cost the others."""
     put(work, "velocity_publisher.py")
     put(work, "locked.py")
@@ -432,7 +444,9 @@ def test_an_unreadable_file_or_folder_is_skipped_with_a_note(work, into, monkeyp
     assert submission.notes == ("not copied: locked.py (it cannot be read: Permission denied)",)
 
 
-def test_an_unreadable_folder_inside_is_skipped_with_a_note(work, into, monkeypatch):
+def test_an_unreadable_folder_inside_is_skipped_with_a_note(
+    work: Path, into: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One locked folder does not cost the others."""
     put(work, "velocity_publisher.py")
     put(work, "locked/x.py")
@@ -441,7 +455,7 @@ def test_an_unreadable_folder_inside_is_skipped_with_a_note(work, into, monkeypa
     assert submission.notes == ("not copied: locked (the folder cannot be read: Permission denied)",)
 
 
-def test_an_unreadable_submission_is_an_error(work, into, monkeypatch):
+def test_an_unreadable_submission_is_an_error(work: Path, into: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The folder that was named has to be readable."""
     put(work, "velocity_publisher.py")
     refuse(monkeypatch, "alice")
@@ -450,18 +464,18 @@ def test_an_unreadable_submission_is_an_error(work, into, monkeypatch):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
-def test_real_permissions_are_reported(work, into):
+def test_real_permissions_are_reported(work: Any, into: Any) -> None:
     """The same with a real mode, where modes bind."""
     put(work, "velocity_publisher.py")
     put(work, "locked.py").chmod(0)
     assert "Permission denied" in stage_submission(str(work), WANTED, into).notes[0]
 
 
-def test_a_full_disk_is_not_the_students_fault(work, into, monkeypatch):
+def test_a_full_disk_is_not_the_students_fault(work: Path, into: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A copy that cannot be written is our problem."""
     put(work, "velocity_publisher.py")
 
-    def full(self, content):
+    def full(self: Path, content: bytes) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
@@ -471,7 +485,7 @@ def test_a_full_disk_is_not_the_students_fault(work, into, monkeypatch):
 
 @given(st.text(st.characters(exclude_characters="/\0", exclude_categories=()), min_size=1, max_size=60))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-def test_any_name_can_be_asked_for(tmp_path_factory, name):
+def test_any_name_can_be_asked_for(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
     """A file of any name beside the wanted one is copied or left out, and never stops the intake."""
     work, into = tmp_path_factory.mktemp("work"), tmp_path_factory.mktemp("into")
     put(work, "velocity_publisher.py")
@@ -483,14 +497,16 @@ def test_any_name_can_be_asked_for(tmp_path_factory, name):
     assert submission.files["velocity_publisher.py"].found is not None
 
 
-def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(work, tmp_path, into, monkeypatch):
+def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(
+    work: Path, tmp_path: Path, into: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Between listing and reading, nothing can be slipped in from elsewhere."""
     put(work, "velocity_publisher.py")
     put(work, "sub/odom_subscriber.py", "mine")
     secret = put(tmp_path, "secret/odom_subscriber.py", "secret").parent
     real = staging._content
 
-    def exchanged(*arguments):
+    def exchanged(*arguments: Any) -> bytes | None:
         if not (work / "sub").is_symlink():
             (work / "sub").rename(tmp_path / "moved")
             (work / "sub").symlink_to(secret)
@@ -502,7 +518,7 @@ def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(work, tmp_path,
     assert submission.notes == ("not copied: sub/odom_subscriber.py (it cannot be read: Not a directory)",)
 
 
-def test_what_file_managers_leave_is_passed_over(work, into):
+def test_what_file_managers_leave_is_passed_over(work: Path, into: Path) -> None:
     """Their files are nobody's work, and change no digest."""
     put(work, "velocity_publisher.py")
     for name in (".DS_Store", "sub/Thumbs.db", "desktop.ini", "._velocity_publisher.py"):

@@ -1,5 +1,7 @@
 """Quantities with units are read exactly and printed back."""
 
+from __future__ import annotations
+
 import re
 
 import pytest
@@ -28,7 +30,7 @@ HERTZ = Unit("Hz")
         ("0 s", 0),
     ],
 )
-def test_a_duration_is_whole_nanoseconds(text, ns):
+def test_a_duration_is_whole_nanoseconds(text: str, ns: int) -> None:
     """Durations in every unit become exact integers."""
     got = parse_quantity(text, SECONDS)
     assert got == ns
@@ -36,7 +38,7 @@ def test_a_duration_is_whole_nanoseconds(text, ns):
 
 
 @pytest.mark.parametrize(("text", "hz"), [("20 Hz", 20.0), ("0.5 kHz", 500.0), ("0.25Hz", 0.25)])
-def test_a_frequency_is_hertz(text, hz):
+def test_a_frequency_is_hertz(text: str, hz: float) -> None:
     """Frequencies become floats in hertz."""
     got = parse_quantity(text, HERTZ)
     assert got == hz
@@ -63,7 +65,7 @@ def test_a_frequency_is_hertz(text, hz):
         ("9" * 100_000 + " s", SECONDS, "a duration such as `10 s`", ""),
     ],
 )
-def test_what_is_no_quantity_says_what_should_stand_there(text, unit, expected, hint):
+def test_what_is_no_quantity_says_what_should_stand_there(text: str, unit: Unit, expected: str, hint: str) -> None:
     """Missing units, unknown units and anything else are refused with the remedy where one is likely."""
     with pytest.raises(QuantityError) as caught:
         parse_quantity(text, unit)
@@ -83,24 +85,24 @@ def test_what_is_no_quantity_says_what_should_stand_there(text, unit, expected, 
         (1e-9, HERTZ, "0.000000001 Hz"),
     ],
 )
-def test_a_quantity_prints_in_its_largest_whole_unit(value, unit, text):
+def test_a_quantity_prints_in_its_largest_whole_unit(value: float, unit: Unit, text: str) -> None:
     """Durations print without fractions, frequencies without exponents."""
     assert format_quantity(value, unit) == text
 
 
 @given(st.integers(min_value=0, max_value=10**20))
-def test_a_printed_duration_reads_back(t_ns):
+def test_a_printed_duration_reads_back(t_ns: int) -> None:
     """No nanosecond is lost between printing and reading."""
     assert parse_quantity(format_quantity(t_ns, SECONDS), SECONDS) == t_ns
 
 
 @given(st.floats(min_value=0, max_value=1e300))
-def test_a_printed_frequency_reads_back(hz):
+def test_a_printed_frequency_reads_back(hz: float) -> None:
     """No bit of a frequency is lost between printing and reading."""
     assert parse_quantity(format_quantity(hz, HERTZ), HERTZ) == hz
 
 
-def is_readable(text, unit):
+def is_readable(text: str, unit: Unit) -> bool:
     try:
         return parse_quantity(text, unit) >= 0
     except QuantityError as error:
@@ -108,13 +110,13 @@ def is_readable(text, unit):
 
 
 @given(st.text(max_size=20))
-def test_any_text_is_read_or_refused(text):
+def test_any_text_is_read_or_refused(text: str) -> None:
     """Whatever is written, the answer is a quantity or a QuantityError."""
     assert is_readable(text, SECONDS) in (True, False)
     assert is_readable(text, HERTZ) in (True, False)
 
 
 @pytest.mark.parametrize("text", ["10 s", "0.5 s", ".5ms", "+1 min", "3 h", "10", "10 sec", "-1 s", "s", "5 Hz"])
-def test_the_editors_pattern_agrees_with_the_reader(text):
+def test_the_editors_pattern_agrees_with_the_reader(text: str) -> None:
     """An editor marks what the reader would refuse, and nothing else."""
     assert (re.search(quantity_pattern(SECONDS), text) is not None) == is_readable(text, SECONDS)

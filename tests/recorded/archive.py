@@ -6,8 +6,11 @@ import io
 import tarfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
 
 from grader.app.evidence_writer import request_of
 from grader.app.reproducing import command_words
@@ -43,7 +46,7 @@ class Recorded:
     traces: Mapping[str, bytes]
 
 
-@lru_cache(maxsize=1)
+@cache
 def read_archive(path: Path = ARCHIVE) -> dict[str, Recorded]:
     """Return what was recorded, by folder."""
     files: dict[str, dict[str, bytes]] = {}
@@ -72,7 +75,7 @@ def recorded_in(folder: Path) -> Recorded:
 def write_archive(recorded: Mapping[str, Recorded], path: Path = ARCHIVE) -> None:
     """Write what was recorded; the same recordings give the same bytes, and like ones are packed side by side."""
     with tarfile.open(path, "w:xz", preset=9, format=tarfile.PAX_FORMAT) as archive:
-        members = [
+        members: list[tuple[tuple[str, ...], str, str, bytes]] = [
             (name.partition(".")[::-1], folder, f"{name}{TRACE_ENDING}", data)
             for folder, one in recorded.items()
             for name, data in one.traces.items()
@@ -85,7 +88,23 @@ def write_archive(recorded: Mapping[str, Recorded], path: Path = ARCHIVE) -> Non
             archive.addfile(member, io.BytesIO(data))
 
 
-@lru_cache(maxsize=1)
+@cache
+def expected() -> dict[str, Any]:
+    """Return what each submission is graded for, and the outcome of every criterion that it does not meet."""
+    return _table("expected.yaml")
+
+
+@cache
+def golden() -> dict[str, Any]:
+    """Return the reasons, hints and places that students read, by folder."""
+    return _table("golden.yaml")
+
+
+def _table(name: str) -> dict[str, Any]:
+    return dict(YAML(typ="safe").load((SUBMISSIONS / name).read_text(encoding="utf-8")))
+
+
+@cache
 def builtin_exercises() -> dict[str, Exercise]:
     """Return the exercises of the built-in rubrics by id."""
     return {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}

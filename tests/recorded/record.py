@@ -14,12 +14,23 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
-from archive import ARCHIVE, SEED, SUBMISSIONS, Recorded, judged, read_archive, recorded_in, told, write_archive
+from archive import (
+    ARCHIVE,
+    SEED,
+    SUBMISSIONS,
+    Recorded,
+    expected,
+    judged,
+    read_archive,
+    recorded_in,
+    told,
+    write_archive,
+)
 from ruamel.yaml import YAML
 
 from grader.reporting.json_report import dumps
 
-EXPECTED, GOLDEN = SUBMISSIONS / "expected.yaml", SUBMISSIONS / "golden.yaml"
+GOLDEN = SUBMISSIONS / "golden.yaml"
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 
@@ -38,20 +49,20 @@ def main() -> None:
     parser.add_argument("prefixes", nargs="*", metavar="PREFIX")
     parser.add_argument("--judge", action="store_true")
     arguments = parser.parse_args()
-    expected = YAML(typ="safe").load(EXPECTED.read_text(encoding="utf-8"))
+    wanted = expected()
     before = read_archive() if ARCHIVE.exists() else {}
     if arguments.judge:
         made = {folder: replace(one, report=dumps(judged(one)).encode()) for folder, one in before.items()}
     else:
-        folders = [folder for folder in expected if folder.startswith(tuple(arguments.prefixes) or ("",))]
-        made = {folder: one for folder, one in before.items() if folder in expected}
+        folders = [folder for folder in wanted if folder.startswith(tuple(arguments.prefixes) or ("",))]
+        made = {folder: one for folder, one in before.items() if folder in wanted}
         with ThreadPoolExecutor(2) as pool:
-            futures = {pool.submit(graded, folder, expected[folder]["graded"]): folder for folder in folders}
+            futures = {pool.submit(graded, folder, wanted[folder]["graded"]): folder for folder in folders}
             for number, future in enumerate(as_completed(futures), 1):
                 made[futures[future]] = future.result()
                 print(f"{number}/{len(folders)} {futures[future]}", flush=True)
-    write_archive({folder: made[folder] for folder in expected if folder in made})
-    texts = {folder: told(judged(made[folder])) for folder in expected if folder in made}
+    write_archive({folder: made[folder] for folder in wanted if folder in made})
+    texts = {folder: told(judged(made[folder])) for folder in wanted if folder in made}
     yaml = YAML()
     yaml.width = 1000
     with GOLDEN.open("w", encoding="utf-8") as out:

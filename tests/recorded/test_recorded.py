@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from archive import SUBMISSIONS, judged, outcomes, outdated, read_archive, told, write_archive
-from ruamel.yaml import YAML
+from archive import expected, golden, judged, outcomes, outdated, read_archive, told, write_archive
 
 from grader.reporting.json_report import dumps
 
-EXPECTED = YAML(typ="safe").load((SUBMISSIONS / "expected.yaml").read_text(encoding="utf-8"))
-GOLDEN = YAML(typ="safe").load((SUBMISSIONS / "golden.yaml").read_text(encoding="utf-8"))
 AGAIN = "python tests/recorded/record.py"
 
 
-def test_every_submission_is_recorded():
+def test_every_submission_is_recorded() -> None:
     """A new folder is recorded before it can be compared with anything."""
-    missing = set(EXPECTED) - set(read_archive())
+    missing = set(expected()) - set(read_archive())
     assert not missing, f"{AGAIN} {' '.join(sorted(missing))}"
-    assert set(read_archive()) == set(EXPECTED)
+    assert set(read_archive()) == set(expected())
 
 
-@pytest.mark.parametrize("folder", EXPECTED)
-def test_a_recording_is_judged_as_ever(folder):
+@pytest.mark.parametrize("folder", expected())
+def test_a_recording_is_judged_as_ever(folder: str) -> None:
     """The outcome of every criterion, what the student reads, and the whole report."""
     recorded = read_archive()[folder]
     assert not outdated(recorded), f"{AGAIN} {folder}"
     report = judged(recorded)
-    assert outcomes(report) == EXPECTED[folder]["expected"]
-    assert told(report) == GOLDEN.get(folder, {})
+    assert outcomes(report) == expected()[folder]["expected"]
+    assert told(report) == golden().get(folder, {})
     assert dumps(report) == recorded.report.decode(), f"if the new report is the better one: {AGAIN} --judge"
 
 
-def test_the_archive_is_written_as_it_was_read(tmp_path):
+def test_the_archive_is_written_as_it_was_read(tmp_path: Path) -> None:
     """The same recordings, the same bytes."""
     some = {folder: one for folder, one in read_archive().items() if folder.startswith("broken/")}
     for name in ("one", "two"):

@@ -1,14 +1,18 @@
 """Reports of a made-up class: what students of this chapter get wrong, in shares as a course has them."""
 
+from __future__ import annotations
+
 import random
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 from report_samples import exercise as sample
 from report_samples import report
 
-from grader.core.exercise import Location, Outcome
-from grader.core.report import ReportedFault, Verdict
+from grader.core.exercise import Criterion, Exercise, Location, Outcome
+from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
@@ -73,17 +77,17 @@ EXERCISES = [read_rubric(builtin_rubrics()[id_]) for id_ in CHAPTER]
 WORDS = ("timer_callback", "tick", "publish_velocity", "on_timer", "cb", "step")
 
 
-def drawn_report(number, name):
+def drawn_report(number: int, name: str) -> Report:
     """Return the report of student `number`, always the same one; every 40th has something undecided."""
     draw = random.Random(number)
     return report(*(_exercise(exercise, draw, number) for exercise in EXERCISES), name=name, path=name, seed=number)
 
 
-def _exercise(exercise, draw, number):
-    verdicts = []
-    missing = draw.random() < 0.06
+def _exercise(exercise: Exercise, draw: random.Random, number: int) -> ExerciseReport:
+    verdicts: list[Verdict] = []
+    missing = exercise.files[-1] if draw.random() < 0.06 else ""
     for criterion in exercise.criteria:
-        verdicts.append(_verdict(criterion, {v.id: v for v in verdicts}, draw, missing and exercise.files[-1]))
+        verdicts.append(_verdict(criterion, {v.id: v for v in verdicts}, draw, missing))
     if number % 40 == 17 and exercise.number == "2":
         lost = "the machine did not keep up, three times: the reference timer slipped by 0.4 s"
         verdicts[-1] = Verdict(verdicts[-1].id, verdicts[-1].title, Outcome.UNDECIDED, Fraction(0), Fraction(8), lost)
@@ -91,7 +95,7 @@ def _exercise(exercise, draw, number):
     return sample(exercise.id, exercise.number, exercise.title, *verdicts, faults=tuple(faults))
 
 
-def _verdict(criterion, before, draw, missing):
+def _verdict(criterion: Criterion, before: Mapping[str, Verdict], draw: random.Random, missing: str) -> Verdict:
     points = Fraction(criterion.points)
     if missing and not before:
         reason, hint = f"{missing}: not in the submission", f"hand in a file named {missing}"
@@ -122,7 +126,9 @@ def _verdict(criterion, before, draw, missing):
     return Verdict(criterion.id, criterion.title, Outcome.MET, points, points, f"{criterion.title}, as asked")
 
 
-def _lost(criterion, reason, hint, evidence, *, partly=False):
+def _lost(
+    criterion: Criterion, reason: str, hint: str, evidence: Mapping[str, Any], *, partly: bool = False
+) -> Verdict:
     points = Fraction(criterion.points)
     outcome, score = (Outcome.PARTLY, points / 2) if partly else (Outcome.NOT_MET, Fraction(0))
     place = Location("a.py", 7)
@@ -131,6 +137,6 @@ def _lost(criterion, reason, hint, evidence, *, partly=False):
     )
 
 
-def _fault(verdict):
+def _fault(verdict: Verdict) -> ReportedFault:
     file, line, text = verdict.reason.split(":", 2)
     return ReportedFault("exception", file, int(line), text.strip(), 1_250_000_000, "waiting_then_driving", ())

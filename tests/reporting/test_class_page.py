@@ -1,12 +1,16 @@
 """The page of a class: what it says, read back by a parser; hostile text stays text and no link leads out."""
 
+from __future__ import annotations
+
 import base64
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from html.parser import HTMLParser
+from typing import Any
 from urllib.parse import unquote
 
 import class_reports
@@ -33,13 +37,18 @@ VOID = {"meta", "link", "img", "br", "input"}
 class Parsed(HTMLParser):
     """What a parser finds in a page."""
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.tags, self.attributes, self.open, self.texts, self.raw, self.rows = Counter(), [], [], [], {}, []
+        self.tags: Counter[str] = Counter()
+        self.attributes: list[Any] = []
+        self.open: list[Any] = []
+        self.texts: list[Any] = []
+        self.raw: dict[Any, Any] = {}
+        self.rows: list[Any] = []
         self.feed(text)
         self.close()
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
         self.tags[tag] += 1
         self.attributes += [(tag, name, value) for name, value in attrs]
         if tag == "tr":
@@ -49,10 +58,10 @@ class Parsed(HTMLParser):
         if tag not in VOID:
             self.open.append((tag, dict(attrs)))
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, tag: str) -> None:
         assert self.open.pop()[0] == tag
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         tag, attrs = self.open[-1] if self.open else ("", {})
         if tag == "script":
             self.raw[attrs.get("id", attrs.get("src", "code"))] = data
@@ -61,12 +70,12 @@ class Parsed(HTMLParser):
             if self.rows and any(name in ("td", "th") for name, _ in self.open):
                 self.rows[-1][-1] += data
 
-    def links(self):
+    def links(self) -> list[str]:
         """Return every address that a link leads to."""
         return [value for tag, name, value in self.attributes if (tag, name) == ("a", "href")]
 
 
-def student(number=1, name="Ada", **changes):
+def student(number: int = 1, name: str = "Ada", **changes: Any) -> Student:
     """Return a student with a drawn report."""
     report = report_to_json(class_reports.drawn_report(number, name))
     score, most = (Fraction(str(report[key])) for key in ("score", "max_score"))
@@ -74,19 +83,19 @@ def student(number=1, name="Ada", **changes):
     return replace(given, **changes)
 
 
-def page(*students, **changes):
+def page(*students: Student, **changes: Any) -> ClassPage:
     """Return the page of a class."""
     return replace(ClassPage("homework", RunFacts("took 1:00"), students), **changes)
 
 
-def parsed(*students, **changes):
+def parsed(*students: Student, **changes: Any) -> tuple[Parsed, dict[str, Any]]:
     """Return the page as a parser reads it, and the data in it."""
     found = Parsed(render_class(page(*students, **changes)))
     assert found.open == []
     return found, json.loads(found.raw["class"])
 
 
-def test_everybody_is_in_the_table_with_all_scores():
+def test_everybody_is_in_the_table_with_all_scores() -> None:
     """Raw, what was decided, final, and the points of each exercise; also without a script."""
     late = student(2, "Bob", raw=Fraction(80), final=Fraction(60), adjustments=("2 days late: \u221220 points",))
     found, _ = parsed(student(1), late)
@@ -95,7 +104,7 @@ def test_everybody_is_in_the_table_with_all_scores():
     assert len(row) == 9
 
 
-def test_a_score_that_was_set_does_not_hide_the_raw_one():
+def test_a_score_that_was_set_does_not_hide_the_raw_one() -> None:
     """Both are in the row, with the reason."""
     found, _ = parsed(
         student(raw=Fraction(10), final=Fraction(80), adjustments=("set to 80: the lab machine was down",))
@@ -105,7 +114,7 @@ def test_a_score_that_was_set_does_not_hide_the_raw_one():
     assert row[3:5] == ["set to 80: the lab machine was down", "80"]
 
 
-def test_the_data_is_what_the_table_sorts_by():
+def test_the_data_is_what_the_table_sorts_by() -> None:
     """A row for a row; one letter for the outcome of each criterion."""
     _, data = parsed(student(1), student(2, "Bob", final=None, report=None, raw=None, max_score=None, folder=""))
     ada, bob = data["students"]
@@ -116,7 +125,7 @@ def test_the_data_is_what_the_table_sorts_by():
     assert sum(ada["exercises"]) == ada["raw"]
 
 
-def test_each_criterion_has_its_counts():
+def test_each_criterion_has_its_counts() -> None:
     """Outcomes of a criterion add up to the submissions that count."""
     students = [student(k, f"s{k}") for k in range(30)]
     found, _ = parsed(*students, student(31, "ignored", counts=False))
@@ -126,13 +135,13 @@ def test_each_criterion_has_its_counts():
     assert numbers[2] == sum(
         c["outcome"] == "not_met"
         for s in students
-        for e in s.report["exercises"]
+        for e in (s.report or {})["exercises"]
         for c in e["criteria"]
         if c["id"] == "log_period"
     )
 
 
-def test_causes_are_those_of_who_counts():
+def test_causes_are_those_of_who_counts() -> None:
     """With an index into the students for each."""
     students = [student(k, f"s{k}") for k in range(60)]
     _, data = parsed(*students)
@@ -141,7 +150,7 @@ def test_causes_are_those_of_who_counts():
     assert fewer["causes"] == []
 
 
-def test_scores_are_distributed_as_graded_and_in_the_end():
+def test_scores_are_distributed_as_graded_and_in_the_end() -> None:
     """A score at an edge belongs to the part above; more than everything is everything."""
     made = [("a", 0, 0), ("b", 10, 5), ("c", 99, 100), ("d", 100, 120), ("e", 50, None)]
     students = [
@@ -155,14 +164,15 @@ def test_scores_are_distributed_as_graded_and_in_the_end():
     assert spread.changed
 
 
-def test_scores_that_are_not_final_are_no_scores():
+def test_scores_that_are_not_final_are_no_scores() -> None:
     """What is undecided is not counted as lost."""
     open_ = student(17, final=None)
+    assert open_.report is not None
     assert open_.report["final"] is False
     assert sum(b.raw for b in distribution([open_]).bins) == 0
 
 
-def test_a_class_without_reports_has_a_page():
+def test_a_class_without_reports_has_a_page() -> None:
     """Also one of nobody at all."""
     for students in ((), (Student("", "Zoë", status="nothing handed in"),)):
         found, data = parsed(*students)
@@ -172,7 +182,7 @@ def test_a_class_without_reports_has_a_page():
 
 
 @pytest.mark.parametrize("text", HOSTILE)
-def test_hostile_text_stays_text(text):
+def test_hostile_text_stays_text(text: str) -> None:
     """Wherever somebody else chose the words: names, remarks, decisions, reasons, titles, lists, links, facts."""
     report = report_to_json(class_reports.drawn_report(3, text))
     for exercise in report["exercises"]:
@@ -216,26 +226,26 @@ def test_hostile_text_stays_text(text):
         ("a\0b", ""),
     ],
 )
-def test_links_are_encoded_and_stay_in_the_folder(folder, link):
+def test_links_are_encoded_and_stay_in_the_folder(folder: str, link: str) -> None:
     """A name that would lead elsewhere has no link."""
     assert result_link(folder, "report.html") == link
     assert not link or unquote(link) == f"students/{folder}/report.html"
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "../x", "a//b", "", "https://x.example/", "a/../../b"])
-def test_other_pages_lie_in_the_folder(path):
+def test_other_pages_lie_in_the_folder(path: str) -> None:
     """Whoever adds a page to the class cannot lead out of it."""
     assert page_link(PageLink("t", path)) == ""
 
 
-def test_other_pages_are_linked_with_a_note():
+def test_other_pages_are_linked_with_a_note() -> None:
     """For instance how many pairs of similar submissions there are."""
     found, _ = parsed(student(), links=(PageLink("Similar submissions", "similarity/index.html", "3 pairs"),))
     assert "similarity/index.html" in found.links()
     assert "Similar submissions (3 pairs)" in "".join(found.texts)
 
 
-def test_the_page_stands_alone_or_shares_its_scripts():
+def test_the_page_stands_alone_or_shares_its_scripts() -> None:
     """The policy allows just these scripts, and nothing from a network."""
     alone = Parsed(render_class(page(student())))
     shared = Parsed(render_class(page(student()), assets="assets"))
@@ -249,7 +259,7 @@ def test_the_page_stands_alone_or_shares_its_scripts():
         assert (f"'sha256-{digest}'" in policies[0]) is data.startswith((b"/*", b"//"))
 
 
-def test_the_table_is_a_table_for_whoever_listens():
+def test_the_table_is_a_table_for_whoever_listens() -> None:
     """Headings with a scope, a caption, an order that is said, and a name for each control."""
     found, _ = parsed(student())
     scopes = [v for t, n, v in found.attributes if (t, n) == ("th", "scope")]
@@ -261,7 +271,7 @@ def test_the_table_is_a_table_for_whoever_listens():
     assert found.tags["label"] == found.tags["select"] + 3
 
 
-def test_only_the_header_block_differs_between_runs():
+def test_only_the_header_block_differs_between_runs() -> None:
     """The same results give the same page."""
     students = [student(k, f"s{k}") for k in range(20)]
     one, other = (render_class(page(*students, run=RunFacts(line, (("jobs", line),), (line,)))) for line in ("1", "2"))

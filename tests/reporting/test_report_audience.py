@@ -1,5 +1,7 @@
 """What a rubric withholds from students is in no format that they read."""
 
+from __future__ import annotations
+
 import base64
 import json
 from dataclasses import replace
@@ -9,7 +11,7 @@ from report_samples import criterion, endpoint, exercise, hostile, report
 
 from grader.core.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
 from grader.core.exercise import Audience, Feedback, Location, Outcome, Shows
-from grader.core.report import ReportedFault, Reproduction
+from grader.core.report import Report, ReportedFault, Reproduction
 from grader.core.trace import ClockKind, GraphSnapshot
 from grader.reporting.audience import Readers, for_student, told, withholds
 from grader.reporting.formats import FORMATS, Layout, rendered
@@ -22,18 +24,18 @@ STUDENT, INSTRUCTOR = Readers(Audience.STUDENT, BEFORE), Readers(Audience.INSTRU
 NUMBER, SECRET = "7357", "hushhush"
 
 
-def chart(id_, *criteria):
+def chart(id_: str, *criteria: str) -> Chart:
     points = ((0.0, 7357.0),)
     panel = Panel(f"{SECRET} panel", "Hz", (Series(f"{SECRET} series", points, texts=(SECRET,)),))
     return Chart(f"x-{id_}", f"{SECRET} chart", f"{SECRET} {NUMBER}", criteria, "time", "s", (panel,))
 
 
-def fault(scenario, line):
+def fault(scenario: str, line: int) -> ReportedFault:
     text = f"ValueError: {NUMBER}" if scenario == "numbers" else f"ValueError: {SECRET} {NUMBER}"
     return ReportedFault("exception", "pump.py", line, text, 7_357_000_000, scenario, ("pump.py:9 in tick",))
 
 
-def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
+def sample(shown: Shows = Shows.NOTHING, until: str = BEFORE, clock: ClockKind = ClockKind.WALL) -> Report:
     """Return a report with an open criterion, one without numbers, one of `shown`, and one that needs it."""
     graph = GraphSnapshot(0, (f"/{SECRET}", "/b"), (endpoint("publisher", f"/{SECRET}_{NUMBER}", f"/{SECRET}"),))
     words = f"/flow: average rate: {NUMBER}.25 Hz, expected {NUMBER} ± 1 Hz over 0.0 to {NUMBER} s"
@@ -90,14 +92,14 @@ def sample(shown=Shows.NOTHING, until=BEFORE, clock=ClockKind.WALL):
 
 
 @pytest.fixture(autouse=True)
-def classroom(monkeypatch):
+def classroom(monkeypatch: pytest.MonkeyPatch) -> None:
     """Classroom 50's variables, which its format needs."""
     values = dict.fromkeys(VARIABLES.values(), "x") | {"SUBMISSION_TAG": "submit/1", "ASSIGNMENT_TYPE": "group"}
     for name, value in {**values, COMMIT_DATETIME: "2026-01-31T10:00:00Z"}.items():
         monkeypatch.setenv(name, value)
 
 
-def visible(name, text):
+def visible(name: str, text: str) -> str:
     """Return what a student sees of a rendered report."""
     if name == "classroom":
         return base64.b64decode(text).decode()
@@ -113,7 +115,7 @@ def visible(name, text):
 
 @pytest.mark.parametrize("shown", [Shows.OUTCOME, Shows.NOTHING])
 @pytest.mark.parametrize("name", FORMATS)
-def test_nothing_withheld_is_in_any_format(name, shown):
+def test_nothing_withheld_is_in_any_format(name: str, shown: Shows) -> None:
     """Neither words nor numbers: not in evidence, pictures, source, graph, faults, notes, or what repeats the run."""
     text = visible(name, rendered(name, sample(shown), LAYOUT, STUDENT))
     assert SECRET not in text
@@ -122,7 +124,7 @@ def test_nothing_withheld_is_in_any_format(name, shown):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_an_instructor_sees_everything(name):
+def test_an_instructor_sees_everything(name: str) -> None:
     """The very same report, if asked for in every format."""
     text = rendered(name, sample(), LAYOUT, INSTRUCTOR)
     assert text == FORMATS[name](sample(), LAYOUT)
@@ -130,26 +132,26 @@ def test_an_instructor_sees_everything(name):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_after_the_date_students_see_everything(name):
+def test_after_the_date_students_see_everything(name: str) -> None:
     """The day after, a report for students is the whole one."""
     after = Readers(Audience.STUDENT, AFTER)
     assert rendered(name, sample(), LAYOUT, after) == FORMATS[name](sample(), LAYOUT)
 
 
-def test_without_a_word_formats_for_platforms_are_for_students():
+def test_without_a_word_formats_for_platforms_are_for_students() -> None:
     """Whoever runs the command reads the others."""
     found = {name: SECRET in visible(name, rendered(name, sample(), LAYOUT, Readers(None, BEFORE))) for name in FORMATS}
     assert [name for name, there in found.items() if there] == ["json", "text", "html", "markdown", "junit"]
 
 
-def test_a_report_of_an_open_rubric_is_left_as_it_is():
+def test_a_report_of_an_open_rubric_is_left_as_it_is() -> None:
     """Not even copied, so that nothing can differ."""
     whole = hostile()
     assert for_student(whole, BEFORE) is whole
     assert not withholds(whole, BEFORE)
 
 
-def test_a_criterion_that_is_not_shown_counts_in_no_sum():
+def test_a_criterion_that_is_not_shown_counts_in_no_sum() -> None:
     """Else its outcome could be had by subtraction; how many points it has is no secret."""
     whole, seen = sample(), for_student(sample(), BEFORE)
     assert (whole.max_score, seen.max_score) == (40, 20)
@@ -160,7 +162,7 @@ def test_a_criterion_that_is_not_shown_counts_in_no_sum():
 
 
 @pytest.mark.parametrize("shown", [Shows.ALL, Shows.WITHOUT_NUMBERS])
-def test_a_criterion_that_is_not_shown_has_no_name_in_another(shown):
+def test_a_criterion_that_is_not_shown_has_no_name_in_another(shown: Shows) -> None:
     """Neither where it explains a cause, nor where it names a file that both miss; the file may be named."""
     same = {"hint": f"this has the same cause as {SECRET}: mend that first", "same_cause_as": SECRET}
     missing = {"reason": "not judged: needs a.py, which is missing", "blocked_by": SECRET, "missing_file": "a.py"}
@@ -181,7 +183,7 @@ def test_a_criterion_that_is_not_shown_has_no_name_in_another(shown):
     assert seen[1].reason == missing["reason"]
 
 
-def test_an_outcome_alone_has_its_points():
+def test_an_outcome_alone_has_its_points() -> None:
     """What is withheld is why."""
     seen = for_student(sample(Shows.OUTCOME), BEFORE)
     closed = seen.exercises[0].verdicts[2]
@@ -190,7 +192,7 @@ def test_an_outcome_alone_has_its_points():
     assert seen.max_score == 40
 
 
-def test_a_reason_without_numbers_still_says_what_is_wrong():
+def test_a_reason_without_numbers_still_says_what_is_wrong() -> None:
     """Words stand for numbers, hints with numbers go; the place in the student's own file stays."""
     numbers = for_student(sample(), BEFORE).exercises[0].verdicts[1]
     assert numbers.reason == "/flow: average rate: a rate, expected a rate over a time"
@@ -198,7 +200,7 @@ def test_a_reason_without_numbers_still_says_what_is_wrong():
     assert (numbers.location, numbers.evidence) == (Location("pump.py", 17), {})
 
 
-def test_faults_are_shown_as_openly_as_what_is_judged_on_their_scenario():
+def test_faults_are_shown_as_openly_as_what_is_judged_on_their_scenario() -> None:
     """A program may tell in a fault whatever it was told there."""
     free = replace(fault("free", 8), text="ValueError: 12")
     whole = sample()
@@ -210,7 +212,7 @@ def test_faults_are_shown_as_openly_as_what_is_judged_on_their_scenario():
     ]
 
 
-def test_pictures_stay_where_nothing_of_their_scenario_is_withheld():
+def test_pictures_stay_where_nothing_of_their_scenario_is_withheld() -> None:
     """A chart of an open criterion on a scenario of its own shows nothing else."""
     own = chart("open", "open")
     whole = sample()
@@ -218,7 +220,7 @@ def test_pictures_stay_where_nothing_of_their_scenario_is_withheld():
     assert for_student(whole, BEFORE).exercises[0].figures == (own,)
 
 
-def test_an_exercise_of_which_nothing_is_shown_is_gone():
+def test_an_exercise_of_which_nothing_is_shown_is_gone() -> None:
     """A note says so; the report can still be written in every format."""
     whole = sample()
     closed = dict.fromkeys([v.id for v in whole.exercises[0].verdicts], Feedback(Shows.NOTHING))
@@ -234,7 +236,7 @@ def test_an_exercise_of_which_nothing_is_shown_is_gone():
     ("until", "visibility"),
     [("", "hidden"), ("2026-12-01", "hidden"), ("due_date", "after_due_date"), ("published", "after_published")],
 )
-def test_gradescope_hides_in_its_own_way(until, visibility):
+def test_gradescope_hides_in_its_own_way(until: str, visibility: str) -> None:
     """A test that it shows later is whole; one that it never shows has no reason; the score counts all."""
     data = json.loads(rendered("gradescope", sample(until=until), LAYOUT, STUDENT))
     hidden = [test for test in data["tests"] if test["visibility"] != "visible"]
@@ -244,7 +246,7 @@ def test_gradescope_hides_in_its_own_way(until, visibility):
     assert [test["number"] for test in data["tests"]] == ["1.1", "1.2", "1.3", "1.4"]
 
 
-def test_an_exit_code_tells_students_no_more_than_their_report():
+def test_an_exit_code_tells_students_no_more_than_their_report() -> None:
     """With --audience student what is told besides is of the same report."""
     whole = sample()
     assert told(whole, Readers(None, BEFORE)) is whole

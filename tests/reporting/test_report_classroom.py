@@ -1,8 +1,12 @@
 """The retired GitHub Classroom's result: both totals of its reporter are the score."""
 
+from __future__ import annotations
+
 import base64
 import json
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -10,30 +14,31 @@ from hypothesis import strategies as st
 from report_samples import SAMPLES, exercise, hostile, middling, perfect, report, undecided
 
 from grader.core.exercise import Outcome
-from grader.core.report import Verdict
+from grader.core.report import Report, Verdict
 from grader.reporting.platforms.classroom import MOST_ROWS, render_classroom
 
 
-def result(sample):
+def result(sample: Report) -> dict[str, Any]:
     text = render_classroom(sample)
     assert text.endswith("\n")
     assert len(text.splitlines()) == 1  # a step output is one line
-    return json.loads(base64.b64decode(text.rstrip("\n"), validate=True))
+    found: dict[str, Any] = json.loads(base64.b64decode(text.rstrip("\n"), validate=True))
+    return found
 
 
-def console_total(found):
+def console_total(found: Mapping[str, Any]) -> float:
     """Return what the reporter prints at the end of the log: the share of rows that passed, of the maximum."""
     passed = sum(test["status"] == "pass" for test in found["tests"])
-    return passed / len(found["tests"]) * found["max_score"]
+    return float(passed / len(found["tests"]) * found["max_score"])
 
 
-def annotation_total(found):
+def annotation_total(found: Mapping[str, Any]) -> float:
     """Return what the reporter annotates: the sum of the rows."""
-    return sum(test["score"] for test in found["tests"])
+    return float(sum(test["score"] for test in found["tests"]))
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_both_totals_are_the_score(name):
+def test_both_totals_are_the_score(name: str) -> None:
     """Rows of unequal worth would make them differ."""
     sample = SAMPLES[name]()
     found = result(sample)
@@ -43,7 +48,7 @@ def test_both_totals_are_the_score(name):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_rows_have_every_key_that_the_reporter_reads(name):
+def test_rows_have_every_key_that_the_reporter_reads(name: str) -> None:
     """A missing one crashes it, or is sent to the service as nothing."""
     found = result(SAMPLES[name]())
     assert found["version"] == 1
@@ -58,7 +63,7 @@ SHARES = st.fractions(min_value=0, max_value=1, max_denominator=12)
 
 
 @given(st.lists(st.tuples(st.integers(1, 40), SHARES), min_size=1, max_size=12))
-def test_both_totals_agree_for_any_scores(rows):
+def test_both_totals_agree_for_any_scores(rows: Sequence[tuple[int, Fraction]]) -> None:
     """Thirds, halves and whole points mixed; where rows would be too many, both are the rounded score."""
     verdicts = [
         Verdict(f"c{n}", "C", Outcome.MET if share == 1 else Outcome.PARTLY, top * share, Fraction(top), "x")
@@ -71,7 +76,7 @@ def test_both_totals_agree_for_any_scores(rows):
     assert (found["status"] == "pass") == (annotation_total(found) == found["max_score"])
 
 
-def test_the_status_tells_a_lost_point_from_a_fault_of_ours():
+def test_the_status_tells_a_lost_point_from_a_fault_of_ours() -> None:
     """Only what is undecided is an error."""
     assert result(perfect())["status"] == "pass"
     assert result(middling())["status"] == "fail"
@@ -82,21 +87,21 @@ def test_the_status_tells_a_lost_point_from_a_fault_of_ours():
     }
 
 
-def test_a_reason_is_told_once():
+def test_a_reason_is_told_once() -> None:
     """A lost criterion of ten points is ten rows, and explained at the first."""
     rows = [t for t in result(middling())["tests"] if "20 Hz" in t["name"]]
     assert [bool(row["test_code"]) for row in rows] == [True] + [False] * 9
     assert "hint: the argument of create_timer" in rows[0]["test_code"]
 
 
-def test_rows_are_as_coarse_as_the_scores_allow():
+def test_rows_are_as_coarse_as_the_scores_allow() -> None:
     """Points in steps of five need one row for five."""
     verdicts = [Verdict("a", "A", Outcome.MET, Fraction(10), Fraction(10), "x")]
     verdicts.append(Verdict("b", "B", Outcome.PARTLY, Fraction(5), Fraction(15), "x"))
     assert [t["score"] for t in result(report(exercise("e", "1", "E", *verdicts)))["tests"]] == [5, 5, 5, 0, 0]
 
 
-def test_scores_in_tiny_steps_are_rounded():
+def test_scores_in_tiny_steps_are_rounded() -> None:
     """Nobody reads ten thousand rows; the exact score stands beside them."""
     odd = Verdict("a", "A", Outcome.PARTLY, Fraction(1000, 997), Fraction(30), "x")
     found = result(report(exercise("e", "1", "E", odd)))
@@ -105,7 +110,7 @@ def test_scores_in_tiny_steps_are_rounded():
     assert found["exact_score"] == 1.003009
 
 
-def test_nothing_that_is_printed_is_a_command_to_the_runner():
+def test_nothing_that_is_printed_is_a_command_to_the_runner() -> None:
     """The reporter prints names, messages and code as they are."""
     attack = "::error::x\n  ::stop-commands::y\n##[error]z"
     verdict = Verdict("a", attack, Outcome.NOT_MET, Fraction(0), Fraction(2), attack, hint=attack)

@@ -1,5 +1,7 @@
 """A checkup is shown to people and to programs, with what mends each lack."""
 
+from __future__ import annotations
+
 import json
 import unicodedata
 
@@ -35,11 +37,11 @@ NO_ROS = Checkup((Fact("ROS 2", "none", fits=False, remedy="install it"),), None
 NO_DDS = Checkup((), Exchange("bubblewrap", 10, 3, 9.0), (HOLDS,), "bubblewrap", "", Limits())
 
 
-def text(checkup, width=100):
+def text(checkup: Checkup, width: int = 100) -> str:
     return render_checkup(checkup, width=width, colour=False)
 
 
-def test_a_machine_that_is_safe_is_called_so():
+def test_a_machine_that_is_safe_is_called_so() -> None:
     """First the verdict and the sandbox; then every tier with each property, and what gives it in the used one."""
     shown = text(GOOD)
     assert shown.startswith("grading is safe here, in the sandbox bubblewrap\n")
@@ -60,13 +62,13 @@ def test_a_machine_that_is_safe_is_called_so():
         (NO_DDS, "  DDS exchange: 3 of 10 messages of a trial node arrived\n", ""),
     ],
 )
-def test_what_is_missing_comes_first_with_its_remedy(checkup, problem, remedy):
+def test_what_is_missing_comes_first_with_its_remedy(checkup: Checkup, problem: str, remedy: str) -> None:
     """Whoever reads only the first lines knows what to do."""
     assert not checkup.safe
     assert text(checkup).startswith(f"grading is NOT SAFE here\n{problem}{remedy}\n")
 
 
-def test_an_exchange_that_could_not_be_tried_says_why():
+def test_an_exchange_that_could_not_be_tried_says_why() -> None:
     """A problem is told, also if by then every message had come."""
     checkup = Checkup((), Exchange("none", 10, 10, 1.0, "the node\nraised"), (HOLDS,), "bubblewrap", "", Limits())
     assert not checkup.safe
@@ -76,12 +78,12 @@ def test_an_exchange_that_could_not_be_tried_says_why():
 
 @pytest.mark.parametrize("width", [1, 60, 80, 120])
 @pytest.mark.parametrize("checkup", [GOOD, NONE_HOLDS, NO_ROS, NO_DDS])
-def test_every_width_is_kept(checkup, width):
+def test_every_width_is_kept(checkup: Checkup, width: int) -> None:
     """No line is longer than the page, which has at least 60 columns."""
     assert max(map(len, text(checkup, width).splitlines())) <= max(width, 60)
 
 
-def test_colour_changes_no_word():
+def test_colour_changes_no_word() -> None:
     """Without its sequences the coloured page is the plain one."""
     coloured = render_checkup(GOOD, width=80, colour=True)
     assert "\x1b[" in coloured
@@ -89,7 +91,7 @@ def test_colour_changes_no_word():
     assert plain == text(GOOD, 80)
 
 
-def test_nothing_that_a_machine_says_steers_a_terminal():
+def test_nothing_that_a_machine_says_steers_a_terminal() -> None:
     """Names of paths and what programs print are shown, not obeyed."""
     evil = "\x1b[2J\u202e\nx"
     tiers = (TierReport("landlock", "C", usable=False, why=evil, properties=HOLDS.properties[:1], remedy=evil),)
@@ -98,7 +100,7 @@ def test_nothing_that_a_machine_says_steers_a_terminal():
         assert not [c for c in shown if c != "\n" and unicodedata.category(c) in {"Cc", "Cf"}]
 
 
-def test_programs_read_the_same():
+def test_programs_read_the_same() -> None:
     """The JSON holds the verdict, the problems with their remedies, each tier with each property, and the limits."""
     data = json.loads(checkup_to_json(GOOD))
     assert (data["schema"], data["safe"], data["used"], data["problems"]) == (

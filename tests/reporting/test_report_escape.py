@@ -1,5 +1,7 @@
 """Escaping: nothing that a student wrote can steer a terminal."""
 
+from __future__ import annotations
+
 import unicodedata
 
 import pytest
@@ -28,13 +30,13 @@ ANYTHING = st.text(alphabet=st.characters(), max_size=200)  # surrogates include
         ("[bold]x[/]", "[bold]x[/]"),
     ],
 )
-def test_what_is_shown(text, expected):
+def test_what_is_shown(text: str, expected: str) -> None:
     """Controls are named, letters of every language stay, spaces are plain."""
     assert shown(text) == expected
 
 
 @given(ANYTHING)
-def test_shown_text_is_one_line_of_printable_characters(text):
+def test_shown_text_is_one_line_of_printable_characters(text: str) -> None:
     """Whatever comes in, nothing that a terminal obeys comes out, and it can be encoded."""
     out = shown(text)
     out.encode("utf-8")
@@ -43,13 +45,13 @@ def test_shown_text_is_one_line_of_printable_characters(text):
 
 
 @given(ANYTHING)
-def test_showing_twice_changes_nothing(text):
+def test_showing_twice_changes_nothing(text: str) -> None:
     """A text that passed one room unharmed passes the next."""
     assert shown(shown(text)) == shown(text)
 
 
 @given(ANYTHING, st.integers(min_value=1, max_value=60))
-def test_a_text_is_cut_only_if_it_is_too_long(text, limit):
+def test_a_text_is_cut_only_if_it_is_too_long(text: str, limit: int) -> None:
     """Nothing is lost below the limit, and a cut is visible."""
     whole, cut = shown(text, limit=10_000), shown(text, limit=limit)
     assert len(cut) <= limit
@@ -60,13 +62,13 @@ def test_a_text_is_cut_only_if_it_is_too_long(text, limit):
         assert whole.startswith(cut[: -len(ELLIPSIS)])
 
 
-def test_a_huge_text_is_cut():
+def test_a_huge_text_is_cut() -> None:
     """A line of megabytes costs no more than a long one."""
     assert len(shown("x" * 10_000_000)) == LIMIT
 
 
 @given(ANYTHING)
-def test_valid_unicode_replaces_surrogates_only(text):
+def test_valid_unicode_replaces_surrogates_only(text: str) -> None:
     """The length stays, and only what cannot be encoded changes."""
     out = valid_unicode(text)
     out.encode("utf-8")
@@ -74,7 +76,7 @@ def test_valid_unicode_replaces_surrogates_only(text):
     assert all(a == b or ("\ud800" <= a <= "\udfff" and b == "\ufffd") for a, b in zip(text, out, strict=True))
 
 
-def test_a_poor_encoding_gets_plain_signs():
+def test_a_poor_encoding_gets_plain_signs() -> None:
     """On an ASCII terminal the numbers and arrows can still be read."""
     assert encoded("20 ± 1 Hz ──/t──▶ 25 °C é", "ascii") == b"20 +/- 1 Hz --/t--> 25 deg C ?"
     assert encoded("20 ± 1", "utf-8") == "20 ± 1".encode()

@@ -1,5 +1,7 @@
 """Escaping for each target: what a student writes is text, and only text, to the program that reads the report."""
 
+from __future__ import annotations
+
 import csv
 import html
 import io
@@ -7,9 +9,11 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from enum import Enum
 from fractions import Fraction
 from html.parser import HTMLParser
+from typing import Any
 
 import cmarkgfm
 import pytest
@@ -47,35 +51,36 @@ ANYTHING = st.text(alphabet=st.characters(), max_size=60) | SIGNS | PIECES
 class Page(HTMLParser):
     """The tags and the text of a piece of HTML, as a browser sees them."""
 
-    def __init__(self, source):
+    def __init__(self, source: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.tags, self.pieces = [], []
+        self.tags: list[str] = []
+        self.pieces: list[str] = []
         self.feed(source)
         self.close()
         self.text = "".join(self.pieces)
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: Sequence[Any]) -> None:
         self.tags.append(tag)
 
-    def handle_comment(self, data):
+    def handle_comment(self, data: Any) -> None:
         self.tags.append("comment")
 
-    def handle_decl(self, decl):
+    def handle_decl(self, decl: Any) -> None:
         self.tags.append("declaration")
 
-    def handle_pi(self, data):
+    def handle_pi(self, data: Any) -> None:
         self.tags.append("instruction")
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         self.pieces.append(data)
 
 
-def rendered(source):
+def rendered(source: str) -> Page:
     """Return what GitHub's own Markdown makes of a text, before it is cleaned."""
     return Page(cmarkgfm.github_flavored_markdown_to_html(source, options=Options.CMARK_OPT_UNSAFE))
 
 
-def plain(text):
+def plain(text: str) -> str:
     """Return text without the invisible space, and with single spaces."""
     return " ".join(text.replace("\u200b", "").split())
 
@@ -99,7 +104,7 @@ PLACES = {
 @example(text="===")
 @example(text="\\|")
 @example(text="http://a.b www.a.b a@b.cd mailto:a@b.cd xmpp:a@b.cd ftp://a.b")
-def test_markdown_shows_just_the_text(place, text):
+def test_markdown_shows_just_the_text(place: str, text: str) -> None:
     """In each place: the tags of the place and no other, and the text of the student letter for letter."""
     tags = PLACES[place]
     if not plain(shown(text)):  # an empty heading or item may lose its paragraph
@@ -117,7 +122,7 @@ def test_markdown_shows_just_the_text(place, text):
 @example(text="a\\|b")
 @example(text="a\\\\|`` ` `")
 @example(text=" `")
-def test_a_code_span_shows_just_the_text(place, text):
+def test_a_code_span_shows_just_the_text(place: str, text: str) -> None:
     """One code element, in cells of tables too, and spaces at the edges stay."""
     code = markdown_code(text, in_cell="|" in place)
     if not code:
@@ -131,7 +136,7 @@ def test_a_code_span_shows_just_the_text(place, text):
 
 
 @pytest.mark.parametrize("text", ["@ada", "see @ada", "#12", "ada/x#12", "GH-12", ":boom:"])
-def test_nothing_is_mentioned_or_referred_to(text):
+def test_nothing_is_mentioned_or_referred_to(text: str) -> None:
     """GitHub looks for these in the finished text: an invisible space stands in between."""
     seen = rendered(markdown(text)).text
     assert plain(seen) == text
@@ -143,7 +148,7 @@ def test_nothing_is_mentioned_or_referred_to(text):
 @example("```\n````\n~~~")
 @example("")
 @example("    x\n\tx")
-def test_a_code_block_ends_where_it_should(text):
+def test_a_code_block_ends_where_it_should(text: str) -> None:
     """All lines are inside, and what follows is outside."""
     page = rendered(f"before\n\n{markdown_block(text)}\n\nafter")
     assert page.tags == ["p", "pre", "code", "p"]
@@ -151,27 +156,27 @@ def test_a_code_block_ends_where_it_should(text):
 
 
 @given(ANYTHING)
-def test_shown_lines_keeps_line_breaks_and_nothing_else(text):
+def test_shown_lines_keeps_line_breaks_and_nothing_else(text: str) -> None:
     """Line by line the same as one line shown."""
     lines = shown_lines(text).split("\n")
     assert lines == [shown(line.expandtabs(4)) for line in text.replace("\r\n", "\n").split("\n")]
 
 
 @given(ANYTHING, st.integers(min_value=1, max_value=30))
-def test_shown_lines_are_cut_visibly(text, limit):
+def test_shown_lines_are_cut_visibly(text: str, limit: int) -> None:
     """Never longer than the limit; whole, or with an ellipsis."""
     whole, cut = shown_lines(text, limit=10_000), shown_lines(text, limit=limit)
     assert len(cut) <= limit
     assert cut == whole if len(whole) <= limit and len(text) <= limit else cut.endswith(ELLIPSIS) or cut == whole
 
 
-def test_shown_lines_of_a_huge_text_cost_little():
+def test_shown_lines_of_a_huge_text_cost_little() -> None:
     """A million empty lines are as harmless as one long one."""
     assert len(shown_lines("\n" * 5_000_000)) <= 20_000
     assert len(shown_lines("\x1b" * 5_000_000)) <= 20_000
 
 
-def parsed_command(line):
+def parsed_command(line: str) -> tuple[str, dict[str, str], str]:
     """Read a workflow command as the runner does: command, properties, message."""
     assert line.startswith("::")
     assert "\n" not in line
@@ -180,7 +185,7 @@ def parsed_command(line):
     command, _, properties = head.partition(" ")
     pairs = dict(part.split("=", 1) for part in properties.split(",") if part)
 
-    def unescaped(text, signs):
+    def unescaped(text: str, signs: str) -> str:
         for sign in signs:
             text = text.replace(f"%{ord(sign):02X}", sign)
         return text
@@ -190,7 +195,7 @@ def parsed_command(line):
 
 @given(ANYTHING, ANYTHING)
 @example("a,line=1::x", "%0A%250A")
-def test_workflow_commands_carry_text_unharmed(title, message):
+def test_workflow_commands_carry_text_unharmed(title: str, message: str) -> None:
     """The runner reads back one command, its properties and its message, whatever they hold."""
     line = f"::error file=x.py,title={workflow_property(title)}::{workflow_message(message)}"
     assert parsed_command(line) == ("error", {"file": "x.py", "title": shown(title)}, shown_lines(message))
@@ -198,7 +203,7 @@ def test_workflow_commands_carry_text_unharmed(title, message):
 
 @given(ANYTHING)
 @example("  ::error::x\n##[add-mask]e\n###[debug]x\n\t:::")
-def test_no_line_of_a_log_is_a_command(text):
+def test_no_line_of_a_log_is_a_command(text: str) -> None:
     """Neither in the runner's present form nor in the old one, which it takes anywhere in a line."""
     lines = log_lines(text)
     assert not [line for line in lines.split("\n") if line.lstrip().startswith("::") or "##[" in line]
@@ -206,7 +211,7 @@ def test_no_line_of_a_log_is_a_command(text):
 
 
 @given(ANYTHING)
-def test_xml_holds_the_text(text):
+def test_xml_holds_the_text(text: str) -> None:
     """A parser of XML 1.0 gives back what was put in, as an attribute and as content."""
     element = ET.Element("a", b=xml_text(text))
     element.text = xml_text(text)
@@ -215,7 +220,7 @@ def test_xml_holds_the_text(text):
 
 
 @given(ANYTHING)
-def test_html_holds_the_text(text):
+def test_html_holds_the_text(text: str) -> None:
     """A parser of HTML finds no tag, neither in content nor out of an attribute."""
     source = html_text(text)
     page = Page(f"<p title=\"{source}\">{source}</p><i class='{source}'></i>")
@@ -233,7 +238,7 @@ JSON = st.recursive(
 @given(JSON)
 @example("</script><!--\u2028")
 @example({"a": [math.nan, -math.inf, 10**400]})
-def test_json_in_a_page_cannot_end_its_script(value):
+def test_json_in_a_page_cannot_end_its_script(value: Any) -> None:
     """It can be encoded, parsed strictly, and holds nothing of HTML."""
     text = script_json(value)
     text.encode("utf-8")
@@ -241,7 +246,7 @@ def test_json_in_a_page_cannot_end_its_script(value):
     assert json.loads(text, parse_constant=pytest.fail) == json_value(value)
 
 
-def test_json_values():
+def test_json_values() -> None:
     """What JSON cannot say becomes something that it can."""
 
     class Colour(Enum):
@@ -258,7 +263,7 @@ def test_json_values():
 @pytest.mark.parametrize(
     "text", ["=1+1", "+1", "-2+3", "@SUM(A1)", " =1", "\t=1", "\u3000=1", "\uff1d1", "\uff0b1", "=cmd|' /C calc'!A0"]
 )
-def test_a_formula_becomes_text(text):
+def test_a_formula_becomes_text(text: str) -> None:
     """Spreadsheets compute what begins like this, unless an apostrophe stands before it."""
     assert csv_cell(text) == f"'{shown(text)}"
 
@@ -266,7 +271,7 @@ def test_a_formula_becomes_text(text):
 @given(ANYTHING)
 @example("\r=1")
 @example("\n=1")
-def test_a_cell_of_csv_is_one_cell(text):
+def test_a_cell_of_csv_is_one_cell(text: str) -> None:
     """A reader finds the same cell again; it begins like no formula and holds no line break."""
     file = io.StringIO()
     csv.writer(file).writerow([csv_cell(text), "next"])
@@ -277,7 +282,7 @@ def test_a_cell_of_csv_is_one_cell(text):
 
 
 @given(ANYTHING)
-def test_a_label_of_mermaid_stays_a_label(text):
+def test_a_label_of_mermaid_stays_a_label(text: str) -> None:
     """No quote, bracket or line break is left, and the numbers stand for the text."""
     label = mermaid_label(text)
     assert not re.search(r'["`<>&\[\](){}|;:\\%\n]', re.sub(r"#\d+;", "", label))

@@ -3,14 +3,18 @@
 `UPDATE_GOLDEN=1 pytest tests/reporting` writes the golden files anew; read the difference before committing it.
 """
 
+from __future__ import annotations
+
 import base64
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from report_samples import HANDED_IN, SAMPLES, hostile, middling, partial, perfect, undecided
 
+from grader.core.report import Report
 from grader.reporting.formats import FORMATS, Layout
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
@@ -24,7 +28,7 @@ from grader.reporting.platforms.prairielearn import render_prairielearn
 from grader.reporting.text import render_text
 
 GOLDEN = Path(__file__).parent / "golden"
-RENDERERS = {
+RENDERERS: dict[str, Callable[[Report], str]] = {
     "text": lambda report: render_text(report, width=100, colour=False),
     "json": dumps,
     "html": lambda report: render_html(report, assets="."),
@@ -43,7 +47,7 @@ RUN_LINES = {"text": 1, "html": 1, "json": 2, "markdown": 1, "junit": 1, "grades
 
 @pytest.mark.parametrize("name", ENDINGS)
 @pytest.mark.parametrize("sample", ["crashed", "middling", "perfect", "undecided", "hostile"])
-def test_the_output_is_the_golden_one(name, sample):
+def test_the_output_is_the_golden_one(name: str, sample: str) -> None:
     """What people and platforms see changes only on purpose."""
     path = GOLDEN / f"{sample}.{ENDINGS[name]}"
     text = RENDERERS[name](SAMPLES[sample]())
@@ -53,13 +57,13 @@ def test_the_output_is_the_golden_one(name, sample):
 
 
 @pytest.mark.parametrize("name", RENDERERS)
-def test_the_same_trace_gives_the_same_bytes(name):
+def test_the_same_trace_gives_the_same_bytes(name: str) -> None:
     """No date, host name or random word is in any format."""
     assert RENDERERS[name](hostile()) == RENDERERS[name](hostile())
 
 
 @pytest.mark.parametrize("name", RENDERERS)
-def test_only_the_header_differs_between_two_runs(name):
+def test_only_the_header_differs_between_two_runs(name: str) -> None:
     """Path and duration stand in one place; formats that need neither are the same from the first byte to the last."""
     one = RENDERERS[name](middling()).splitlines()
     other = RENDERERS[name](replace(middling(), path="./elsewhere", duration_s=7.0)).splitlines()
@@ -69,7 +73,7 @@ def test_only_the_header_differs_between_two_runs(name):
 
 @pytest.mark.parametrize("name", RENDERERS)
 @pytest.mark.parametrize("sample", SAMPLES)
-def test_every_report_says_what_gives_it_again(name, sample):
+def test_every_report_says_what_gives_it_again(name: str, sample: str) -> None:
     """The command, the seed, the rubric and the versions."""
     text = RENDERERS[name](SAMPLES[sample]())
     for word in ("--seed 4711", "sha256:000000000000", "7.1.6", "0.1.0", "jazzy"):
@@ -77,14 +81,14 @@ def test_every_report_says_what_gives_it_again(name, sample):
 
 
 @pytest.mark.parametrize("name", RENDERERS)
-def test_a_run_without_walls_says_so(name):
+def test_a_run_without_walls_says_so(name: str) -> None:
     """No platform passes it over in silence."""
     assert "no walls" in RENDERERS[name](undecided()) or '"isolation": "none"' in RENDERERS[name](undecided())
     assert "no walls" not in RENDERERS[name](perfect())
 
 
 @pytest.mark.parametrize("name", sorted(set(RENDERERS) - {"json"}))
-def test_a_partial_report_says_so_in_every_format_for_people(name):
+def test_a_partial_report_says_so_in_every_format_for_people(name: str) -> None:
     """Nobody takes it for the whole."""
     assert "This report is partial" in RENDERERS[name](partial())
     assert "partial" not in RENDERERS[name](undecided())
@@ -92,7 +96,7 @@ def test_a_partial_report_says_so_in_every_format_for_people(name):
 
 @pytest.mark.parametrize("name", RENDERERS)
 @pytest.mark.parametrize("sample", SAMPLES)
-def test_nothing_steers_a_terminal_and_all_can_be_encoded(name, sample):
+def test_nothing_steers_a_terminal_and_all_can_be_encoded(name: str, sample: str) -> None:
     """No control character, direction override or lone surrogate comes through."""
     text = RENDERERS[name](SAMPLES[sample]())
     text.encode("utf-8")
@@ -100,7 +104,7 @@ def test_nothing_steers_a_terminal_and_all_can_be_encoded(name, sample):
 
 
 @pytest.mark.parametrize("name", sorted(set(FORMATS) & set(RENDERERS) - {"classroom50"}))
-def test_the_table_of_formats_names_the_right_renderer(name, monkeypatch):
+def test_the_table_of_formats_names_the_right_renderer(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the command line writes is what the tests look at."""
     monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
     sample = replace(middling(), path="/nowhere/at/all.zip")

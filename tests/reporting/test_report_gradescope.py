@@ -1,10 +1,15 @@
 """Gradescope's results.json: the keys and values that the platform takes."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
 from report_samples import SAMPLES, middling, partial, undecided
 
+from grader.core.report import Report
 from grader.reporting.platforms.gradescope import render_gradescope
 
 TOP = {
@@ -34,11 +39,12 @@ FORMATS = {"text", "html", "simple_format", "md", "ansi"}
 VISIBILITIES = {"hidden", "after_due_date", "after_published", "visible"}
 
 
-def result(sample):
-    return json.loads(render_gradescope(sample), parse_constant=pytest.fail)
+def result(sample: Report) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(render_gradescope(sample), parse_constant=pytest.fail)
+    return found
 
 
-def check(part, keys):
+def check(part: Mapping[str, Any], keys: Mapping[str, Any]) -> None:
     assert set(part) == set(keys)
     assert all(isinstance(part[key], kind) and not isinstance(part[key], bool) for key, kind in keys.items())
     assert part["output_format"] in FORMATS
@@ -46,7 +52,7 @@ def check(part, keys):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name):
+def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name: str) -> None:
     """Scores are numbers, and the rows add up to the whole."""
     whole = result(SAMPLES[name]())
     check(whole, TOP)
@@ -58,14 +64,14 @@ def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name):
     assert whole["score"] == pytest.approx(sum(test["score"] for test in whole["tests"]))
 
 
-def test_texts_are_plain():
+def test_texts_are_plain() -> None:
     """What a student wrote is never markup to the platform."""
     whole = result(SAMPLES["hostile"]())
     formats = {test[key] for test in whole["tests"] for key in ("name_format", "output_format")}
     assert formats | {whole["output_format"]} == {"text"}
 
 
-def test_rows_are_numbered_like_the_exercises_and_say_why():
+def test_rows_are_numbered_like_the_exercises_and_say_why() -> None:
     """Exercise 1, criterion 2."""
     rate = result(middling())["tests"][1]
     assert (rate["number"], rate["name"], rate["status"]) == ("1.2", "Publishes at 20 Hz (rate)", "failed")
@@ -74,7 +80,7 @@ def test_rows_are_numbered_like_the_exercises_and_say_why():
     assert rate["tags"] == ["not_met"]
 
 
-def test_what_is_not_final_is_said_before_anything_else():
+def test_what_is_not_final_is_said_before_anything_else() -> None:
     """The platform has no word for it, so the output has."""
     assert result(undecided())["output"].splitlines()[1].startswith("This score is not final")
     whole = result(partial())

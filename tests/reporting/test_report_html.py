@@ -1,12 +1,16 @@
 """The HTML page: what it shows first, that hostile text stays text, and that nothing is loaded from anywhere."""
 
+from __future__ import annotations
+
 import base64
 import hashlib
 import json
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
+from typing import Any
 
 import pytest
 from report_samples import (
@@ -43,28 +47,32 @@ VOID = {"meta", "link", "img", "br", "hr", "input"}
 class Page(HTMLParser):
     """What a parser finds in a page."""
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.tags, self.attributes, self.open, self.texts, self.raw = Counter(), [], [], [], {}
+        self.tags: Counter[str] = Counter()
+        self.attributes: list[Any] = []
+        self.open: list[Any] = []
+        self.texts: list[Any] = []
+        self.raw: dict[Any, Any] = {}
         self.feed(text)
         self.close()
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
         self.tags[tag] += 1
         self.attributes += [(tag, name, value) for name, value in attrs]
         if tag not in VOID:
             self.open.append((tag, dict(attrs)))
 
-    def handle_startendtag(self, tag, attrs):
+    def handle_startendtag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
         self.tags[tag] += 1
         self.attributes += [(tag, name, value) for name, value in attrs]
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, tag: str) -> None:
         assert self.open, f"</{tag}> closes nothing"
         assert self.open[-1][0] == tag, f"</{tag}> closes <{self.open[-1][0]}>"
         self.open.pop()
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         tag = self.open[-1] if self.open else ("", {})
         if tag[0] in ("script", "style"):
             self.raw[tag[1].get("id", tag[0])] = self.raw.get(tag[1].get("id", tag[0]), "") + data
@@ -72,11 +80,11 @@ class Page(HTMLParser):
             self.texts.append(data)
 
     @property
-    def text(self):
+    def text(self) -> str:
         return " ".join(" ".join(self.texts).split())
 
 
-def pictured(text="fine"):
+def pictured(text: str = "fine") -> Report:
     """Return a report whose every text, those of its figures included, is the one given."""
     chart = Chart(
         "velocity_publisher-1",
@@ -108,13 +116,13 @@ def pictured(text="fine"):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_every_element_is_closed_where_it_belongs(name):
+def test_every_element_is_closed_where_it_belongs(name: str) -> None:
     """A strict reading of the page finds nothing left open."""
     assert Page(render_html(SAMPLES[name]())).open == []
 
 
 @pytest.mark.parametrize("text", MARKUP)
-def test_hostile_text_makes_no_element_and_no_attribute(text):
+def test_hostile_text_makes_no_element_and_no_attribute(text: str) -> None:
     """With an attack in every text the page has the elements and attributes that it has with harmless text."""
     harmless, attacked = Page(render_html(pictured())), Page(render_html(pictured(text)))
     assert attacked.tags == harmless.tags
@@ -123,7 +131,7 @@ def test_hostile_text_makes_no_element_and_no_attribute(text):
 
 
 @pytest.mark.parametrize("text", MARKUP)
-def test_the_data_of_the_charts_survives_hostile_text(text):
+def test_the_data_of_the_charts_survives_hostile_text(text: str) -> None:
     """It is JSON that holds the text, and the script element ends where it should."""
     figures = json.loads(Page(render_html(pictured(text))).raw["figures"])
     shown = text.replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
@@ -132,14 +140,14 @@ def test_the_data_of_the_charts_survives_hostile_text(text):
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_no_control_character_or_surrogate_is_in_a_page(name):
+def test_no_control_character_or_surrogate_is_in_a_page(name: str) -> None:
     """Nor one that reorders text."""
     page = Page(render_html(SAMPLES[name]()))
     assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]", page.text)
 
 
 @pytest.mark.parametrize("assets", [None, "../assets"])
-def test_nothing_is_loaded_from_elsewhere(assets):
+def test_nothing_is_loaded_from_elsewhere(assets: str | None) -> None:
     """Every address in the page is one inside it, or one of the shared files beside it."""
     page = Page(render_html(pictured(), assets=assets))
     loading = {"src", "href", "action", "data", "poster", "srcset", "formaction", "ping", "background"}
@@ -150,7 +158,7 @@ def test_nothing_is_loaded_from_elsewhere(assets):
     assert "url(" not in bundle().style
 
 
-def test_the_policy_lets_only_our_script_run():
+def test_the_policy_lets_only_our_script_run() -> None:
     """A browser refuses every other script, and every connection."""
     text = render_html(pictured("<script>alert(1)</script>"))
     page = Page(text)
@@ -162,7 +170,7 @@ def test_the_policy_lets_only_our_script_run():
     assert "img-src" not in policy
 
 
-def test_links_inside_the_page_lead_somewhere():
+def test_links_inside_the_page_lead_somewhere() -> None:
     """Every fragment names an element."""
     page = Page(render_html(pictured()))
     ids = [value for _, name, value in page.attributes if name == "id"]
@@ -172,7 +180,7 @@ def test_links_inside_the_page_lead_somewhere():
     assert wanted <= set(ids)
 
 
-def test_the_score_comes_first_and_the_way_to_repeat_it_last():
+def test_the_score_comes_first_and_the_way_to_repeat_it_last() -> None:
     """People look for the mark, and whoever doubts it for the command."""
     command = Reproduction(
         ("grade", "./ada homework", "--seed", "4711"), (("velocity_publisher", "sha256:" + "a" * 64),)
@@ -183,7 +191,7 @@ def test_the_score_comes_first_and_the_way_to_repeat_it_last():
     assert text.index(f"of {middling().max_score} points") < text.index("criteria met") < text.index("Exercise 1")
 
 
-def test_a_criterion_says_what_was_expected_and_found_and_what_to_do():
+def test_a_criterion_says_what_was_expected_and_found_and_what_to_do() -> None:
     """With the line of the source that is meant."""
     made = middling().exercises[0]
     excerpt = Excerpt("velocity_publisher.py", 17, 16, ("before", "self.create_timer(0.1, self.tick)", "after"))
@@ -199,7 +207,7 @@ def test_a_criterion_says_what_was_expected_and_found_and_what_to_do():
     assert "self.create_timer(0.1, self.tick) (this line)" in text
 
 
-def test_what_cost_points_is_unfolded_and_the_rest_is_folded():
+def test_what_cost_points_is_unfolded_and_the_rest_is_folded() -> None:
     """Not met, partly and undecided are open at first."""
     page = Page(render_html(middling()))
     folds = [v for t, n, v in page.attributes if t == "details" and n == "class" and v.startswith("criterion")]
@@ -207,7 +215,7 @@ def test_what_cost_points_is_unfolded_and_the_rest_is_folded():
     assert opened == sum(v in ("criterion not_met", "criterion partly") for v in folds) == 4
 
 
-def test_a_report_without_a_sandbox_says_so_at_the_top_and_at_the_end():
+def test_a_report_without_a_sandbox_says_so_at_the_top_and_at_the_end() -> None:
     """It is the first thing after the score, in words."""
     text = Page(render_html(undecided())).text
     assert text.index("No sandbox.") < text.index("Exercise 1")
@@ -215,21 +223,21 @@ def test_a_report_without_a_sandbox_says_so_at_the_top_and_at_the_end():
     assert "No sandbox." not in Page(render_html(replace(undecided(), environment=ENVIRONMENT))).text
 
 
-def test_the_same_report_gives_the_same_bytes():
+def test_the_same_report_gives_the_same_bytes() -> None:
     """No date, host name or random word; of two runs only the one line of the run differs."""
     assert render_html(hostile()) == render_html(hostile())
     one, other = (render_html(replace(perfect(), duration_s=d)).splitlines() for d in (1.0, 2.5))
     assert sum(a != b for a, b in zip(one, other, strict=True)) == 1
 
 
-def test_a_report_without_exercises_or_points_is_a_page():
+def test_a_report_without_exercises_or_points_is_a_page() -> None:
     """Nothing divides by zero."""
     assert Page(render_html(report())).open == []
     assert isinstance(report(replace(velocity(), verdicts=())), Report)
     assert Page(render_html(report(replace(velocity(), verdicts=())))).open == []
 
 
-def test_shared_files_keep_a_class_small():
+def test_shared_files_keep_a_class_small() -> None:
     """A page that links to them is small; their names change with their content."""
     page = render_html(pictured(), assets="assets")
     assert len(page) < 60_000
@@ -238,7 +246,7 @@ def test_shared_files_keep_a_class_small():
         assert hashlib.sha256(content).hexdigest()[:12] in name
 
 
-def test_a_page_that_stands_alone_is_small_enough_for_a_letter():
+def test_a_page_that_stands_alone_is_small_enough_for_a_letter() -> None:
     """With as many figures as three exercises have, each as full as it may be, it stays under 1.5 MB."""
     points = tuple((k / 100, (k % 17) / 3) for k in range(1200))
     full = Series("rate", points)
@@ -248,13 +256,13 @@ def test_a_page_that_stands_alone_is_small_enough_for_a_letter():
     assert len(render_html(report(replace(velocity(), figures=figures)))) < 1_500_000
 
 
-def test_no_script_ends_early_or_changes_on_the_way():
+def test_no_script_ends_early_or_changes_on_the_way() -> None:
     """What would end a script element, or be read differently by a browser, is not in the bundle."""
     assert not re.search(r"</script|<!--|<script|\r|\x00", bundle().script, re.IGNORECASE)
     assert "</style" not in bundle().style.lower()
 
 
-def test_the_licences_travel_with_the_libraries():
+def test_the_licences_travel_with_the_libraries() -> None:
     """Each report carries them."""
     for owner in ("Apache Software Foundation", "Mike Bostock", "Chris Pettitt"):
         assert owner in bundle().script

@@ -1,13 +1,18 @@
 """The JSON report: the format, hostile text, numbers."""
 
+from __future__ import annotations
+
 import json
 import math
+from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import jsonschema
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jsonschema.validators import Draft202012Validator
 from report_samples import NASTY, SAMPLES, criterion, exercise, hostile, middling, perfect, report, undecided
 
 from grader.core.exercise import Outcome
@@ -15,19 +20,19 @@ from grader.core.trace import Start, StartWay
 from grader.reporting.json_report import dumps, report_schema, report_to_json
 
 
-def validator():
+def validator() -> Draft202012Validator:
     schema = report_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     return jsonschema.Draft202012Validator(schema)
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_every_sample_follows_the_shipped_schema(name):
+def test_every_sample_follows_the_shipped_schema(name: str) -> None:
     """What is printed is what the schema promises, after a round trip through text."""
     validator().validate(json.loads(dumps(SAMPLES[name]())))
 
 
-def test_the_report_ends_with_what_gives_it_again():
+def test_the_report_ends_with_what_gives_it_again() -> None:
     """The command with its seed, and a digest of everything that was read besides the submission."""
     whole = report_to_json(middling())
     assert whole["reproduce"] == {
@@ -41,18 +46,22 @@ def test_the_report_ends_with_what_gives_it_again():
 @pytest.mark.parametrize(
     "where", [(), ("submission",), ("environment",), ("exercises", 0), ("exercises", 0, "criteria", 1), ("reproduce",)]
 )
-def test_the_schema_allows_nothing_more_and_nothing_less(where):
+def test_the_schema_allows_nothing_more_and_nothing_less(where: tuple[int | str, ...]) -> None:
     """A key too many and a key too few are both refused, at every level but the evidence."""
-    for change in (lambda part: part.update(extra=1), lambda part: part.pop(next(iter(part)))):
+    changes: list[Callable[[Any], object]] = [
+        lambda part: part.update(extra=1),
+        lambda part: part.pop(next(iter(part))),
+    ]
+    for change in changes:
         whole = report_to_json(middling())
-        part = whole
+        part: Any = whole
         for step in where:
             part = part[step]
         change(part)
         assert not validator().is_valid(whole)
 
 
-def test_the_keys_have_a_fixed_order():
+def test_the_keys_have_a_fixed_order() -> None:
     """Two programs that compare texts see the same report alike."""
     whole = report_to_json(middling())
     assert list(whole) == [
@@ -103,7 +112,7 @@ def test_the_keys_have_a_fixed_order():
     ]
 
 
-def test_values_land_where_they_belong():
+def test_values_land_where_they_belong() -> None:
     """Outcomes, scores, hints, places and the clock are those of the report."""
     whole = report_to_json(middling())
     assert (whole["score"], whole["max_score"], whole["final"]) == (13, 60, True)
@@ -119,7 +128,7 @@ def test_values_land_where_they_belong():
     assert "did not settle" in second["clock_reason"]
 
 
-def test_how_files_were_started_is_told_where_it_is_known():
+def test_how_files_were_started_is_told_where_it_is_known() -> None:
     """As the schema says, with hostile names whole; reports on earlier evidence leave it out."""
     starts = (
         Start("a.py", "a.py", StartWay.SCRIPT, hidden=("random.py",)),
@@ -137,7 +146,7 @@ def test_how_files_were_started_is_told_where_it_is_known():
     assert "starts" not in report_to_json(middling())["exercises"][0]
 
 
-def test_faults_carry_seconds():
+def test_faults_carry_seconds() -> None:
     """The time of a fault is in seconds since its scenario began."""
     (fault,) = report_to_json(SAMPLES["crashed"]())["exercises"][0]["faults"]
     assert fault == {
@@ -149,7 +158,7 @@ def test_faults_carry_seconds():
     }
 
 
-def test_every_exercise_names_the_seed_and_the_notes_of_the_intake():
+def test_every_exercise_names_the_seed_and_the_notes_of_the_intake() -> None:
     """A program that reads one exercise only still learns how to repeat the run, and each note once."""
     for part in report_to_json(middling())["exercises"]:
         assert part["notes"][0] == "a symbolic link was not followed: data"
@@ -162,7 +171,7 @@ def test_every_exercise_names_the_seed_and_the_notes_of_the_intake():
     ("points", "expected", "kind"),
     [(Fraction(5), 5, int), (Fraction(5, 2), 2.5, float), (Fraction(1, 3), 0.333333, float), (Fraction(0), 0, int)],
 )
-def test_whole_scores_are_ints_and_others_are_rounded(points, expected, kind):
+def test_whole_scores_are_ints_and_others_are_rounded(points: Fraction, expected: float, kind: type[Any]) -> None:
     """5 is 5 and not 5.0; a third has six digits."""
     verdict = criterion("c", "C", 9, Outcome.PARTLY)
     changed = exercise("e", "1", "E", type(verdict)("c", "C", Outcome.PARTLY, points, Fraction(9), "why"))
@@ -171,7 +180,7 @@ def test_whole_scores_are_ints_and_others_are_rounded(points, expected, kind):
     assert type(score) is kind
 
 
-def test_evidence_that_json_cannot_say_becomes_text():
+def test_evidence_that_json_cannot_say_becomes_text() -> None:
     """NaN, infinities, huge integers and unknown values do not break a strict reader."""
     evidence = {
         "nan": math.nan,
@@ -195,7 +204,7 @@ def test_evidence_that_json_cannot_say_becomes_text():
     }
 
 
-def test_hostile_text_arrives_whole_but_can_be_encoded():
+def test_hostile_text_arrives_whole_but_can_be_encoded() -> None:
     """Only lone surrogates are replaced; everything else a student wrote is in the report."""
     text = dumps(hostile())
     text.encode("utf-8")
@@ -204,28 +213,28 @@ def test_hostile_text_arrives_whole_but_can_be_encoded():
     assert len(read["exercises"][0]["criteria"][0]["reason"]) > 100_000
 
 
-def test_printed_json_cannot_steer_a_terminal():
+def test_printed_json_cannot_steer_a_terminal() -> None:
     """No control and no direction override stands raw in the text."""
     assert not set(dumps(hostile())) & {"\x1b", "\x07", "\x9b", "\u202e", "\u202c", "\u200b", "\r", "\t"}
 
 
-def test_people_can_read_the_json():
+def test_people_can_read_the_json() -> None:
     """Degrees and the like stay as they are."""
     assert "30 °C" in dumps(perfect())
 
 
-def test_an_undecided_report_is_not_final():
+def test_an_undecided_report_is_not_final() -> None:
     """A program need not look through the criteria."""
     assert report_to_json(undecided())["final"] is False
 
 
-def test_only_the_duration_differs_between_two_runs():
+def test_only_the_duration_differs_between_two_runs() -> None:
     """The same verdicts give the same bytes."""
     assert dumps(middling()) == dumps(middling())
 
 
 @given(st.text(alphabet=st.characters(), max_size=60))
-def test_any_text_survives_the_round_trip(text):
+def test_any_text_survives_the_round_trip(text: str) -> None:
     """Whatever can be encoded is read back as it was."""
     whole = report(exercise("e", "1", "E", criterion("c", "C", 1, reason=text, evidence={text: text})), name=text)
     encodable = "".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in text)

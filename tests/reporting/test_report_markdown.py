@@ -1,12 +1,17 @@
 """Markdown: read back by a parser, inert whatever a student wrote, and never longer than GitHub takes."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Iterator, Sequence
 from html.parser import HTMLParser
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
+from markdown_it.token import Token
 from report_samples import (
     SAMPLES,
     crashed,
@@ -32,7 +37,7 @@ NODE = r'(?:node\d+\(\["[^"]*"\]\)|topic\d+\["[^"]*"\]|more\["and \d+ more"\])'
 ARROW = r'(?:node|topic)\d+ (?:-->|-\. "[^"]*" \.->) (?:node|topic)\d+'
 
 
-def flat(tokens):
+def flat(tokens: Sequence[Token]) -> Iterator[Token]:
     for token in tokens:
         yield token
         yield from flat(token.children or [])
@@ -41,21 +46,23 @@ def flat(tokens):
 class Text(HTMLParser):
     """The tags and the text of a rendered page."""
 
-    def __init__(self, html):
+    def __init__(self, html: str) -> None:
         super().__init__()
-        self.tags, self.text = set(), ""
+        self.tags: set[str] = set()
+        self.text = ""
         self.feed(html)
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: Sequence[tuple[str, str | None]]) -> None:
         self.tags.add(tag)
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         self.text += data
 
 
-def tables(text):
+def tables(text: str) -> list[list[list[str]]]:
     """Return every table as rows of the cells' texts."""
-    rows, found = [], []
+    rows: list[list[str]] = []
+    found: list[list[list[str]]] = []
     tokens = GITHUB.parse(text)
     for at, token in enumerate(tokens):
         if token.type == "table_open":
@@ -68,7 +75,7 @@ def tables(text):
     return found
 
 
-def test_the_score_comes_first_and_the_outcomes_in_a_table():
+def test_the_score_comes_first_and_the_outcomes_in_a_table() -> None:
     """A reader of a step summary sees both without scrolling."""
     text = render_markdown(middling())
     assert (
@@ -82,7 +89,7 @@ def test_the_score_comes_first_and_the_outcomes_in_a_table():
     assert second[-1] == ["⏸️ blocked", "0/8", "Waits for data: needs subscribes_odom (not met)"]
 
 
-def test_reasons_hints_and_places_follow():
+def test_reasons_hints_and_places_follow() -> None:
     """What was lost is explained below the table; what was met is not."""
     text = Text(GITHUB.render(render_markdown(middling()))).text
     assert "Publishes at 20 Hz (rate): /cmd_vel: 10.00 Hz, expected 20 ± 1 Hz" in text
@@ -91,20 +98,20 @@ def test_reasons_hints_and_places_follow():
     assert "as asked" not in text
 
 
-def test_a_fault_comes_with_its_frames():
+def test_a_fault_comes_with_its_frames() -> None:
     """In a block of code, as a traceback is read."""
     blocks = [token.content for token in GITHUB.parse(render_markdown(crashed())) if token.type == "fence"]
     assert blocks[0].startswith("velocity_publisher.py:31 in <module>\n")
 
 
-def test_what_is_not_final_stands_out():
+def test_what_is_not_final_stands_out() -> None:
     """So does a run without walls."""
     text = render_markdown(undecided())
     assert text.index("[!WARNING]") < text.index("[!CAUTION]") < text.index("| Points |")
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_a_parser_finds_nothing_but_what_was_meant(name):
+def test_a_parser_finds_nothing_but_what_was_meant(name: str) -> None:
     """No HTML, link or picture; every row of every table has three cells."""
     text = render_markdown(SAMPLES[name]())
     kinds = {token.type for token in flat(GITHUB.parse(text))}
@@ -140,7 +147,7 @@ SIGNS = st.lists(
 
 
 @given(st.one_of(SIGNS, st.text(alphabet=st.characters(), max_size=40)))
-def test_no_text_of_a_student_is_markup(text):
+def test_no_text_of_a_student_is_markup(text: str) -> None:
     """Wherever it stands, the page has the same tags as with a plain word there, and the text is read."""
     pages = []
     for word in ("plain", text):
@@ -152,10 +159,12 @@ def test_no_text_of_a_student_is_markup(text):
     assert pages[1].tags - {"code"} == pages[0].tags - {"code"}
 
 
-def test_detail_gives_way_in_order_until_it_fits():
+def test_detail_gives_way_in_order_until_it_fits() -> None:
     """Frames first, then the graph, explanations, criteria, exercises; the score and the end stay."""
     sample = hostile()
-    limit, sizes, seen = len(render_markdown(sample).encode()), [], []
+    limit = len(render_markdown(sample).encode())
+    sizes: list[int] = []
+    seen: list[Any] = []
     while True:
         text = render_markdown(sample, limit=limit)
         size = len(text.encode())
@@ -176,14 +185,14 @@ def test_detail_gives_way_in_order_until_it_fits():
     assert seen[-1] == (False,) * 5
 
 
-def test_a_cut_report_says_so():
+def test_a_cut_report_says_so() -> None:
     """A reader knows that there is more, and where."""
     whole = render_markdown(hostile())
     assert "Details are left out" not in whole
     assert "Details are left out" in render_markdown(hostile(), limit=len(whole.encode()) - 1)
 
 
-def test_a_monstrous_report_stays_below_the_limit():
+def test_a_monstrous_report_stays_below_the_limit() -> None:
     """Hundreds of criteria with long texts do not make GitHub drop the summary."""
     verdicts = [criterion(f"c{n}", "😀" * 400, 1, Outcome.NOT_MET, reason="&" * 500) for n in range(250)]
     sample = report(exercise("e", "1", "E", *verdicts))
@@ -193,17 +202,20 @@ def test_a_monstrous_report_stays_below_the_limit():
     assert "0 of 250 points" in text
 
 
-def diagram(graph):
+def diagram(graph: GraphSnapshot) -> list[str]:
     lines = draw_mermaid(graph).split("\n")
     assert lines[0] == "flowchart LR"
     assert [line for line in lines[1:] if not re.fullmatch(f" {{4}}(?:{NODE}|{ARROW})", line)] == []
     return [line.strip() for line in lines[1:]]
 
 
-def test_the_graph_is_drawn_both_ways():
+def test_the_graph_is_drawn_both_ways() -> None:
     """Nodes round, topics square, and the arrows go through the topics."""
-    lines = diagram(perfect().exercises[1].graph)
-    boxes = dict(re.match(r'(\w+)[([]+"([^"]*)"', line).groups() for line in lines if "--" not in line)
+    graph = perfect().exercises[1].graph
+    assert graph is not None
+    lines = diagram(graph)
+    matches = [re.match(r'(\w+)[([]+"([^"]*)"', line) for line in lines if "--" not in line]
+    boxes = {match[1]: match[2] for match in matches if match}
     arrows = [[boxes[end] for end in line.split(" --> ")] for line in lines if "--" in line]
     assert arrows == [
         ["/fan_controller", "/fan_speed"],
@@ -213,20 +225,20 @@ def test_the_graph_is_drawn_both_ways():
     ]
 
 
-def test_a_topic_whose_types_differ_is_dotted():
+def test_a_topic_whose_types_differ_is_dotted() -> None:
     """No message goes through it, and the arrow says why."""
     ends = (endpoint("publisher", "/t", "/a"), endpoint("subscription", "/t", "/b", "std_msgs/msg/Int32"))
     assert any("types differ" in line for line in diagram(GraphSnapshot(0, ("/a", "/b"), ends)))
 
 
-def test_a_node_without_topics_is_drawn_alone():
+def test_a_node_without_topics_is_drawn_alone() -> None:
     """It exists, and does nothing."""
     assert diagram(GraphSnapshot(0, ("/a",), ())) == ['node0(["/a"])']
     assert draw_mermaid(GraphSnapshot(0, (), ())) == ""
 
 
 @given(st.text(alphabet=st.characters(), max_size=40), st.text(alphabet='"];-->\n#(){}%[`', max_size=20))
-def test_a_name_in_the_graph_is_no_syntax(name, topic):
+def test_a_name_in_the_graph_is_no_syntax(name: str, topic: str) -> None:
     """Every line is a box or an arrow, and no block of code ends early."""
     ends = (endpoint("publisher", topic, name), endpoint("subscription", topic, name, name))
     lines = diagram(GraphSnapshot(0, (name,), ends))

@@ -1,20 +1,25 @@
 """PrairieLearn's results.json: a share of the points, rows with points, and a size that is accepted."""
 
+from __future__ import annotations
+
 import json
+from typing import Any
 
 import pytest
 from report_samples import SAMPLES, criterion, exercise, hostile, middling, report, undecided
 
 from grader.core.exercise import Outcome
+from grader.core.report import Report
 from grader.reporting.platforms.prairielearn import MOST_BYTES, render_prairielearn
 
 
-def result(sample, **options):
-    return json.loads(render_prairielearn(sample, **options), parse_constant=pytest.fail)
+def result(sample: Report, **options: int) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(render_prairielearn(sample, **options), parse_constant=pytest.fail)
+    return found
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name):
+def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name: str) -> None:
     """One row without points would hide those of all others."""
     whole = result(SAMPLES[name]())
     assert set(whole) == {"gradable", "score", "message", "output", "tests"}
@@ -26,13 +31,13 @@ def test_every_sample_has_the_keys_and_values_that_the_platform_takes(name):
         assert all(isinstance(test[key], str) for key in ("name", "description", "message", "output"))
 
 
-def test_the_score_is_a_share():
+def test_the_score_is_a_share() -> None:
     """13 of 60."""
     assert result(middling())["score"] == pytest.approx(13 / 60, abs=1e-6)
     assert result(report(exercise("e", "1", "E")))["score"] == 0
 
 
-def test_what_is_undecided_is_not_graded():
+def test_what_is_undecided_is_not_graded() -> None:
     """The attempt does not count, and the message says why."""
     whole = result(undecided())
     assert whole["gradable"] is False
@@ -40,7 +45,7 @@ def test_what_is_undecided_is_not_graded():
     assert result(middling())["gradable"] is True
 
 
-def test_detail_gives_way_before_the_file_is_too_long():
+def test_detail_gives_way_before_the_file_is_too_long() -> None:
     """Explanations, then the output, then the rows; the score stays, and so does what gives it again."""
     whole = render_prairielearn(hostile())
     short = result(hostile(), limit=len(whole.encode()) - 1)
@@ -50,7 +55,7 @@ def test_detail_gives_way_before_the_file_is_too_long():
     assert json.loads(shorter)["output"].startswith("reproduce: grade ")
 
 
-def test_a_monstrous_report_is_accepted():
+def test_a_monstrous_report_is_accepted() -> None:
     """A megabyte is the platform's limit."""
     verdicts = [criterion(f"c{n}", "😀" * 400, 1, Outcome.NOT_MET, reason="€" * 500) for n in range(400)]
     sample = report(exercise("e", "1", "E", *verdicts))

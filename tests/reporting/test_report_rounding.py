@@ -1,5 +1,8 @@
 """Whole points: totals are the exact ones rounded, and rows add up to them."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from fractions import Fraction
 
 from hypothesis import given
@@ -14,35 +17,35 @@ WHOLE = st.lists(
 )
 
 
-def rounded(rows):
+def rounded(rows: Sequence[tuple[Fraction, Fraction]]) -> list[tuple[int, int]]:
     return whole_points([top * share for top, share in rows], [top for top, _ in rows])
 
 
-def test_the_largest_remainders_get_what_is_missing():
+def test_the_largest_remainders_get_what_is_missing() -> None:
     """2.5 + 2.5 + 0.3 is 5.3: five points, the first of equal halves gets the one that is missing."""
     scores = [Fraction(5, 2), Fraction(5, 2), Fraction(3, 10)]
     assert whole_points(scores, [Fraction(5)] * 3) == [(3, 5), (2, 5), (0, 5)]
 
 
-def test_only_a_score_without_loss_is_shown_as_full():
+def test_only_a_score_without_loss_is_shown_as_full() -> None:
     """99.6 of 100 is no 100."""
     scores = [Fraction(50), Fraction(496, 10)]
     assert whole_points(scores, [Fraction(50)] * 2) == [(50, 50), (49, 50)]
 
 
-def test_half_a_point_is_rounded_up():
+def test_half_a_point_is_rounded_up() -> None:
     """87.5 is shown as 88."""
     assert sum(score for score, _ in whole_points([Fraction(175, 2), Fraction(0)], [Fraction(90), Fraction(10)])) == 88
 
 
 @given(ROWS)
-def test_no_row_earns_more_than_its_maximum(rows):
+def test_no_row_earns_more_than_its_maximum(rows: Sequence[tuple[Fraction, Fraction]]) -> None:
     """Not even where maxima are fractions."""
     assert all(0 <= score <= top for score, top in rounded(rows))
 
 
 @given(WHOLE)
-def test_whole_maxima_stay_and_rows_are_off_by_less_than_one(rows):
+def test_whole_maxima_stay_and_rows_are_off_by_less_than_one(rows: Sequence[tuple[Fraction, Fraction]]) -> None:
     """Rounding moves no row by a whole point, and the total by a half at most, unless it would look full."""
     found = rounded(rows)
     exact = sum((top * share for top, share in rows), Fraction(0))
@@ -56,7 +59,7 @@ def test_whole_maxima_stay_and_rows_are_off_by_less_than_one(rows):
 
 
 @given(ROWS)
-def test_full_marks_are_full_and_others_are_not(rows):
+def test_full_marks_are_full_and_others_are_not(rows: Sequence[tuple[Fraction, Fraction]]) -> None:
     """The extremes are exact."""
     found = rounded(rows)
     full = all(share == 1 for _, share in rows)

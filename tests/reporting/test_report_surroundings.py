@@ -1,5 +1,7 @@
 """What a platform tells beside the report: where the repository is, and what was handed in."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 
@@ -17,7 +19,7 @@ CLASSROOM = {
 
 
 @pytest.fixture
-def repository(tmp_path):
+def repository(tmp_path: Path) -> Path:
     folder = tmp_path / "repository"
     (folder / "hw" / "ada").mkdir(parents=True)
     (folder / "hw" / "ada" / "velocity_publisher.py").touch()
@@ -39,7 +41,7 @@ def repository(tmp_path):
     ],
 )
 @pytest.mark.parametrize("in_a_job", [True, False])
-def test_the_place_in_the_repository(repository, path, expected, in_a_job):
+def test_the_place_in_the_repository(repository: Path, path: str, expected: str | None, in_a_job: bool) -> None:
     """GitHub names files from the root of the checkout, wherever the command was given."""
     environment = {"GITHUB_WORKSPACE": str(repository)} if in_a_job else {}
     found = repository_folder(str(repository / path), environment)
@@ -49,14 +51,14 @@ def test_the_place_in_the_repository(repository, path, expected, in_a_job):
         assert found == expected
 
 
-def test_a_link_into_the_repository_is_followed(repository, tmp_path):
+def test_a_link_into_the_repository_is_followed(repository: Path, tmp_path: Path) -> None:
     """Annotations belong to the file that is there."""
     link = tmp_path / "link"
     link.symlink_to(repository / "hw")
     assert repository_folder(str(link), {}) == "hw"
 
 
-def test_without_a_checkout_this_folder_is_the_root(tmp_path, monkeypatch):
+def test_without_a_checkout_this_folder_is_the_root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A runner starts its steps there."""
     (tmp_path / "ada").mkdir()
     monkeypatch.chdir(tmp_path)
@@ -64,7 +66,7 @@ def test_without_a_checkout_this_folder_is_the_root(tmp_path, monkeypatch):
         assert repository_folder("ada", {}) == "ada"
 
 
-def test_what_was_handed_in_comes_from_the_environment():
+def test_what_was_handed_in_comes_from_the_environment() -> None:
     """Each field from the variable that the platform sets for it; the time in UTC."""
     found = handed_in(CLASSROOM)
     assert (found.username, found.review) == ("the username", "the review")
@@ -72,7 +74,7 @@ def test_what_was_handed_in_comes_from_the_environment():
     assert handed_in({**CLASSROOM, "COMMIT_DATETIME": "2026-01-31T10:00:00Z"}).datetime == "2026-01-31T10:00:00Z"
 
 
-def test_the_commit_s_time_may_come_from_the_event(tmp_path):
+def test_the_commit_s_time_may_come_from_the_event(tmp_path: Path) -> None:
     """GitHub writes it beside the job; what was set by hand counts more."""
     event = tmp_path / "event.json"
     event.write_text(json.dumps({"head_commit": {"timestamp": "2026-01-30T23:30:00-01:00"}}))
@@ -84,7 +86,7 @@ def test_the_commit_s_time_may_come_from_the_event(tmp_path):
 
 @pytest.mark.parametrize("event", ["", "{", "[]", "null", '{"head_commit": null}', '{"head_commit": {}}'])
 @pytest.mark.parametrize("by_hand", ["", "yesterday", "2026-01-31T10:00:00", "2026-01-31"])
-def test_a_time_that_cannot_be_known_is_asked_for(tmp_path, event, by_hand):
+def test_a_time_that_cannot_be_known_is_asked_for(tmp_path: Path, event: str, by_hand: str) -> None:
     """The time of grading is no substitute."""
     path = tmp_path / "event.json"
     path.write_text(event)
@@ -95,7 +97,7 @@ def test_a_time_that_cannot_be_known_is_asked_for(tmp_path, event, by_hand):
 
 
 @pytest.mark.parametrize("name", VARIABLES.values())
-def test_a_missing_variable_is_named(name):
+def test_a_missing_variable_is_named(name: str) -> None:
     """All that are missing, in one line."""
     environment = {**CLASSROOM, name: ""}
     with pytest.raises(GraderError, match=f"found no {name}$"):
@@ -103,13 +105,13 @@ def test_a_missing_variable_is_named(name):
 
 
 @pytest.mark.parametrize(("name", "value"), [("SUBMISSION_TAG", "v1"), ("ASSIGNMENT_TYPE", "solo")])
-def test_a_value_that_the_platform_would_refuse_is_refused_here(name, value):
+def test_a_value_that_the_platform_would_refuse_is_refused_here(name: str, value: str) -> None:
     """Before anything is graded."""
     with pytest.raises(GraderError, match=name):
         handed_in({**CLASSROOM, name: value})
 
 
-def test_nothing_is_read_but_what_is_named():
+def test_nothing_is_read_but_what_is_named() -> None:
     """An event file that is not there is as good as none."""
     environment = {**CLASSROOM, "GITHUB_EVENT_PATH": str(Path("/nowhere/event.json"))}
     assert handed_in(environment).datetime == "2026-01-31T08:00:00Z"

@@ -1,5 +1,7 @@
 """Sentences without numbers: words stand for what was measured, and no digit of any script is left."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,18 +26,18 @@ from grader.reporting.audience import without_numbers
         ("", ""),
     ],
 )
-def test_what_is_left_of_a_sentence(text, left):
+def test_what_is_left_of_a_sentence(text: str, left: str) -> None:
     """Units say what kind of number it was; message types keep the bits in their names."""
     assert without_numbers(text) == left
 
 
 @given(st.text(st.characters(categories=["N", "L", "P", "S", "Zs"]), max_size=80))
-def test_no_digit_of_any_script_is_left(text):
+def test_no_digit_of_any_script_is_left(text: str) -> None:
     """Also not in names that a program made up to carry one."""
     assert not [sign for sign in without_numbers(text) if sign.isnumeric()]
 
 
 @pytest.mark.parametrize("text", ["pkg_31/msg/T31", "a/msg/T31", "a/msg/Int3132", "31.py", "x.py:31", "٣١ a³ Ⅷ ½ 一"])
-def test_a_program_cannot_smuggle_a_number_in_a_name(text):
+def test_a_program_cannot_smuggle_a_number_in_a_name(text: str) -> None:
     """Only the sizes of types are kept, and none of these is one."""
     assert not [sign for sign in without_numbers(text) if sign.isnumeric()]

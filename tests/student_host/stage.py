@@ -16,7 +16,7 @@ from typing import Any
 
 HOST = Path(__file__).resolve().parents[2] / "grader/student_host"
 sys.path.insert(0, str(HOST))
-import launcher  # noqa: E402
+import launcher  # type: ignore[import-not-found]  # noqa: E402
 import time_machine  # noqa: E402, F401 - it takes long: once for all repetitions
 
 sys.path.remove(str(HOST))
@@ -105,17 +105,18 @@ def stand_in_for_ros(say: Callable[[object], None]) -> None:
         def __init__(self, name: str = "") -> None:
             made.append(self)
 
-    rclpy = types.ModuleType("rclpy")
-    node = types.ModuleType("rclpy.node")
+    rclpy: Any = types.ModuleType("rclpy")
+    node: Any = types.ModuleType("rclpy.node")
     rclpy.node, node.Node = node, Node
     rclpy.ok = lambda: False
     rclpy.init = lambda: say("init")
     rclpy.spin = lambda spun: say(f"spin {type(spun).__name__}")
-    host = types.ModuleType("_grader_host.ros")
+    host: Any = types.ModuleType("_grader_host.ros")
     host.MADE_NODES = made
     sys.modules.update({"rclpy": rclpy, "rclpy.node": node, "_grader_host.ros": host})
-    sys.modules["_grader_host"].ros = host
-    builtins = sys.modules["builtins"]
+    package: Any = sys.modules["_grader_host"]
+    package.ros = host
+    builtins: Any = sys.modules["builtins"]
     builtins.say = say
 
 

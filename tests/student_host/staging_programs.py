@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from typing import Any
 
 STAGE = Path(__file__).with_name("stage.py")
 SEED, OTHER_SEED = "ab" * 32, "cd" * 32
@@ -24,11 +25,14 @@ def play_file(root: Path, file: str) -> list[str]:
     return _perform({"root": str(root), "file": file, "seed": SEED, "repeats": 1})
 
 
-def _perform(request: dict) -> list[str]:
+def _perform(request: dict[str, Any]) -> list[str]:
     stage = _stage()
+    assert stage.stdin is not None
+    assert stage.stdout is not None
     stage.stdin.write(json.dumps(request) + "\n")
     stage.stdin.flush()
-    first, *others = json.loads(stage.stdout.readline())
+    answers: list[list[str] | None] = json.loads(stage.stdout.readline())
+    first, *others = answers
     assert first is not None, "the program ended its process, or hung"
     for other in others:
         assert other == first, "two runs differ"
@@ -40,5 +44,6 @@ def _stage() -> subprocess.Popen[str]:
     """Start the stage, once for all tests of this process."""
     stage = subprocess.Popen([sys.executable, str(STAGE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     atexit.register(stage.wait)
-    atexit.register(stage.stdin.close)
+    if stage.stdin is not None:
+        atexit.register(stage.stdin.close)
     return stage

@@ -1,9 +1,11 @@
 """Event loops and selectors in virtual time."""
 
+from __future__ import annotations
+
 from staging_programs import play
 
 
-def test_tasks_sleep_side_by_side():
+def test_tasks_sleep_side_by_side() -> None:
     """`gather` takes as long as the longest; order follows time."""
     assert play("""
         import asyncio
@@ -23,7 +25,7 @@ def test_tasks_sleep_side_by_side():
     """) == ["200 a", "300 b", "400 a", "600 b", "600 ['a', 'b']", "600 0.6", "600 end"]
 
 
-def test_a_periodic_task_does_not_drift():
+def test_a_periodic_task_does_not_drift() -> None:
     """Two hundred pauses of a twentieth of a second are ten seconds and the microsecond that each ends late."""
     assert play("""
         import asyncio
@@ -35,7 +37,7 @@ def test_a_periodic_task_does_not_drift():
     """) == ["10000.2 over", "10000.2 end"]
 
 
-def test_timeouts_queues_events_and_locks_of_asyncio():
+def test_timeouts_queues_events_and_locks_of_asyncio() -> None:
     """Everything that waits inside a loop waits in virtual time."""
     assert play("""
         import asyncio
@@ -61,7 +63,7 @@ def test_timeouts_queues_events_and_locks_of_asyncio():
     """) == ["500 timeout", "1500 item", "1750 later", "2500 CancelledError", "2500 end"]
 
 
-def test_an_executor_of_a_loop_runs_beside_it():
+def test_an_executor_of_a_loop_runs_beside_it() -> None:
     """A blocking call in a thread does not hold up the loop, and wakes it when it is done."""
     assert play("""
         import asyncio, time
@@ -81,7 +83,7 @@ def test_an_executor_of_a_loop_runs_beside_it():
     """) == ["100 tick", "200 tick", "250 slept", "300 tick", "750 slept again", "750 end"]
 
 
-def test_a_loop_in_a_thread_takes_calls_from_outside():
+def test_a_loop_in_a_thread_takes_calls_from_outside() -> None:
     """`run_coroutine_threadsafe` and `call_soon_threadsafe` reach a loop that waits."""
     assert play("""
         import asyncio, threading, time
@@ -100,7 +102,7 @@ def test_a_loop_in_a_thread_takes_calls_from_outside():
     """) == ["1500 result", "1500 closed", "1500 end"]
 
 
-def test_selectors_wait_for_pipes_and_timeouts():
+def test_selectors_wait_for_pipes_and_timeouts() -> None:
     """What is there is found at once; what is not is waited for, until another thread writes it."""
     assert play("""
         import os, select, selectors, threading, time
@@ -131,7 +133,7 @@ def test_selectors_wait_for_pipes_and_timeouts():
     ]
 
 
-def test_a_task_that_raises_ends_the_program_as_usual():
+def test_a_task_that_raises_ends_the_program_as_usual() -> None:
     """The exception comes out of `run`."""
     assert play("""
         import asyncio

@@ -1,10 +1,12 @@
 """Clocks and sleeps in virtual time: they agree with each other, drift by nothing and let busy loops go on."""
 
+from __future__ import annotations
+
 import pytest
 from staging_programs import play
 
 
-def test_sleeping_is_exact():
+def test_sleeping_is_exact() -> None:
     """A thousand pauses of a twentieth of a second are fifty seconds, to the nanosecond; then one of half of one."""
     assert play("""
         import time
@@ -21,7 +23,7 @@ def test_sleeping_is_exact():
 
 @pytest.mark.parametrize("clock", ["time.time", "time.monotonic", "time.perf_counter", "now"])
 @pytest.mark.parametrize(("compare", "pause"), [(">=", 0.01), (">", 0.01), (">=", 0.025), (">", 0.05), (">", 0.002)])
-def test_a_loop_that_compares_clocks_after_each_pause_keeps_its_pace(clock, compare, pause):
+def test_a_loop_that_compares_clocks_after_each_pause_keeps_its_pace(clock: str, compare: str, pause: float) -> None:
     """As on any machine a pause is over a little late, so that the last one of a period completes it."""
     said = play(f"""
         import datetime, time
@@ -39,7 +41,7 @@ def test_a_loop_that_compares_clocks_after_each_pause_keeps_its_pace(clock, comp
     assert 2000 <= float(said[0].split()[0]) <= 2002
 
 
-def test_every_clock_tells_the_same_time():
+def test_every_clock_tells_the_same_time() -> None:
     """Wall clocks and steady ones, in seconds and nanoseconds, advance together."""
     assert play("""
         import datetime, time
@@ -52,7 +54,7 @@ def test_every_clock_tells_the_same_time():
     """) == ["1500 [1.5, 1.5, 1.5, 1.5]", "1500 [1500000000, 1500000000, 1500000000]", "1500 end"]
 
 
-def test_dates_follow():
+def test_dates_follow() -> None:
     """However they were imported, and with or without a time zone."""
     assert play("""
         import datetime, time
@@ -87,7 +89,7 @@ def test_dates_follow():
         "time.clock_gettime_ns(time.CLOCK_MONOTONIC) < (raw + 0.1) * 1e9",
     ],
 )
-def test_a_loop_that_only_looks_at_a_clock_goes_on(look):
+def test_a_loop_that_only_looks_at_a_clock_goes_on(look: str) -> None:
     """It sees the time pass in small steps, and leaves the loop within one of them."""
     said = play(f"""
         import datetime, time
@@ -115,7 +117,7 @@ def test_a_loop_that_only_looks_at_a_clock_goes_on(look):
         "not lock.acquire(blocking=False)",
     ],
 )
-def test_a_loop_that_waits_for_another_thread_without_blocking(look):
+def test_a_loop_that_waits_for_another_thread_without_blocking(look: str) -> None:
     """The other thread gets its turn if the loop sleeps, looks at a clock or asks whether something has happened."""
     pause = "time.sleep(0)" if look == "not results" else "pass"
     said = play(f"""
@@ -141,7 +143,7 @@ def test_a_loop_that_waits_for_another_thread_without_blocking(look):
     assert 100 <= float(at_ms) <= 110.5
 
 
-def test_looking_now_and_then_costs_nothing():
+def test_looking_now_and_then_costs_nothing() -> None:
     """A program that sleeps between its looks, however often it looks, drifts by a microsecond a pause only."""
     assert play("""
         import datetime, threading, time
@@ -154,7 +156,7 @@ def test_looking_now_and_then_costs_nothing():
     """) == ["30003 30.003", "30003 end"]
 
 
-def test_sleeping_until_a_deadline_does_not_drift():
+def test_sleeping_until_a_deadline_does_not_drift() -> None:
     """The pattern of a paced loop: look at the clock, sleep for the rest."""
     assert play("""
         import time
@@ -166,7 +168,7 @@ def test_sleeping_until_a_deadline_does_not_drift():
     """) == ["100000 2000", "100000 end"]
 
 
-def test_sleep_refuses_what_it_always_refuses():
+def test_sleep_refuses_what_it_always_refuses() -> None:
     """The same kinds of error, in the same words where students see them often."""
     assert play("""
         import time
@@ -198,7 +200,7 @@ def test_sleep_refuses_what_it_always_refuses():
     ]
 
 
-def test_sleeping_for_nothing_lets_others_run():
+def test_sleeping_for_nothing_lets_others_run() -> None:
     """`sleep(0)` gives the turn away and takes no time."""
     assert play("""
         import threading, time
@@ -211,7 +213,7 @@ def test_sleeping_for_nothing_lets_others_run():
     """) == ["0 a", "0 b", "0 a", "0 b", "0 end"]
 
 
-def test_sched_follows():
+def test_sched_follows() -> None:
     """A scheduler of the standard library that was made with the module's own clock."""
     assert play("""
         import sched, time
@@ -224,7 +226,7 @@ def test_sched_follows():
     """) == ["1000 first", "1000 second", "2000 late", "2000 end"]
 
 
-def test_processor_time_is_not_virtual():
+def test_processor_time_is_not_virtual() -> None:
     """What was computed was computed."""
     assert play("""
         import time

@@ -1,5 +1,7 @@
 """Randomness in a student's process: the same for the same seed, another one for another."""
 
+from __future__ import annotations
+
 import pytest
 from staging_programs import OTHER_SEED, play
 
@@ -33,14 +35,14 @@ for _ in range(3): threading.Thread(target=work).start()
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_randomness_repeats_for_a_seed_and_differs_for_another(source):
+def test_randomness_repeats_for_a_seed_and_differs_for_another(source: str) -> None:
     """The same submission gets the same run, whatever its nodes draw from."""
     said = play(SOURCES[source], repeats=3)
     assert said[-1] == "300 end" or said[-1].endswith("0 end")
     assert said != play(SOURCES[source], seed=OTHER_SEED, repeats=1)
 
 
-def test_a_seed_of_the_program_s_own_is_respected():
+def test_a_seed_of_the_program_s_own_is_respected() -> None:
     """`random.seed(1)` gives what it gives everywhere."""
     assert play("import random; random.seed(1); say(random.random()); say(random.Random(2).random())", repeats=1) == [
         "0 0.13436424411240122",

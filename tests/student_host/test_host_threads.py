@@ -1,10 +1,12 @@
 """Programs with threads in virtual time: exact instants, one order, the same every time."""
 
+from __future__ import annotations
+
 import pytest
 from staging_programs import play
 
 
-def test_sleeping_threads_interleave():
+def test_sleeping_threads_interleave() -> None:
     """Each wakes at its own instants; at the same instant, whoever has slept longest goes first."""
     assert play("""
         import threading, time
@@ -21,7 +23,7 @@ def test_sleeping_threads_interleave():
     """) == ["200 a", "300 b", "400 a", "600 b", "600 a", "600 joined", "900 b", "900 joined", "900 end"]
 
 
-def test_hundred_threads_at_one_instant_go_in_the_order_of_their_start():
+def test_hundred_threads_at_one_instant_go_in_the_order_of_their_start() -> None:
     """However the system switches between threads, no two runs differ."""
     assert play("""
         import threading, time
@@ -36,7 +38,7 @@ def test_hundred_threads_at_one_instant_go_in_the_order_of_their_start():
     """) == ["1000 True", "1000 end"]
 
 
-def test_a_race_between_threads_has_one_outcome():
+def test_a_race_between_threads_has_one_outcome() -> None:
     """Threads take turns only where they block: a counter without a lock loses nothing."""
     assert play("""
         import threading, time
@@ -53,7 +55,7 @@ def test_a_race_between_threads_has_one_outcome():
     """) == ["0 16000", "0 end"]
 
 
-def test_an_event_is_waited_for_until_its_timeout():
+def test_an_event_is_waited_for_until_its_timeout() -> None:
     """False at the timeout, True at the instant at which another thread sets it."""
     assert play("""
         import threading, time
@@ -68,7 +70,7 @@ def test_an_event_is_waited_for_until_its_timeout():
     """) == ["250 False", "350 True", "350 True", "350 False", "350 False", "350 end"]
 
 
-def test_a_queue_is_waited_for():
+def test_a_queue_is_waited_for() -> None:
     """The consumer gets each item when it is put; an empty queue raises at the timeout, a full one as well."""
     assert play("""
         import queue, threading, time
@@ -96,7 +98,7 @@ def test_a_queue_is_waited_for():
     """) == ["100 0", "200 1", "300 2", "800 empty", "800 empty now", "1000 full", "1000 end"]
 
 
-def test_a_queue_is_joined_when_its_tasks_are_done():
+def test_a_queue_is_joined_when_its_tasks_are_done() -> None:
     """Unfinished tasks keep the main thread waiting."""
     assert play("""
         import queue, threading, time
@@ -117,7 +119,7 @@ def test_a_queue_is_joined_when_its_tasks_are_done():
     """) == ["750 done", "1750 empty", "1750 end"]
 
 
-def test_a_pool_runs_as_many_tasks_as_it_has_threads():
+def test_a_pool_runs_as_many_tasks_as_it_has_threads() -> None:
     """Two workers need two seconds for four tasks of a second each; results come in order."""
     assert play("""
         import time
@@ -152,7 +154,7 @@ def test_a_pool_runs_as_many_tasks_as_it_has_threads():
     ]
 
 
-def test_a_pool_hands_an_exception_on():
+def test_a_pool_hands_an_exception_on() -> None:
     """It is the caller's, and no fault of a thread."""
     assert play("""
         from concurrent.futures import ThreadPoolExecutor
@@ -161,7 +163,7 @@ def test_a_pool_hands_an_exception_on():
     """) == ["0 ZeroDivisionError('division by zero')", "0 end"]
 
 
-def test_a_timer_that_starts_the_next_one_ticks_exactly():
+def test_a_timer_that_starts_the_next_one_ticks_exactly() -> None:
     """Hundreds of threads one after another, and no drift; a cancelled timer stays silent."""
     assert play("""
         import threading
@@ -176,7 +178,7 @@ def test_a_timer_that_starts_the_next_one_ticks_exactly():
     """) == ["0 600", "10000 400", "20000 200", "30000 0", "30000 end"]
 
 
-def test_a_daemon_thread_does_not_keep_the_program_alive():
+def test_a_daemon_thread_does_not_keep_the_program_alive() -> None:
     """The others do, also when the main thread has come to its end."""
     assert play("""
         import threading, time
@@ -190,7 +192,7 @@ def test_a_daemon_thread_does_not_keep_the_program_alive():
     """) == ["0 main ends", "1000 daemon", "1000 worker", "2000 daemon", "2000 worker", "2000 end"]
 
 
-def test_a_thread_that_raises_is_a_fault_and_the_others_go_on():
+def test_a_thread_that_raises_is_a_fault_and_the_others_go_on() -> None:
     """The main thread notices only that it has ended; SystemExit is no fault."""
     assert play("""
         import sys, threading, time
@@ -206,7 +208,7 @@ def test_a_thread_that_raises_is_a_fault_and_the_others_go_on():
     """) == ["500 fault ValueError: no", "500 joined False", "1500 end"]
 
 
-def test_a_join_ends_at_its_timeout():
+def test_a_join_ends_at_its_timeout() -> None:
     """The thread lives on; joining it again is allowed, joining oneself or too early is not."""
     assert play("""
         import threading, time
@@ -233,7 +235,7 @@ def test_a_join_ends_at_its_timeout():
     ]
 
 
-def test_many_threads_joined_in_turn_wake_nobody_else():
+def test_many_threads_joined_in_turn_wake_nobody_else() -> None:
     """A thread's number in memory is used again; what waits for the old one is not disturbed by the new."""
     assert play("""
         import threading, time
@@ -259,7 +261,7 @@ def test_many_threads_joined_in_turn_wake_nobody_else():
         "c.wait()",
     ],
 )
-def test_a_deadlock_is_idle_without_a_wish_to_wake(wait):
+def test_a_deadlock_is_idle_without_a_wish_to_wake(wait: str) -> None:
     """The grader is asked, not the processor: it learns that nothing but the world can go on."""
     assert play(f"""
         import queue, threading
@@ -271,7 +273,7 @@ def test_a_deadlock_is_idle_without_a_wish_to_wake(wait):
     """) == ["0 idle for ever"]
 
 
-def test_two_threads_that_want_each_others_lock_are_idle():
+def test_two_threads_that_want_each_others_lock_are_idle() -> None:
     """The textbook's deadlock."""
     assert play("""
         import threading, time
@@ -286,7 +288,7 @@ def test_two_threads_that_want_each_others_lock_are_idle():
     """) == ["100 idle for ever"]
 
 
-def test_a_lock_goes_to_whoever_has_waited_longest():
+def test_a_lock_goes_to_whoever_has_waited_longest() -> None:
     """First come, first served; a timeout gives up at its instant."""
     assert play("""
         import threading, time
@@ -317,7 +319,7 @@ def test_a_lock_goes_to_whoever_has_waited_longest():
     ]
 
 
-def test_a_lock_can_be_copied_no_more_than_elsewhere():
+def test_a_lock_can_be_copied_no_more_than_elsewhere() -> None:
     """A program that copies an object with a lock in it fails, and fails here as well."""
     said = play("""
         import copy, threading
@@ -334,7 +336,7 @@ def test_a_lock_can_be_copied_no_more_than_elsewhere():
     assert [line.partition(" ")[2] for line in said[:-1]] == [*["TypeError"] * 3, "<unlocked _thread.lock ob"[:24]]
 
 
-def test_locks_are_misused_with_the_same_errors():
+def test_locks_are_misused_with_the_same_errors() -> None:
     """Whatever raises in an ordinary program raises here, with the same words."""
     said = play("""
         import threading
@@ -373,7 +375,7 @@ def test_locks_are_misused_with_the_same_errors():
     ]
 
 
-def test_an_rlock_is_entered_again_by_its_owner_only():
+def test_an_rlock_is_entered_again_by_its_owner_only() -> None:
     """Another thread waits until it is left as often as it was entered."""
     assert play("""
         import threading, time
@@ -391,7 +393,7 @@ def test_an_rlock_is_entered_again_by_its_owner_only():
     """) == ["500 False", "2000 main", "2000 other", "2000 end"]
 
 
-def test_a_lock_is_released_when_its_block_raises():
+def test_a_lock_is_released_when_its_block_raises() -> None:
     """The with statement holds what it promises."""
     assert play("""
         import threading
@@ -404,7 +406,7 @@ def test_a_lock_is_released_when_its_block_raises():
     """) == ["0 False", "0 end"]
 
 
-def test_a_condition_wakes_as_many_as_it_is_told():
+def test_a_condition_wakes_as_many_as_it_is_told() -> None:
     """One, then all; `wait_for` looks at its predicate again and gives up at its timeout."""
     assert play("""
         import threading, time
@@ -433,7 +435,7 @@ def test_a_condition_wakes_as_many_as_it_is_told():
     """) == ["1000 a", "2000 b", "2000 c", "3000 True", "5000 False", "5500 False", "5500 end"]
 
 
-def test_semaphores_and_barriers_hold_threads_back():
+def test_semaphores_and_barriers_hold_threads_back() -> None:
     """Two at a time through the semaphore; all three at once through the barrier; a broken barrier raises."""
     assert play("""
         import threading, time
@@ -464,7 +466,7 @@ def test_semaphores_and_barriers_hold_threads_back():
     ]
 
 
-def test_thread_locals_and_names_stay_the_threads_own():
+def test_thread_locals_and_names_stay_the_threads_own() -> None:
     """What threads know about themselves is untouched."""
     assert play("""
         import threading, time
@@ -480,7 +482,7 @@ def test_thread_locals_and_names_stay_the_threads_own():
     """) == ["0 3", "0 True", "100 left", "100 right", "100 end"]
 
 
-def test_the_low_level_module_is_virtual_as_well():
+def test_the_low_level_module_is_virtual_as_well() -> None:
     """`_thread` is what everything above rests on."""
     assert play("""
         import _thread, time

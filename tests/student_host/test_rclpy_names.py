@@ -4,11 +4,16 @@ What they do is tested by programs that run on real nodes. This test only tells,
 release of ROS has renamed. ARCHITECTURE.md lists the same names.
 """
 
+from __future__ import annotations
+
 import ast
 import importlib
 import inspect
 import re
+import types
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,7 +88,7 @@ CPP = {
 }
 
 
-def found(place):
+def found(place: str) -> type[Any] | types.ModuleType:
     """Return a module, or a class in one."""
     module, _, path = place.partition(":")
     value = importlib.import_module(module)
@@ -92,35 +97,35 @@ def found(place):
     return value
 
 
-def bindings():
+def bindings() -> Any:
     """Return the module written in C++, as rclpy loads it."""
     return importlib.import_module(BINDINGS).rclpy_implementation
 
 
 @pytest.mark.parametrize(("place", "name"), [(place, name) for place, names in PYTHON.items() for name in names])
-def test_a_name_in_python_exists(place, name):
+def test_a_name_in_python_exists(place: str, name: str) -> None:
     """In the release that is installed."""
     assert hasattr(found(place), name)
 
 
 @pytest.mark.parametrize(("name", "place"), ASSIGNED.items())
-def test_an_attribute_of_instances_is_assigned(name, place):
+def test_an_attribute_of_instances_is_assigned(name: str, place: str) -> None:
     """No node is made to see it."""
     assert f"self.{name}" in inspect.getsource(found(place))
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in CPP.items() for name in names])
-def test_a_name_in_cpp_exists(kind, name):
+def test_a_name_in_cpp_exists(kind: str, name: str) -> None:
     """It has no source to look at and no promise to be kept."""
     assert hasattr(getattr(bindings(), kind) if kind else bindings(), name)
 
 
-def test_a_wait_set_can_be_derived_from():
+def test_a_wait_set_can_be_derived_from() -> None:
     """Virtual time stands on a subclass with the constructor and the methods of the original."""
     assert type("Derived", (bindings().WaitSet,), {}).__mro__[1] is bindings().WaitSet
 
 
-def names_used(path):
+def names_used(path: Path) -> Iterator[str]:
     """Yield what a file reads of the bindings, and the private attributes of anything that is not its own."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     own = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in ("self", "cls")}
@@ -133,14 +138,14 @@ def names_used(path):
 
 
 @pytest.mark.parametrize("file", ["ros", "ledger", "actions", "log", "wall"])
-def test_the_tables_hold_what_the_host_uses(file):
+def test_the_tables_hold_what_the_host_uses(file: str) -> None:
     """A new use of a private name has to be entered."""
     known = {name for table in (PYTHON, CPP) for names in table.values() for name in names} | set(ASSIGNED)
     known |= {"_Clock__clock", "_exit"}  # how Python spells `__clock` from outside; os._exit is documented
     assert set(names_used(ROOT / f"grader/student_host/{file}.py")) <= known
 
 
-def test_the_tables_hold_what_the_host_takes_and_sends():
+def test_the_tables_hold_what_the_host_takes_and_sends() -> None:
     """The host wraps the methods of actions by name."""
     actions = importlib.import_module("grader.student_host.actions")
     for table in (actions.TAKES, actions.SENDS):
@@ -148,7 +153,7 @@ def test_the_tables_hold_what_the_host_takes_and_sends():
         assert table["client"].keys() <= set(CPP["ActionClient"])
 
 
-def test_the_names_are_in_the_documents():
+def test_the_names_are_in_the_documents() -> None:
     """Who takes over reads there what a new release may break."""
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
     names = {name for names in PYTHON.values() for name in names} | set(ASSIGNED) | set(CPP[""])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+
 from pathlib import Path
+from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
+from archive import expected
 
 from grader.core.exercise import Outcome
 
@@ -53,18 +55,18 @@ CRITERIA = {
     },
 }
 
-MANIFEST = YAML(typ="safe").load((HERE / "expected.yaml").read_text(encoding="utf-8"))
+MANIFEST = expected()
 ENTRIES = pytest.mark.parametrize(("folder", "entry"), MANIFEST.items(), ids=list(MANIFEST))
 
 
-def test_every_folder_is_listed():
+def test_every_folder_is_listed() -> None:
     """No submission is forgotten, and none is expected that is not there."""
     folders = {f"{group}/{path.name}" for group in GROUPS for path in (HERE / group).iterdir() if path.is_dir()}
     assert folders == set(MANIFEST)
 
 
 @ENTRIES
-def test_entry_is_well_formed(folder: str, entry: dict):
+def test_entry_is_well_formed(folder: str, entry: dict[str, Any]) -> None:
     """Ids and outcomes are those of the exercises; nothing is expected to be undecided."""
     assert set(entry) == {"about", "graded", "expected"}
     assert set(entry["expected"]) <= set().union(*(CRITERIA[e] for e in entry["graded"]))
@@ -76,7 +78,7 @@ def test_entry_is_well_formed(folder: str, entry: dict):
 
 
 @ENTRIES
-def test_files_are_those_of_the_exercise(folder: str, entry: dict):
+def test_files_are_those_of_the_exercise(folder: str, entry: dict[str, Any]) -> None:
     """Each exercise's files are there under their names, and those of no other exercise."""
     names = {path.name for path in (HERE / folder).rglob("*.py")}
     wanted = set().union(*(FILES[e] for e in entry["graded"]))
@@ -86,7 +88,7 @@ def test_files_are_those_of_the_exercise(folder: str, entry: dict):
 
 
 @ENTRIES
-def test_files_compile(folder: str, entry: dict):
+def test_files_compile(folder: str, entry: dict[str, Any]) -> None:
     """Every file is Python that compiles without a warning, except where that is its fault."""
     sources = [(path.read_bytes(), str(path)) for path in sorted((HERE / folder).rglob("*.py"))]
     if folder in NOT_PYTHON:
