@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.core.exercise import Drawn, Exercise
 from grader.core.report import Report
 from grader.core.submission import Run
@@ -26,7 +26,7 @@ class Keeper:
         EvidenceError: Evidence cannot be kept in one of the folders.
     """
 
-    def __init__(self, folders: Sequence[Path], request: Request) -> None:
+    def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:
         for folder in folders:
             check_place(folder)
         self._folders = folders
@@ -47,7 +47,7 @@ class Keeper:
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
-def request_to_json(request: Request, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
+def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
     """Return what a command to reproduce the report needs besides path, seed and rubrics, and what variants came to."""
     return {
         "exercises": list(request.exercises),
@@ -60,10 +60,10 @@ def request_to_json(request: Request, exercises: Sequence[Exercise] = ()) -> dic
     }
 
 
-def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> Request:
+def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
     """Return the request that would record a kept run again, to be judged by these rubrics."""
     bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
-    return Request(
+    return GradeRequest(
         submission=submission,
         exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
         rubrics=rubrics,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from grader.app.grade import read_exercises
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.core.exercise import Criterion, Exercise
 from grader.core.explanation import CheckExplanation, CriterionExplanation, Parameter
@@ -86,7 +86,7 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
 
 
 def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
-    exercises = read_exercises(Request("", every=True, rubrics=rubrics, draw=First()))
+    exercises = read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()))
     return [(e, c) for e in exercises for c in e.criteria]
 
 

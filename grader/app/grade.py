@@ -12,7 +12,7 @@ from typing import Protocol
 
 import grader
 from grader.app.reproducing import reproduction
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
@@ -24,7 +24,7 @@ from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
 from grader.execution.plan import plan_scenario
-from grader.execution.recording_session import AUTO, NO_ISOLATION, Studio, open_studio, planned_clock
+from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
@@ -82,7 +82,7 @@ class Progress(Protocol):
 
 
 def grade(
-    request: Request,
+    request: GradeRequest,
     progress: Progress,
     hear: Callable[[Run, Sequence[Exercise]], None] | None = None,
     early: Callable[[Report], None] | None = None,
@@ -102,7 +102,7 @@ def grade(
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    with open_studio(request.isolation, request.workers, progress) as studio:
+    with open_session(request.isolation, request.workers, progress) as studio:
         progress("reading the submission")
         exercises = read_exercises(request)
         root = studio.folder / "submission"
@@ -143,7 +143,7 @@ def grade(
         return judge_run(exercises, run, pictures=pictures)
 
 
-def _record_one(studio: Studio, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
+def _record_one(studio: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
     return studio.recorder.record([replace(job, budget=budget)], progress)[0]
 
 
@@ -151,7 +151,7 @@ def _nobody_hears(key: tuple[str, str], trace: Trace) -> None:
     """Stand for whoever would hear of a trace early."""
 
 
-def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[Exercise]:
+def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> list[Exercise]:
     """Return the exercises to grade, in rubric order.
 
     Args:
@@ -168,7 +168,7 @@ def read_exercises(request: Request, submissions: Sequence[Path] = ()) -> list[E
     return [exercise for exercise in exercises if not request.exercises or exercise.id in request.exercises]
 
 
-def _builtin(request: Request) -> list[Path]:
+def _builtin(request: GradeRequest) -> list[Path]:
     """Return the files of the built-in rubrics that are asked for; the others need not be read."""
     headers = builtin_headers()
     require_exercises(request.exercises, [header.id for header in headers])
@@ -176,7 +176,7 @@ def _builtin(request: Request) -> list[Path]:
     return [header.path for header in headers if header.id in wanted]
 
 
-def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry | None:
+def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:
     """Return the /odom recording, if one was named or an exercise plays one."""
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
@@ -185,7 +185,7 @@ def read_recording(request: Request, exercises: Sequence[Exercise]) -> Odometry 
 
 
 def plan_jobs(
-    request: Request, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
+    request: GradeRequest, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
 ) -> dict[tuple[str, str], Job]:
     """Return what has to be recorded, by exercise and scenario; a scenario with a missing file is left out."""
     clock = planned_clock(request.clock)
@@ -215,14 +215,14 @@ def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
 
 
-def _staged(request: Request, exercises: Sequence[Exercise], root: Path) -> Submission:
+def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) -> Submission:
     wanted = wanted_files(exercises)
     if request.collected is not None:
         return stage_collected(request.collected, request.submission, wanted, root)
     return stage_submission(request.submission, wanted, root)
 
 
-def _seed_notes(request: Request) -> tuple[str, ...]:
+def _seed_notes(request: GradeRequest) -> tuple[str, ...]:
     """Say that the drawn values could be known beforehand, if so."""
     return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
 
@@ -234,7 +234,7 @@ def _release_notes(distro: str) -> tuple[str, ...]:
     return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
 
 
-def _isolation_notes(studio: Studio) -> tuple[str, ...]:
+def _isolation_notes(studio: RecordingSession) -> tuple[str, ...]:
     """Say that the submission ran without walls, or what its sandbox does not hold back."""
     if studio.isolation.name == NO_ISOLATION:
         return ("the submission ran without a sandbox: as asked",)
@@ -242,7 +242,7 @@ def _isolation_notes(studio: Studio) -> tuple[str, ...]:
     return (f"sandbox {studio.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
 
 
-def _environment(studio: Studio) -> Environment:
+def _environment(studio: RecordingSession) -> Environment:
     return Environment(
         grader=grader.__version__,
         ros_distro=studio.ros.distro,

@@ -16,7 +16,7 @@ from grader.core.summary import Summary
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
 from grader.execution.plan import plan_scenario
-from grader.execution.recording_session import open_studio, planned_clock
+from grader.execution.recording_session import open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import summarise
 from grader.rubrics.builtin import builtin_odometry
@@ -86,7 +86,7 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         scenario = _undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
     odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
-    with open_studio(request.isolation, progress=progress) as studio:
+    with open_session(request.isolation, progress=progress) as studio:
         submission = _stage(request.files, names, studio.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)

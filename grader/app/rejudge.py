@@ -16,7 +16,7 @@ from grader.app.evidence_writer import request_of
 from grader.app.exit_codes import UNUSABLE, exit_code
 from grader.app.grade import read_exercises
 from grader.app.reproducing import command_words
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import Report
@@ -24,9 +24,9 @@ from grader.execution.evidence.store import Evidence, first_report, found_under,
 from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
 from grader.reporting.delivery import Output, write_whole
-from grader.reporting.formats import FORMATS, Layout, rendered
+from grader.reporting.formats import FORMATS, PageLayout, rendered
 from grader.reporting.json_report import dumps, report_to_json
-from grader.reporting.rejudged import Change, Result, change
+from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.variants import First
 
 #: Fewer submissions than this are judged in this process.
@@ -78,7 +78,7 @@ def judgement(
     chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
 ) -> Judgement:
     """Return how to judge; raises RubricError for a rubric that cannot be used or an exercise that none has."""
-    exercises = read_exercises(Request("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
+    exercises = read_exercises(GradeRequest("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
     return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
 
 
@@ -98,7 +98,7 @@ def rejudge(evidence: Evidence, how: Judgement) -> Report:
     return judge_run(exercises, replace(run, reproduce=again), pictures=how.pictures)
 
 
-def what_changed(name: str, evidence: Evidence, report: Report) -> Change | None:
+def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange | None:
     """Return what a new report changes for a submission; None if its first report is gone."""
     before = first_report(evidence)
     if before is None:
@@ -131,7 +131,7 @@ def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
 
 def rejudge_class(
     named: Sequence[tuple[str, Path]], how: Judgement, wanted: Wanted, *, jobs: int | None = None
-) -> list[Result]:
+) -> list[RejudgedResult]:
     """Return one result for each submission, in the order given; one that cannot be judged keeps no other back.
 
     Args:
@@ -171,21 +171,21 @@ def _little_collecting() -> Iterator[None]:
         gc.unfreeze()
 
 
-def _result_there(named: tuple[str, Path]) -> Result:
+def _result_there(named: tuple[str, Path]) -> RejudgedResult:
     return _result(*named, *_task[0])
 
 
-def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Result:
+def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> RejudgedResult:
     try:
         evidence = open_evidence(folder)
         report = rejudge(evidence, how)
         _write(name, report, wanted)
     except GraderError as error:
-        return Result(name, problem=error.message, code=UNUSABLE)
+        return RejudgedResult(name, problem=error.message, code=UNUSABLE)
     except OSError as error:
-        return Result(name, problem=f"its report cannot be written: {error.strerror or error}", code=UNUSABLE)
+        return RejudgedResult(name, problem=f"its report cannot be written: {error.strerror or error}", code=UNUSABLE)
     seen = told(report, wanted.readers)
-    return Result(
+    return RejudgedResult(
         name,
         score=float(seen.score),
         max_score=float(seen.max_score),
@@ -200,7 +200,7 @@ def _write(name: str, report: Report, wanted: Wanted) -> None:
         if output.path is not None:
             path = output.path / f"{name}{FORMATS[output.format].suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
-            text = rendered(output.format, report, Layout(_WIDTH, colour=False), wanted.readers)
+            text = rendered(output.format, report, PageLayout(_WIDTH, colour=False), wanted.readers)
             write_whole(path, text.encode())
 
 
@@ -218,7 +218,7 @@ def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:
     return [exercise for exercise in how.exercises if exercise.id in held]
 
 
-def _as_recorded(exercises: list[Exercise], request: Request) -> list[Exercise]:
+def _as_recorded(exercises: list[Exercise], request: GradeRequest) -> list[Exercise]:
     """Return the exercises with the values that were this student's own when they were graded."""
     if all(exercise.variant is None for exercise in exercises):
         return exercises
@@ -234,7 +234,7 @@ def _name(folder: Path, root: Path) -> str:
     return "/".join(parts)
 
 
-def codes(results: Sequence[Result]) -> Iterator[int]:
+def codes(results: Sequence[RejudgedResult]) -> Iterator[int]:
     """Yield the exit codes of all submissions, that which matters most first."""
     order = (UNUSABLE, 3, 1, 0)
     yield from sorted((r.code for r in results), key=order.index)

@@ -6,14 +6,16 @@ import hashlib
 import os
 from collections.abc import Sequence
 
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.core.exercise import Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import Reproduction
 from grader.execution.bag import Odometry
 
 
-def reproduction(request: Request, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int) -> Reproduction:
+def reproduction(
+    request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
+) -> Reproduction:
     """Return what gives a report again.
 
     Args:
@@ -29,7 +31,7 @@ def reproduction(request: Request, exercises: Sequence[Exercise], odometry: Odom
     )
 
 
-def command_words(request: Request, seed: int) -> tuple[str, ...]:
+def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
     """Return the words of the command, with the seed used and every option that the result depends on."""
     words = ["grade", _plainly_a_path(request.submission)]
     for exercise in request.exercises:

@@ -12,7 +12,7 @@ from grader.submissions.collected import Collected
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class GradeRequest:
     """What is to be graded, and how.
 
     Attributes:

@@ -12,7 +12,7 @@ from grader.app.seeds import read_key
 from grader.core.errors import VariantError
 from grader.core.exercise import Drawn, Exercise, Value
 from grader.rubrics.loader import read_rubric
-from grader.rubrics.variants import Options
+from grader.rubrics.variants import VariantOptions
 from grader.submissions.collected import shown
 
 #: Longest id of a student.
@@ -33,7 +33,7 @@ class ByKey:
     key: bytes
     student: str
 
-    def value(self, exercise: str, options: Options) -> Value | None:
+    def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Return the value that HMAC-SHA256 picks for exercise, variant and student."""
         text = "\n".join((_SCHEME, exercise, options.name, folded(self.student)))
         digest = hmac.new(self.key, text.encode(), hashlib.sha256).digest()

@@ -11,7 +11,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class DraftQuantity:
     """Text that is written as it is: a number with its unit."""
 
     text: str
@@ -140,9 +140,9 @@ def scenario_id(draft: Draft) -> str:
 
 
 def _scenario(draft: Draft) -> Iterator[str]:
-    observe: dict[str, Any] = {"duration": Quantity(f"{draft.duration_s:g} s")}
+    observe: dict[str, Any] = {"duration": DraftQuantity(f"{draft.duration_s:g} s")}
     if draft.after:
-        observe |= {"after_first_message_on": draft.after, "wait_at_most": Quantity("60 s")}
+        observe |= {"after_first_message_on": draft.after, "wait_at_most": DraftQuantity("60 s")}
     yield from ("scenarios:", f"  - id: {scenario_id(draft)}", f"    processes: {_value(list(draft.files))}")
     if draft.may_exit:
         yield f"    may_exit: {_value(list(draft.may_exit))}"
@@ -196,7 +196,7 @@ def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator
 
 def _value(value: Any) -> str:
     """Return a value as YAML writes it on one line."""
-    if isinstance(value, Quantity):
+    if isinstance(value, DraftQuantity):
         return value.text
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_plain(str(key))}: {_value(inner)}" for key, inner in value.items()) + "}"

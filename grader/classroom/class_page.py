@@ -10,10 +10,10 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from grader.classroom.cache_key import Conditions
-from grader.classroom.gradebook import Classbook, Row, Status, exactly, number, remarks
+from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
 from grader.classroom.roster import Person, fold_name
 from grader.classroom.watching import clock_time
-from grader.reporting.class_page.contents import ClassPage, Entry, Listing, PageLink, RunFacts, Student, Tone
+from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def folders_of(paths: Sequence[Path]) -> tuple[str, ...]:
 _MIB = 1 << 20
 
 
-def run_facts(book: Classbook, run: RunOfClass) -> RunFacts:
+def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
     """Return what the header of the page says.
 
     Args:
@@ -72,7 +72,7 @@ def run_facts(book: Classbook, run: RunOfClass) -> RunFacts:
     return RunFacts(line, tuple(_rows(book, run, reports)), tuple(_warnings(run, reports)))
 
 
-def _rows(book: Classbook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
     conditions = run.conditions
     seed = conditions.seed
     yield "grader", _counted(_versions(report) for report in reports) or conditions.grader
@@ -110,7 +110,7 @@ def _clock(asked: str, reports: Sequence[Mapping[str, Any]]) -> str:
     return f"asked for: {asked}; on the wall clock in part or whole: {walls} of {len(reports)}"
 
 
-def _cost(book: Classbook) -> str:
+def _cost(book: Gradebook) -> str:
     used = [row.standing for row in book.rows if row.standing is not None]
     processor = sum(standing.usage.get("processor_s", 0.0) for standing in used)
     peak = max((standing.usage.get("peak_bytes", 0.0) for standing in used), default=0.0)
@@ -126,12 +126,12 @@ def _counted(texts: Iterable[str]) -> str:
 
 
 _TONES = {
-    Status.GRADED: Tone.FINE,
-    Status.UNDECIDED: Tone.OURS,
-    Status.FAILED: Tone.OURS,
-    Status.REFUSED: Tone.THEIRS,
-    Status.NOT_RUN: Tone.NOTHING,
-    Status.MISSING: Tone.NOTHING,
+    Status.GRADED: RowTone.FINE,
+    Status.UNDECIDED: RowTone.OURS,
+    Status.FAILED: RowTone.OURS,
+    Status.REFUSED: RowTone.THEIRS,
+    Status.NOT_RUN: RowTone.NOTHING,
+    Status.MISSING: RowTone.NOTHING,
 }
 _NOT_GRADED = (Status.REFUSED, Status.FAILED, Status.NOT_RUN)
 # A path of three parts or more in the problem of a submission is one of this machine; ROS names are shorter.
@@ -139,7 +139,7 @@ _PATH = re.compile(r"(?<![\w.])/(?:[^/\s:'\"`]+/){2,}([^/\s:'\"`]+)")
 _ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not come back"}
 
 
-def class_page(book: Classbook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
+def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
     """Return the page of a class.
 
     Args:
@@ -153,9 +153,9 @@ def class_page(book: Classbook, run: RunOfClass, links: Sequence[PageLink] = ())
     return ClassPage(run.title, run_facts(book, run), students, tuple(listings), tuple(links))
 
 
-def _student(row: Row, run: RunOfClass) -> Student:
+def _student(row: Row, run: RunOfClass) -> StudentRow:
     adjusted = row.adjusted
-    return Student(
+    return StudentRow(
         folder=row.name,
         name=_name(row),
         also=tuple(dict.fromkeys(text for text in _also(row) if text and text != _name(row))),
@@ -204,7 +204,7 @@ def _adjustments(row: Row) -> Iterator[str]:
         yield adjusted.reason
 
 
-def _listings(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
+def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
     """Yield all lists, empty ones too."""
     undecided = [(k, row) for k, row in enumerate(rows) if row.status is Status.UNDECIDED]
     yield Listing(
@@ -218,7 +218,7 @@ def _listings(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator
         "Not graded",
         "There is no report. What was refused is for the student to mend; --rerun failed tries again what failed here.",
         tuple(
-            Entry(f"{row.status.value}{_problem(row, run)}", k)
+            PageEntry(f"{row.status.value}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
             if row.status in _NOT_GRADED
         ),
@@ -232,15 +232,15 @@ def _listings(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield from _roster(book, rows, run)
 
 
-def _roster(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
+def _roster(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
     matching = book.matching
     place = {row.name: k for k, row in enumerate(rows) if row.name}
 
-    def named(names: Sequence[str], text: str) -> tuple[Entry, ...]:
-        return tuple(Entry(text, place.get(name)) for name in names)
+    def named(names: Sequence[str], text: str) -> tuple[PageEntry, ...]:
+        return tuple(PageEntry(text, place.get(name)) for name in names)
 
-    twins = tuple(Entry(" = ".join(names), place.get(names[0])) for names in matching.duplicates)
-    missing = tuple(Entry("nothing handed in", k) for k, row in enumerate(rows) if row.status is Status.MISSING)
+    twins = tuple(PageEntry(" = ".join(names), place.get(names[0])) for names in matching.duplicates)
+    missing = tuple(PageEntry("nothing handed in", k) for k, row in enumerate(rows) if row.status is Status.MISSING)
     outdated = [row.name for row in rows if row.outdated]
     yield Listing(
         "unmatched",
@@ -268,16 +268,16 @@ def _roster(book: Classbook, rows: Sequence[Row], run: RunOfClass) -> Iterator[L
     yield Listing("remarks", "To know", "What else was noticed.", _texts(book.remarks, run))
 
 
-def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[Entry, ...]:
-    return tuple(Entry(without_folders(text, run.folders)) for text in texts)
+def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:
+    return tuple(PageEntry(without_folders(text, run.folders)) for text in texts)
 
 
-def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[Entry]:
+def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
     for exercise in _exercises(row):
         for criterion in exercise["criteria"]:
             if criterion["outcome"] == "undecided":
                 said = without_folders(str(criterion["reason"]), run.folders)
-                yield Entry(f"{criterion['title']}: {said}", index, f"{exercise['id']}-{criterion['id']}")
+                yield PageEntry(f"{criterion['title']}: {said}", index, f"{exercise['id']}-{criterion['id']}")
 
 
 def _problem(row: Row, run: RunOfClass) -> str:
@@ -286,14 +286,14 @@ def _problem(row: Row, run: RunOfClass) -> str:
     return f": {'; '.join(said)}" if said else ""
 
 
-def _faults(index: int, row: Row) -> Iterator[Entry]:
+def _faults(index: int, row: Row) -> Iterator[PageEntry]:
     for exercise in _exercises(row):
         for fault in exercise.get("faults", ()):
             where = f"{fault['file']}:{fault['line']}" if fault["line"] else fault["file"] or "a node"
             what = _ENDED.get(fault["kind"], str(fault["kind"]).replace("_", " "))
             when = f" at t = {fault['t_s']:.3f} s" if fault["t_s"] else ""
             text = str(fault["text"]).strip().rsplit("\n", 1)[-1]
-            yield Entry(f"{where}: {what}{when}: {text}", index, str(exercise["id"]))
+            yield PageEntry(f"{where}: {what}{when}: {text}", index, str(exercise["id"]))
 
 
 def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:

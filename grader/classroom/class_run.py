@@ -17,18 +17,18 @@ from typing import Any
 import grader
 from grader.app.grade import read_exercises, read_recording
 from grader.app.reproducing import recording_digest
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
 from grader.classroom.cache_key import Conditions
 from grader.classroom.class_page import RunOfClass, folders_of, title_of
-from grader.classroom.gradebook import Classbook, ReportData, decisions_for, make_classbook
+from grader.classroom.gradebook import Gradebook, ReportData, decisions_for, make_gradebook
 from grader.classroom.grading import ClassRun
-from grader.classroom.intake import Entry, Intake, take_in
+from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
 from grader.classroom.outputs import CLASS, class_files, exports
-from grader.classroom.request import Course, digest_of, due_now
-from grader.classroom.roster import Matching, match, read_roster
+from grader.classroom.request import ClassRequest, digest_of, due_now
+from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.similar import compare_class, link_of_before
 from grader.classroom.store import SEED_KEY, Store, open_store
 from grader.classroom.summary import Graded, summary_json
@@ -42,7 +42,7 @@ from grader.rubrics.variants import First
 
 
 def grade_class(
-    course: Course,
+    course: ClassRequest,
     watcher: Watcher,
     warn: Callable[[str], None],
     make_scheduler: MakeScheduler = LocalScheduler,
@@ -90,7 +90,7 @@ def grade_class(
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
-def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions:
+def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
     """Return what all results of a class depend on; raises RecordingError for a recording that cannot be used."""
     odometry = read_recording(grading, exercises)
     return Conditions(
@@ -106,12 +106,12 @@ def conditions_of(grading: Request, exercises: Sequence[Exercise]) -> Conditions
     )
 
 
-def _digest(entry: Entry, scratch: Path) -> str:
+def _digest(entry: HandedInEntry, scratch: Path) -> str:
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         return digest_of(entry, Path(folder))
 
 
-def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: Course) -> dict[str, Conditions]:
+def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: ClassRequest) -> dict[str, Conditions]:
     """Return the conditions with the seed of each submission: what grades it is told the seed, never the key."""
     if course.grading.seed is not None:
         return dict(own)
@@ -120,10 +120,10 @@ def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: C
 
 
 def _book(
-    store: Store, intake: Intake, matching: Matching, adjustments: Adjustments, keys: Mapping[str, str]
-) -> Classbook:
+    store: Store, intake: Intake, matching: RosterMatch, adjustments: Adjustments, keys: Mapping[str, str]
+) -> Gradebook:
     names = {entry.name for entry in intake.entries}
-    return make_classbook(
+    return make_gradebook(
         intake,
         matching,
         adjustments,
@@ -135,7 +135,7 @@ def _book(
     )
 
 
-def _compared(graded: Graded, intake: Intake, course: Course, store: Store) -> Graded:
+def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store) -> Graded:
     """Return the class with what is said of similar submissions, if that was asked for."""
     if course.given is None:
         return replace(graded, links=link_of_before(store))
@@ -143,7 +143,7 @@ def _compared(graded: Graded, intake: Intake, course: Course, store: Store) -> G
     return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
 
 
-def _run(course: Course, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
+def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
     """Return what belongs to this run alone; without what was graded it is one that was stopped."""
     return RunOfClass(
         conditions=conditions,
@@ -158,7 +158,7 @@ def _run(course: Course, conditions: Conditions, began_s: float, graded: Graded 
     )
 
 
-def _written(graded: Graded, run: RunOfClass, store: Store, course: Course) -> Graded:
+def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest) -> Graded:
     """Write what is made for the whole class, and return the class with what was written."""
     wanted = course.platforms
     names = [row.name for row in graded.book.rows if row.report is not None] if wanted.gradescope else []

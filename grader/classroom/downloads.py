@@ -66,7 +66,7 @@ class Named:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class DownloadLayout:
     """How the entries of one download are named.
 
     Attributes:
@@ -96,7 +96,7 @@ class Layout:
         return Named({k: v for k, v in groups.items() if k != "late"}, file, late="late" in groups)
 
 
-def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> Layout:
+def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
     """Return the layout of a download.
 
     Args:
@@ -109,19 +109,19 @@ def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> L
         ClassError: The regular expression cannot be used.
     """
     if pattern:
-        return Layout("pattern", _compiled(pattern))
+        return DownloadLayout("pattern", _compiled(pattern))
     if wanted in PATTERNS:
-        return Layout(wanted, re.compile(PATTERNS[wanted], re.DOTALL))
+        return DownloadLayout(wanted, re.compile(PATTERNS[wanted], re.DOTALL))
     if wanted in (GITHUB, CLASSROOM50):
-        return Layout(wanted, prefix=_slug(place, labels) or _common(labels))
+        return DownloadLayout(wanted, prefix=_slug(place, labels) or _common(labels))
     if wanted == FOLDERS:
-        return Layout(FOLDERS)
+        return DownloadLayout(FOLDERS)
     for name in (MOODLE, CANVAS):
         layout = layout_of(name, "", place, labels)
         if labels and sum(layout.read(label).recognised for label in labels) * 2 > len(labels):
             return layout
     slug = _slug(place, labels)
-    return Layout(GITHUB, prefix=slug) if slug else Layout(FOLDERS)
+    return DownloadLayout(GITHUB, prefix=slug) if slug else DownloadLayout(FOLDERS)
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:

@@ -12,9 +12,9 @@ from fractions import Fraction
 from typing import Any
 
 from grader.classroom.adjustments import Adjusted, Adjustments, Decision, adjust, unknown_student
-from grader.classroom.intake import Entry, Intake
-from grader.classroom.roster import Matching, Person, fold_handle
-from grader.classroom.store import Kept, Standing, State
+from grader.classroom.intake import HandedInEntry, Intake
+from grader.classroom.roster import Person, RosterMatch, fold_handle
+from grader.classroom.store import Kept, ResultStatus, State
 from grader.reporting.escape import csv_cell, shown
 
 #: A report as JSON values.
@@ -56,7 +56,7 @@ class Row:
     person: Person | None
     status: Status
     problem: str = ""
-    standing: Standing | None = None
+    standing: ResultStatus | None = None
     report: ReportData | None = None
     handed_back: ReportData | None = None
     adjusted: Adjusted = field(default_factory=Adjusted)
@@ -76,7 +76,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Classbook:
+class Gradebook:
     """A class.
 
     Attributes:
@@ -89,7 +89,7 @@ class Classbook:
     """
 
     rows: tuple[Row, ...]
-    matching: Matching = field(default_factory=Matching)
+    matching: RosterMatch = field(default_factory=RosterMatch)
     strays: tuple[str, ...] = ()
     foreign: tuple[str, ...] = ()
     layouts: tuple[tuple[str, str], ...] = ()
@@ -113,9 +113,9 @@ def exactly(number: float) -> Fraction:
     return Fraction(str(round(number, 6)))
 
 
-def make_classbook(  # noqa: PLR0913  each comes from another place
+def make_gradebook(  # noqa: PLR0913  each comes from another place
     intake: Intake,
-    matching: Matching,
+    matching: RosterMatch,
     adjustments: Adjustments,
     *,
     kept: Mapping[str, Kept],
@@ -123,7 +123,7 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
     report_of: Callable[[str], ReportData | None],
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
-) -> Classbook:
+) -> Gradebook:
     """Put a class together.
 
     Args:
@@ -155,10 +155,12 @@ def make_classbook(  # noqa: PLR0913  each comes from another place
     remarks = [f"marked as late by the platform, but no late days are named: {', '.join(late)}"] if late else []
     odd = [entry.name for entry in intake.entries if not entry.recognised]
     remarks += [f"named otherwise than the layout names submissions: {', '.join(odd)}"] if odd else []
-    return Classbook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
+    return Gradebook(tuple(rows), matching, intake.strays, tuple(foreign), intake.layouts, tuple(remarks))
 
 
-def decisions_for(entries: Sequence[Entry], matching: Matching, adjustments: Adjustments) -> dict[str, Decision]:
+def decisions_for(
+    entries: Sequence[HandedInEntry], matching: RosterMatch, adjustments: Adjustments
+) -> dict[str, Decision]:
     """Return name of an entry -> what was decided; raises ClassError for a decision about nobody of this class."""
     found: dict[str, Decision] = {}
     for who, decision in adjustments.students.items():
@@ -171,7 +173,7 @@ def decisions_for(entries: Sequence[Entry], matching: Matching, adjustments: Adj
     return found
 
 
-def _called(entry: Entry, person: Person | None) -> set[str]:
+def _called(entry: HandedInEntry, person: Person | None) -> set[str]:
     own = {fold_handle(text) for text in (entry.name, entry.label, *entry.identity.values())}
     return own | (_handles(person) if person is not None else set())
 
@@ -180,11 +182,11 @@ def _handles(person: Person) -> set[str]:
     return {*person.handles, *(fold_handle(t) for t in (person.name, person.user, person.email, person.id) if t)}
 
 
-def _has_report(standing: Standing | None) -> bool:
+def _has_report(standing: ResultStatus | None) -> bool:
     return standing is not None and standing.state in (State.GRADED, State.UNDECIDED)
 
 
-def _row(entry: Entry, matching: Matching, kept: Kept, report: ReportData | None, key: str) -> Row:
+def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: ReportData | None, key: str) -> Row:
     result, last = kept.result, kept.last
     known = result is not None and (report is not None or not _has_report(result))
     return Row(
@@ -227,7 +229,7 @@ COLUMNS = (
 _TEXT_LIMIT = 2_000
 
 
-def render_gradebook(book: Classbook) -> str:
+def render_gradebook(book: Gradebook) -> str:
     """Return the gradebook: one row for everybody, then points by exercise and criterion."""
     exercises, criteria = _asked(book.rows)
     header = [*COLUMNS, *exercises, *(f"{e}/{c}" for e, c in criteria)]

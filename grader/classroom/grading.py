@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.classroom.cache_key import Conditions, unusable_digest
-from grader.classroom.intake import Entry
+from grader.classroom.intake import HandedInEntry
 from grader.classroom.local import MakeScheduler, Task
-from grader.classroom.request import CHANGED, Course
-from grader.classroom.store import Standing, State, Store
+from grader.classroom.request import CHANGED, ClassRequest
+from grader.classroom.store import ResultStatus, State, Store
 from grader.classroom.watching import Watcher
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.exercise import Exercise
@@ -43,13 +43,13 @@ class ClassRun:
         watcher: Hears how it gets on.
     """
 
-    course: Course
+    course: ClassRequest
     exercises: Sequence[Exercise]
     conditions: Mapping[str, Conditions]
     store: Store
     watcher: Watcher
 
-    def grade(self, due: Sequence[Entry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
+    def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
         """Grade what is due, and return the names of those whose result is still the one of before.
 
         Args:
@@ -72,7 +72,7 @@ class ClassRun:
         return self._schedule(usable, warn, make, left)
 
     def _schedule(
-        self, usable: Sequence[Entry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
+        self, usable: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
     ) -> tuple[str, ...]:
         for name, data in ({} if self.course.standalone else shared_assets()).items():
             self.store.write(f"assets/{name}", data)
@@ -91,7 +91,7 @@ class ClassRun:
                 self._stop_if_full(attempt.standing)
         return tuple(sorted(not_replaced))
 
-    def _take(self, name: str, fresh: Path, standing: Standing, left: set[str]) -> bool:
+    def _take(self, name: str, fresh: Path, standing: ResultStatus, left: set[str]) -> bool:
         """Take in what came of a submission; return whether it is its result now."""
         replaced = self.store.commit(name, fresh, standing)
         left.discard(name)
@@ -104,7 +104,7 @@ class ClassRun:
         if self.course.rerun != CHANGED:
             self.store.note_pending(self.course.rerun, left)
 
-    def _task(self, entry: Entry, workers: int) -> Task:
+    def _task(self, entry: HandedInEntry, workers: int) -> Task:
         grading = self.course.grading
         return Task(
             name=entry.name,
@@ -121,11 +121,11 @@ class ClassRun:
             deadline_s=deadline_s(self.course.grading.time_budget_s),
         )
 
-    def _refused(self, entry: Entry) -> Standing:
+    def _refused(self, entry: HandedInEntry) -> ResultStatus:
         digest = unusable_digest(SubmissionError(entry.problem))
-        return Standing(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
+        return ResultStatus(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
 
-    def _stop_if_full(self, standing: Standing) -> None:
+    def _stop_if_full(self, standing: ResultStatus) -> None:
         """Raise HarnessError if an attempt failed because a disk is full: the others would fail too."""
         if standing.state is not State.FAILED:
             return

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.classroom.downloads import AUTO, PATTERNS, Layout, Named, layout_of, unpack_download
+from grader.classroom.downloads import AUTO, PATTERNS, DownloadLayout, Named, layout_of, unpack_download
 from grader.core.errors import ClassError, HarnessError, SubmissionError
 from grader.submissions.archives import ARCHIVE_SUFFIXES
 from grader.submissions.collected import objection, passed_over_file, passed_over_folder, shown, unnoticed
@@ -57,7 +57,7 @@ MAX_FILE_BYTES = 64 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class HandedInEntry:
     """One submission of a class.
 
     Attributes:
@@ -89,7 +89,7 @@ class Intake:
         strays: What is no submission, and why; one line each.
     """
 
-    entries: tuple[Entry, ...]
+    entries: tuple[HandedInEntry, ...]
     layouts: tuple[tuple[str, str], ...]
     strays: tuple[str, ...] = ()
 
@@ -154,13 +154,13 @@ def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[
     return unpacked.folder, unpacked.refused
 
 
-def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> Layout:
+def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> DownloadLayout:
     """Return how the submissions in a folder are named; single files count only where there is nothing else."""
     names = [child.name for child in children if child.is_dir() or _is_archive(child)]
     return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
 
 
-def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: list[str]) -> _ByStudent:
+def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, strays: list[str]) -> _ByStudent:
     found: _ByStudent = {}
     for child in children:
         if child.is_symlink():
@@ -177,7 +177,7 @@ def _submissions(children: Sequence[Path], own: str, layout: Layout, strays: lis
     return found
 
 
-def _read(layout: Layout, child: Path) -> tuple[Named, str]:
+def _read(layout: DownloadLayout, child: Path) -> tuple[Named, str]:
     """Return what a name says, with or without the ending of an archive, and the name without it."""
     whole = layout.read(child.name)
     label = child.name if child.is_dir() else _stem(child.name)
@@ -186,7 +186,7 @@ def _read(layout: Layout, child: Path) -> tuple[Named, str]:
     return layout.read(label), label
 
 
-def _student(name: str, named: Named, layout: Layout) -> tuple[str, ...]:
+def _student(name: str, named: Named, layout: DownloadLayout) -> tuple[str, ...]:
     """Return what tells students of one source apart: who they are where a platform deals in files, else the name."""
     who = tuple(f"{key}={value}" for key, value in sorted(named.identity.items()))
     return who if who and (named.file or layout.name in PATTERNS) else ("", name)
@@ -198,19 +198,19 @@ def _found(path: Path, label: str, own: str, named: Named) -> _Found:
     return _Found(f"{own}/{path.name}", wish if named.file else label, wish, path, named, files=files)
 
 
-def _refuse(found: _ByStudent, path: Path, own: str, layout: Layout, problem: str) -> None:
+def _refuse(found: _ByStudent, path: Path, own: str, layout: DownloadLayout, problem: str) -> None:
     """Take note of a submission of which something was not unpacked; then nothing of it is graded."""
     named = layout.read(path.name)
     one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named))
     one.problem = problem
 
 
-def _entry(one: _Found, name: str, results: Path) -> Entry:
+def _entry(one: _Found, name: str, results: Path) -> HandedInEntry:
     path, problem = one.path, one.problem
     if one.files and not problem:
         path = results / "unpacked" / "together" / name
         problem = _put_together(one.files, path)
-    return Entry(name, one.label, path, one.named.identity, one.named.late, one.named.recognised, problem)
+    return HandedInEntry(name, one.label, path, one.named.identity, one.named.late, one.named.recognised, problem)
 
 
 def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:

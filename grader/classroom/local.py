@@ -19,7 +19,7 @@ import msgspec
 
 from grader.classroom import store as kept
 from grader.classroom.cache_key import Conditions
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.core.checkup import NO_WALLS, missing
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation
@@ -65,7 +65,7 @@ class Attempt:
     """What came of a task; its files are in the folder that the task named."""
 
     task: Task
-    standing: Standing
+    standing: ResultStatus
 
 
 class Hear(Protocol):
@@ -76,7 +76,7 @@ class Hear(Protocol):
         ...
 
 
-class Scheduler(Protocol):
+class ClassScheduler(Protocol):
     """Grades submissions, several at the same time, on this machine or on others."""
 
     def prepare(self, isolation: str) -> Sequence[str]:
@@ -100,7 +100,7 @@ class Scheduler(Protocol):
 
 
 #: Makes the scheduler for so many submissions at a time.
-MakeScheduler = Callable[[int], Scheduler]
+MakeScheduler = Callable[[int], ClassScheduler]
 
 
 #: Longest line that a process may say.
@@ -126,7 +126,7 @@ class LocalScheduler:
         self._closed = False
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Look for ROS and try the sandbox; see `Scheduler`."""
+        """Look for ROS and try the sandbox; see `ClassScheduler`."""
         choice = choose_isolation(isolation, find_ros())
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
@@ -136,7 +136,7 @@ class LocalScheduler:
         return warnings
 
     def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
-        """Yield what comes of each task; see `Scheduler`."""
+        """Yield what comes of each task; see `ClassScheduler`."""
         # The system ends a process with the thread that started it: these threads live until all is done.
         pool = ThreadPoolExecutor(self._jobs, thread_name_prefix="batch")
         try:
@@ -190,7 +190,7 @@ class LocalScheduler:
             self._running.add(process)
         return process
 
-    def _listen(self, process: subprocess.Popen[bytes], task: Task, hear: Hear) -> Standing | None:
+    def _listen(self, process: subprocess.Popen[bytes], task: Task, hear: Hear) -> ResultStatus | None:
         """Return what a process says of its task at last; None if it ends before."""
         assert process.stdin is not None
         assert process.stdout is not None
@@ -242,4 +242,4 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 
 def _failed(task: Task, problem: str) -> Attempt:
-    return Attempt(task, Standing(State.FAILED, "", "", task.label, problem, "run the same command again"))
+    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, "run the same command again"))

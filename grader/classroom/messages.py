@@ -22,7 +22,7 @@ MAX_ANSWER_FILES = 1_000
 
 # Names of files are bytes: what a student calls a file need not be text.
 Files = tuple[tuple[bytes, bytes], ...]
-_Parcel = TypeVar("_Parcel", "Terms", "Errand", "Answer", "Fitness", "_Reading")
+_Parcel = TypeVar("_Parcel", "Terms", "GradingJob", "JobResult", "Fitness", "_Reading")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Terms:
 
 
 @dataclass(frozen=True, slots=True)
-class Errand:
+class GradingJob:
     """One submission to grade.
 
     Attributes:
@@ -72,7 +72,7 @@ class Errand:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class JobResult:
     """What came of one submission.
 
     Attributes:
@@ -113,7 +113,7 @@ class _Reading:
     notes: tuple[bytes, ...]
 
 
-def pack(parcel: Terms | Errand | Answer | Fitness) -> bytes:
+def pack(parcel: Terms | GradingJob | JobResult | Fitness) -> bytes:
     """Return a parcel as bytes."""
     return msgspec.msgpack.encode(parcel)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.classroom.class_page import RunOfClass, class_page
-from grader.classroom.gradebook import Classbook, render_gradebook
+from grader.classroom.gradebook import Gradebook, render_gradebook
 from grader.classroom.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
@@ -42,7 +42,7 @@ def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *
     )
 
 
-def exports(book: Classbook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
+def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
     """Return platform -> its files; raises ClassError for what a platform could not take.
 
     Args:
@@ -61,7 +61,7 @@ def exports(book: Classbook, wanted: Platforms, results: Mapping[str, str]) -> d
 
 
 def class_files(
-    book: Classbook,
+    book: Gradebook,
     made: Mapping[str, Export],
     run: RunOfClass,
     *,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from grader.classroom.gradebook import Classbook, ReportData, Row, number, table, text_cell
+from grader.classroom.gradebook import Gradebook, ReportData, Row, number, table, text_cell
 from grader.classroom.roster import Person, columns_of, fold_handle, person_of, read_table
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
@@ -62,7 +62,7 @@ def read_users(path: Path) -> Users:
     return Users(path, tuple(header), tuple(rows))
 
 
-def export_canvas(book: Classbook, assignment: str, gradebook: Users | None) -> Export:
+def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> Export:
     """Return the scores for Canvas.
 
     Only people with a score are in it, and only this one column: what was changed in Canvas since stays.
@@ -94,7 +94,7 @@ def export_canvas(book: Classbook, assignment: str, gradebook: Users | None) -> 
     return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)), remark)
 
 
-def export_moodle(book: Classbook, users: Users) -> Export:
+def export_moodle(book: Gradebook, users: Users) -> Export:
     """Return grades and feedback for Moodle's grade import, side by side: the one without the other wipes grades.
 
     Who is not in the table of users is left out, because one unknown user makes Moodle refuse all.
@@ -125,7 +125,7 @@ def export_moodle(book: Classbook, users: Users) -> Export:
     return Export({"moodle.csv": table([column, "Grade", "Feedback"], rows)}, tuple(map(_line, left_out)))
 
 
-def export_gradescope(book: Classbook, results: Mapping[str, str]) -> Export:
+def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
     """Return one results.json for each submission, as an autograder leaves it, and a table of all scores.
 
     Args:
@@ -181,7 +181,7 @@ def _lost(criterion: Mapping[str, Any]) -> str:
     return f"[{points}] {criterion['title']}: {criterion['reason']}"
 
 
-def _counted(book: Classbook, left_out: list[str]) -> Sequence[Row]:
+def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
     """Return the rows to export; name everybody else who handed something in."""
     to_export = book.to_export
     chosen = {id(row) for row in to_export}

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.app.seeds import SeedKey
 from grader.classroom.cache_key import unusable_digest
 from grader.classroom.downloads import AUTO
-from grader.classroom.intake import Entry
+from grader.classroom.intake import HandedInEntry
 from grader.classroom.outputs import Platforms
 from grader.classroom.store import Kept, State, Store
 from grader.core.errors import GraderError, SubmissionError
-from grader.similarity.library import Program
+from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission
 
 CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
@@ -22,7 +22,7 @@ CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
 RERUNS = (CHANGED, FAILED, UNDECIDED, ALL)
 
 
-def digest_of(entry: Entry, scratch: Path) -> str:
+def digest_of(entry: HandedInEntry, scratch: Path) -> str:
     """Return the digest of a submission; empty if that cannot be known.
 
     Args:
@@ -39,7 +39,7 @@ def digest_of(entry: Entry, scratch: Path) -> str:
         return ""  # grading it, in a process of its own, will say why
 
 
-def due_now(store: Store, entries: Sequence[Entry], keys: Mapping[str, str], rerun: str) -> list[Entry]:
+def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, str], rerun: str) -> list[HandedInEntry]:
     """Return the submissions to grade: where a run was stopped, the same one goes on.
 
     Args:
@@ -75,12 +75,12 @@ def is_due(kept: Kept, key: str, rerun: str) -> bool:
     return rerun == FAILED and bool({result.state, last.state} & {State.FAILED, State.REFUSED})
 
 
-_GRADING = Request("")
+_GRADING = GradeRequest("")
 _NO_PLATFORMS = Platforms()
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class ClassRequest:
     """What is to be graded, and how.
 
     Attributes:
@@ -105,10 +105,10 @@ class Course:
     pattern: str = ""
     roster: Path | None = None
     adjustments: Path | None = None
-    grading: Request = _GRADING
+    grading: GradeRequest = _GRADING
     jobs: int | None = None
     rerun: str = CHANGED
     seed_key: SeedKey | None = None
     standalone: bool = False
     platforms: Platforms = _NO_PLATFORMS
-    given: tuple[Program, ...] | None = None
+    given: tuple[ComparedProgram, ...] | None = None

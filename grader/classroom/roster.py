@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.classroom.intake import Entry
+from grader.classroom.intake import HandedInEntry
 from grader.core.errors import ClassError
 from grader.submissions.collected import listed, shown
 
@@ -171,7 +171,7 @@ def _spellings(name: str) -> Iterator[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Matching:
+class RosterMatch:
     """What the roster says of the submissions.
 
     Attributes:
@@ -189,7 +189,7 @@ class Matching:
     missing: tuple[Person, ...] = ()
 
 
-def match(entries: Sequence[Entry], roster: Sequence[Person] | None) -> Matching:
+def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> RosterMatch:
     """Return who handed in what.
 
     What identifies without doubt (user name, number, address, the folder's name) goes before names, and nobody is
@@ -201,14 +201,14 @@ def match(entries: Sequence[Entry], roster: Sequence[Person] | None) -> Matching
     """
     if roster is None:
         people = {entry.name: _unknown(entry) for entry in entries}
-        return Matching(people, duplicates=_twice(entries))
+        return RosterMatch(people, duplicates=_twice(entries))
     found: dict[str, list[int]] = {entry.name: _candidates(entry, roster) for entry in entries}
     clear = {name: people[0] for name, people in found.items() if len(people) == 1}
     several: dict[int, list[str]] = {}
     for name, index in clear.items():
         several.setdefault(index, []).append(name)
     possible = {index for people in found.values() for index in people}
-    return Matching(
+    return RosterMatch(
         people={name: roster[index] for name, index in clear.items()},
         unmatched=tuple(name for name, people in found.items() if not people),
         ambiguous=tuple(name for name, people in found.items() if len(people) > 1),
@@ -217,7 +217,7 @@ def match(entries: Sequence[Entry], roster: Sequence[Person] | None) -> Matching
     )
 
 
-def _unknown(entry: Entry) -> Person:
+def _unknown(entry: HandedInEntry) -> Person:
     """Return a person of whom only the submission tells."""
     identity = entry.identity
     name = identity.get("name") or identity.get("user") or identity.get("email") or entry.label
@@ -225,7 +225,7 @@ def _unknown(entry: Entry) -> Person:
     return Person(name, identity.get("user", ""), identity.get("email", ""), identity.get("id", ""), names=names)
 
 
-def _twice(entries: Sequence[Entry]) -> tuple[tuple[str, ...], ...]:
+def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:
     """Return the entries of the same student: of one identity, or of one name as a folder and as an archive."""
     by_student: dict[tuple[str, ...], list[str]] = {}
     for entry in entries:
@@ -234,7 +234,7 @@ def _twice(entries: Sequence[Entry]) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names) for names in by_student.values() if len(names) > 1)
 
 
-def _candidates(entry: Entry, roster: Sequence[Person]) -> list[int]:
+def _candidates(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
     """Return the people that an entry may be of, by the surest sign that says anything."""
     exact = {fold_handle(text) for kind, text in entry.identity.items() if kind != "name"} | {fold_handle(entry.label)}
     found = [index for index, person in enumerate(roster) if person.handles & exact]
@@ -245,7 +245,7 @@ def _candidates(entry: Entry, roster: Sequence[Person]) -> list[int]:
     return found or _by_ending(entry, roster)
 
 
-def _by_ending(entry: Entry, roster: Sequence[Person]) -> list[int]:
+def _by_ending(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
     """Return the people whose user name a clone's name ends with; of several such names the longest counts."""
     label = fold_handle(entry.label)
     lengths = {

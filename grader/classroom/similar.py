@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.classroom.gradebook import Row
-from grader.classroom.intake import Entry
+from grader.classroom.intake import HandedInEntry
 from grader.classroom.store import Store
 from grader.reporting.class_page.contents import PageLink
 from grader.similarity.finding import find_similar, read_programs
-from grader.similarity.library import Handed, Program, Similar
+from grader.similarity.library import ComparedProgram, Handed, Similar
 from grader.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 
 FOLDER, TABLE = "similarity", "similarity.csv"
@@ -28,7 +28,9 @@ class Compared:
     link: PageLink
 
 
-def compare_class(entries: Sequence[Entry], rows: Sequence[Row], given: Sequence[Program], store: Store) -> Compared:
+def compare_class(
+    entries: Sequence[HandedInEntry], rows: Sequence[Row], given: Sequence[ComparedProgram], store: Store
+) -> Compared:
     """Compare all submissions, and write what was found.
 
     Args:
@@ -64,7 +66,7 @@ def _link(note: str) -> PageLink:
     return PageLink(_TITLE, f"{FOLDER}/{OVERVIEW}", note)
 
 
-def _handed(entry: Entry, row: Row | None) -> Handed:
+def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
     programs, passed_over = ((), ()) if entry.problem else read_programs(entry.path)
     return Handed(
         name=entry.name,

@@ -37,7 +37,7 @@ class State(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ResultStatus:
     """What became of one submission.
 
     Attributes:
@@ -67,15 +67,15 @@ class Standing:
     schema: str = SCHEMA
 
 
-def dump(standing: Standing) -> bytes:
+def dump(standing: ResultStatus) -> bytes:
     """Return a standing as JSON; what is no text in a name becomes a sign for that."""
     return json.dumps(json_value(asdict(standing)), indent=2).encode() + b"\n"
 
 
-def load(data: bytes) -> Standing | None:
+def load(data: bytes) -> ResultStatus | None:
     """Return a standing; None if the data is none of this version."""
     try:
-        standing = msgspec.json.decode(data, type=Standing)
+        standing = msgspec.json.decode(data, type=ResultStatus)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
         return None
     return standing if standing.schema == SCHEMA else None
@@ -97,11 +97,11 @@ class Kept:
         attempt: A later attempt that came to less, so that it did not replace the result; None if there was none.
     """
 
-    result: Standing | None = None
-    attempt: Standing | None = None
+    result: ResultStatus | None = None
+    attempt: ResultStatus | None = None
 
     @property
-    def last(self) -> Standing | None:
+    def last(self) -> ResultStatus | None:
         """What was tried last."""
         return self.attempt or self.result
 
@@ -133,7 +133,7 @@ class Store:
         """Return the names of all results, in order."""
         return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
 
-    def commit(self, name: str, fresh: Path, standing: Standing) -> bool:
+    def commit(self, name: str, fresh: Path, standing: ResultStatus) -> bool:
         """Take in a new result; return whether it is the result now.
 
         Args:
@@ -245,7 +245,7 @@ def open_store(folder: Path) -> Iterator[Store]:
         os.close(lock)
 
 
-def _read(path: Path) -> Standing | None:
+def _read(path: Path) -> ResultStatus | None:
     with suppress(OSError):
         return load(path.read_bytes())
     return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from grader.classroom.gradebook import Classbook, Row, Status, number, remarks
+from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
@@ -35,7 +35,7 @@ class Graded:
         links: Pages of their own in the folder for results, which the page of the class leads to.
     """
 
-    book: Classbook
+    book: Gradebook
     graded: int
     kept_before: int
     not_replaced: tuple[str, ...] = ()
@@ -102,7 +102,7 @@ def _row(row: Row) -> dict[str, Any]:
     }
 
 
-def _scores(book: Classbook) -> Iterator[str]:
+def _scores(book: Gradebook) -> Iterator[str]:
     shares = [
         float(100 * row.adjusted.raw / row.max_score)
         for row in book.rows
@@ -119,7 +119,7 @@ def _scores(book: Classbook) -> Iterator[str]:
         yield f"changed by late days or decisions: {len(changed)}"
 
 
-def _lists(book: Classbook, not_replaced: Sequence[str]) -> Iterator[str]:
+def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
     matching = book.matching
     twins = [" = ".join(names) for names in matching.duplicates]
     yield from _list("nobody on the roster goes with", matching.unmatched)

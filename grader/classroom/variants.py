@@ -9,8 +9,8 @@ from grader.app.grade import read_exercises
 from grader.app.seeds import read_key
 from grader.app.variants import ByKey, checked, drawn
 from grader.classroom.cache_key import Conditions
-from grader.classroom.intake import Entry
-from grader.classroom.request import Course
+from grader.classroom.intake import HandedInEntry
+from grader.classroom.request import ClassRequest
 from grader.classroom.roster import Person
 from grader.core.errors import ClassError, VariantError
 from grader.core.exercise import Exercise
@@ -27,8 +27,8 @@ def student_of(person: Person | None) -> str:
 
 
 def with_known_students(
-    entries: Sequence[Entry], people: Mapping[str, Person], exercises: Sequence[Exercise]
-) -> tuple[Entry, ...]:
+    entries: Sequence[HandedInEntry], people: Mapping[str, Person], exercises: Sequence[Exercise]
+) -> tuple[HandedInEntry, ...]:
     """Return the submissions; where something varies, those whose student is not known cannot be graded.
 
     Args:
@@ -41,7 +41,7 @@ def with_known_students(
     return tuple(entry if entry.problem else _known(entry, people.get(entry.name)) for entry in entries)
 
 
-def _known(entry: Entry, person: Person | None) -> Entry:
+def _known(entry: HandedInEntry, person: Person | None) -> HandedInEntry:
     try:
         checked(student_of(person))
     except VariantError:
@@ -54,7 +54,7 @@ def vary(exercises: Sequence[Exercise]) -> bool:
     return any(exercise.variant is not None for exercise in exercises)
 
 
-def refuse_without_key(course: Course, exercises: Sequence[Exercise]) -> None:
+def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
     """Make sure that variants can be drawn, if there are any.
 
     Raises:
@@ -72,8 +72,8 @@ def refuse_without_key(course: Course, exercises: Sequence[Exercise]) -> None:
 
 
 def own_conditions(
-    course: Course,
-    entries: Sequence[Entry],
+    course: ClassRequest,
+    entries: Sequence[HandedInEntry],
     people: Mapping[str, Person],
     exercises: Sequence[Exercise],
     conditions: Conditions,

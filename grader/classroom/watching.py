@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.reporting.escape import shown
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Watcher:
             self._running.add(name)
             self._draw()
 
-    def done(self, name: str, standing: Standing) -> None:
+    def done(self, name: str, standing: ResultStatus) -> None:
         """Take note of what came of a submission."""
         with self._lock:
             self._count += 1
@@ -101,7 +101,7 @@ def clock_time(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"
 
 
-def outcome_words(standing: Standing) -> str:
+def outcome_words(standing: ResultStatus) -> str:
     """Say what came of a submission."""
     if standing.state in (State.GRADED, State.UNDECIDED):
         points = f"{standing.score:g}/{standing.max_score:g}"

@@ -18,12 +18,12 @@ import msgspec
 
 from grader.app.evidence_writer import Keeper
 from grader.app.grade import Progress, grade
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.cache_key import Conditions, unusable_digest
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.core.errors import GraderError, SubmissionError
 from grader.core.report import Report, Reproduction
 from grader.reporting.audience import for_student
@@ -55,7 +55,7 @@ def main() -> None:
     _say({"done": json.loads(kept.dump(standing))})
 
 
-def attempt(task: Task, progress: Progress) -> Standing:
+def attempt(task: Task, progress: Progress) -> ResultStatus:
     """Grade a submission, write what came of it, and return how it stands; never raises for anything in it."""
     started = time.perf_counter()
     try:
@@ -71,9 +71,9 @@ def attempt(task: Task, progress: Progress) -> Standing:
     return replace(standing, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
 
 
-def _graded(task: Task, progress: Progress) -> Standing:
+def _graded(task: Task, progress: Progress) -> ResultStatus:
     conditions, own = task.conditions, task.conditions.variants
-    request = Request(
+    request = GradeRequest(
         submission=str(task.submission),
         exercises=task.exercises,
         every=conditions.every,
@@ -99,7 +99,7 @@ def _graded(task: Task, progress: Progress) -> Standing:
         write_whole(task.into / name, text.encode())
     keeper.write(report)
     key = _used(conditions, report.reproduce).key(report.digest)
-    return Standing(
+    return ResultStatus(
         state=State.GRADED if report.final else State.UNDECIDED,
         key=key,
         digest=report.digest,
@@ -130,8 +130,8 @@ def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
     }
 
 
-def _without_report(task: Task, state: State, problem: str, hint: str = "", digest: str = "") -> Standing:
-    return Standing(state, task.conditions.key(digest) if digest else "", digest, task.label, problem, hint)
+def _without_report(task: Task, state: State, problem: str, hint: str = "", digest: str = "") -> ResultStatus:
+    return ResultStatus(state, task.conditions.key(digest) if digest else "", digest, task.label, problem, hint)
 
 
 def _usage() -> dict[str, float]:

@@ -110,10 +110,10 @@ def command(  # noqa: PLR0913  one parameter an option
         require("--scheduler", "distributed", "dask")
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.app.request import Request  # noqa: PLC0415  as above
+    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
     from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
     from grader.classroom.outputs import platforms  # noqa: PLC0415  as above
-    from grader.classroom.request import Course  # noqa: PLC0415  as above
+    from grader.classroom.request import ClassRequest  # noqa: PLC0415  as above
     from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
     from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
     from grader.similarity.finding import read_given  # noqa: PLC0415  as above
@@ -122,14 +122,14 @@ def command(  # noqa: PLR0913  one parameter an option
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
     if templates and not similarity:
         raise click.BadParameter("--template needs --similarity")
-    course = Course(
+    course = ClassRequest(
         sources=sources,
         results=results,
         layout=layout,
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
-        grading=Request(
+        grading=GradeRequest(
             "",
             exercises=tuple(dict.fromkeys(exercises)),
             every=every,

@@ -158,12 +158,12 @@ def _grade(  # noqa: PLR0913  one parameter an option
         evidence_writer,
         grade,
     )
-    from grader.app.request import Request  # noqa: PLC0415  as above
+    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
     from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
     from grader.reporting.audience import told  # noqa: PLC0415  as above
 
     key = drawn_with(seed, seed_key)
-    request = Request(
+    request = GradeRequest(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
         every=every,

@@ -47,7 +47,7 @@ def command(  # noqa: PLR0913  one parameter an option
     2 the command or something it was given cannot be used.
     """
     require("grade selftest", "libcst", "authors")
-    from grader.mutation.running import Options, selftest  # noqa: PLC0415  as above
+    from grader.mutation.running import SelftestOptions, selftest  # noqa: PLC0415  as above
     from grader.mutation.showing import render_results, results_to_json  # noqa: PLC0415  as above
     from grader.rubrics.loader import NOTES  # noqa: PLC0415  the rest of the grader, and libcst
 
@@ -55,7 +55,7 @@ def command(  # noqa: PLR0913  one parameter an option
     named = [path for path in rubrics if not path.name.endswith(NOTES)]
     if not named:
         raise click.BadParameter(f"expected rubrics, found notes only; name {rubrics[0].name.removesuffix(NOTES)}.yaml")
-    options = Options(reference, template, jobs, only, sample, seed, clock, isolation)
+    options = SelftestOptions(reference, template, jobs, only, sample, seed, clock, isolation)
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
     if as_json:

@@ -20,8 +20,8 @@ from grader.execution.ending import reported_fault
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.sandbox.protocol import Command
-from grader.execution.student_process import Student
-from grader.execution.wall_runner import LOOK_S, WallConductor
+from grader.execution.student_process import NodeProcess
+from grader.execution.wall_runner import LOOK_S, WallRunner
 
 #: The sandbox's own program, which starts the student's.
 SANDBOX = "bwrap"
@@ -30,11 +30,11 @@ DEEP = 8
 INTERRUPTED = 128 + signal.SIGINT
 
 
-class BareStudent(Student):
+class BareProcess(NodeProcess):
     """A process that has no line to the grader: it is started at once, watched, and stopped by a signal."""
 
     @classmethod
-    def begin(cls, name: str, root: str, command: Command, limits: Limits) -> BareStudent:
+    def begin(cls, name: str, root: str, command: Command, limits: Limits) -> BareProcess:
         """Start the process."""
         ours, nobodys = socket.socketpair()
         student = cls.start(name, root, command, ours, limits)
@@ -112,10 +112,10 @@ PROMPT_NS, IMPORTS_NS = NS_PER_S // 5, NS_PER_S // 2
 FIRST_LOOK_NS = 10_000_000
 
 
-class BareConductor(WallConductor):
-    """Runs one plan on the real clock, with programs that know nothing of it; see `WallConductor`."""
+class BareRunner(WallRunner):
+    """Runs one plan on the real clock, with programs that know nothing of it; see `WallRunner`."""
 
-    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
         self._logs: list[Logged] = []
         observer.hear_logs()

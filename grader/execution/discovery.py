@@ -12,9 +12,9 @@ from grader.execution.exchanges import PlannedCalls, PlannedMessages
 from grader.execution.machine import Patience
 from grader.execution.observer import Observer
 from grader.execution.service_ends import BACKGROUND_TYPES
-from grader.execution.service_peers import Desk
-from grader.execution.student_process import Student
-from grader.execution.trace_recorder import NAME_CHARACTERS, Tape
+from grader.execution.service_peers import ServicePeers
+from grader.execution.student_process import NodeProcess
+from grader.execution.trace_recorder import NAME_CHARACTERS, TraceRecorder
 
 #: Nobody sends more messages than this between two reports.
 COUNT = 1_000_000
@@ -51,7 +51,7 @@ def is_claim(claim: Any) -> bool:
     return not ends or (bools and isinstance(claim.get("deadline_ns"), int))
 
 
-def readers_of(student: Student, topic: str) -> list[dict[str, Any]]:
+def readers_of(student: NodeProcess, topic: str) -> list[dict[str, Any]]:
     """Return the subscriptions that a process says it has on a topic."""
     return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
 
@@ -108,7 +108,7 @@ WORDS = 10_000
 Key = tuple[str, str, str]
 
 
-class Matching:
+class Discovery:
     """Knows which endpoints there are on both sides.
 
     Args:
@@ -127,11 +127,11 @@ class Matching:
 
     def __init__(
         self,
-        students: list[Student],
+        students: list[NodeProcess],
         observer: Observer,
-        tape: Tape,
-        desk: Desk,
-        bury: Callable[[Student], None],
+        tape: TraceRecorder,
+        desk: ServicePeers,
+        bury: Callable[[NodeProcess], None],
     ) -> None:
         self._students = students
         self._observer = observer
@@ -193,7 +193,7 @@ class Matching:
         if any(not student.ended for student in self._students):
             self.match(now_ns)
 
-    def lose(self, student: Student) -> None:
+    def lose(self, student: NodeProcess) -> None:
         """Note that a process ended without leaving the graph, where its endpoints stay for a while, as in reality."""
         self._strangers += Counter(map(_key, student.claims))
 
@@ -262,7 +262,7 @@ class Matching:
         most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
         return len(same) <= matched and (matched <= most or not claim["reliable"])
 
-    def _tell_matches(self, student: Student, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
+    def _tell_matches(self, student: NodeProcess, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
         """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
         expected: dict[str, dict[str, list[int]]] = {}
         for claim in student.claims:

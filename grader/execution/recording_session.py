@@ -31,7 +31,7 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 @dataclass(frozen=True, slots=True)
-class Studio:
+class RecordingSession:
     """What a run is recorded with.
 
     Attributes:
@@ -91,9 +91,9 @@ def _unfit(trace: Trace, clock: str) -> bool:
 
 
 @contextmanager
-def open_studio(
+def open_session(
     isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None
-) -> Iterator[Studio]:
+) -> Iterator[RecordingSession]:
     """Set a studio up, and take it down.
 
     Args:
@@ -115,7 +115,7 @@ def open_studio(
         folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
             recorder.warm_up(1)
-            yield Studio(ros, tier, choice.containment, recorder, folder)
+            yield RecordingSession(ros, tier, choice.containment, recorder, folder)
 
 
 def planned_clock(clock: str) -> str:

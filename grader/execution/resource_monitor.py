@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, size
 from grader.core.trace import Trace
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 from grader.execution.usage import Usage, families, scratch_names, starved_ns, usage
 
 #: How often it looks, and every how many looks it searches for new children.
@@ -46,7 +46,7 @@ class Budget:
     words: str
 
 
-class Guard:
+class ResourceMonitor:
     """A thread beside the conductor's, for as long as its block lasts.
 
     Args:
@@ -55,7 +55,7 @@ class Guard:
         budget: What is left for the submission, if there is such a limit.
     """
 
-    def __init__(self, students: Sequence[Student], limits: Limits, budget: Budget | None = None) -> None:
+    def __init__(self, students: Sequence[NodeProcess], limits: Limits, budget: Budget | None = None) -> None:
         self._students = students
         self._limits = limits
         self._budget = budget
@@ -69,7 +69,7 @@ class Guard:
         self._used_ns = self._waited_ns = 0
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
-    def __enter__(self) -> Guard:
+    def __enter__(self) -> ResourceMonitor:
         self._thread.start()
         return self
 
@@ -167,6 +167,6 @@ class Guard:
         for student in self._students:
             self._hold(student, why)
 
-    def _hold(self, student: Student, why: str) -> None:
+    def _hold(self, student: NodeProcess, why: str) -> None:
         if why and not student.stopped:
             student.stop(why, self._families.get(student.process.pid, set()))

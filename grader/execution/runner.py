@@ -12,7 +12,7 @@ from grader.execution.ending import never_stopped, reported_fault
 from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer, Taken
 from grader.execution.plan import Plan
-from grader.execution.service_peers import Desk
+from grader.execution.service_peers import ServicePeers
 from grader.execution.stimuli import (
     AddClients,
     AddServer,
@@ -23,9 +23,9 @@ from grader.execution.stimuli import (
     TopicEvent,
     schedule,
 )
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import TopicPeers
-from grader.execution.trace_recorder import Tape
+from grader.execution.trace_recorder import TraceRecorder
 
 
 class Runner(ABC):
@@ -42,7 +42,7 @@ class Runner(ABC):
     clock_reason: ClassVar[str] = ""
     _topics: TopicPeers
 
-    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         self._plan = plan
         self._students = students
         self._observer = observer
@@ -50,8 +50,10 @@ class Runner(ABC):
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
         self._due = schedule(plan)
-        self._tape = Tape(plan.limits)
-        self._desk = Desk(plan, observer.services, self._tape, nodes=lambda: self._tape.graph.nodes, later=self._later)
+        self._tape = TraceRecorder(plan.limits)
+        self._desk = ServicePeers(
+            plan, observer.services, self._tape, nodes=lambda: self._tape.graph.nodes, later=self._later
+        )
 
     def run(self) -> Trace:
         """Run the plan to its end and return the trace."""
@@ -90,7 +92,7 @@ class Runner(ABC):
         """Look at the graph at the end, and return the time."""
 
     @abstractmethod
-    def _interrupt(self, student: Student) -> None:
+    def _interrupt(self, student: NodeProcess) -> None:
         """Send a process the stop signal, as Ctrl-C does."""
 
     @abstractmethod
@@ -139,7 +141,7 @@ class Runner(ABC):
         if self._tape.full:
             self._end_ns = min(self._end_ns, now_ns)
 
-    def _report_fault(self, student: Student, report: Mapping[str, Any], now_ns: int) -> None:
+    def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
         """Take down a fault that a process has reported."""
         fault, limits = report.get("fault"), self._plan.limits
         self._tape.add(reported_fault(student.name, now_ns, fault, limits, student.places))

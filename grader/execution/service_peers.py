@@ -14,7 +14,7 @@ from grader.execution.observer import size_of
 from grader.execution.plan import Plan
 from grader.execution.service_ends import Arrived, ServiceEnds
 from grader.execution.stimuli import Answer, Ask, Event
-from grader.execution.trace_recorder import Tape
+from grader.execution.trace_recorder import TraceRecorder
 
 #: Of a flood of requests and responses no more is taken before it is written down.
 UNREAD = 50_000
@@ -31,7 +31,7 @@ class _Served:
     unanswered: dict[int, tuple[Any, int]] = field(default_factory=dict)
 
 
-class Desk:
+class ServicePeers:
     """Serves and calls.
 
     Args:
@@ -46,7 +46,7 @@ class Desk:
         self,
         plan: Plan,
         ends: ServiceEnds,
-        tape: Tape,
+        tape: TraceRecorder,
         *,
         nodes: Callable[[], Sequence[str]],
         later: Callable[[Event], None],

@@ -49,7 +49,7 @@ SILENCE_S = 90.0
 
 
 @dataclass
-class Student:
+class NodeProcess:
     """A running student process.
 
     Attributes:
@@ -116,7 +116,7 @@ class Student:
     _selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
 
     @classmethod
-    def start(cls, name: str, root: str, command: Command, line: socket.socket, limits: Limits) -> Student:
+    def start(cls, name: str, root: str, command: Command, line: socket.socket, limits: Limits) -> NodeProcess:
         """Start the process; `line` is the worker's end."""
         try:
             process = subprocess.Popen(

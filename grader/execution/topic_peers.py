@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from grader.core.trace import Delivery, Mark
-from grader.execution.discovery import Matching, announce, readers_of
+from grader.execution.discovery import Discovery, announce, readers_of
 from grader.execution.exchanges import PlannedMessages
 from grader.execution.interfaces import built, message_class, plain_fields
 from grader.execution.observer import Observer
@@ -21,8 +21,8 @@ from grader.execution.stimuli import (
     number_message,
     numeric_field,
 )
-from grader.execution.student_process import Student
-from grader.execution.trace_recorder import Tape
+from grader.execution.student_process import NodeProcess
+from grader.execution.trace_recorder import TraceRecorder
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 #: How long, on the wall clock, a publisher stays after its last message, which it would take with it otherwise.
@@ -37,7 +37,7 @@ class TopicPeers(ABC):
         tape: Where it is taken down.
     """
 
-    def __init__(self, observer: Observer, tape: Tape) -> None:
+    def __init__(self, observer: Observer, tape: TraceRecorder) -> None:
         self._observer = observer
         self._tape = tape
         #: The topics that stimuli publish on now, with their types.
@@ -109,7 +109,9 @@ class VirtualTopicPeers(TopicPeers):
         matching: Knows which publishers there are, and tells the processes.
     """
 
-    def __init__(self, students: list[Student], observer: Observer, tape: Tape, matching: Matching) -> None:
+    def __init__(
+        self, students: list[NodeProcess], observer: Observer, tape: TraceRecorder, matching: Discovery
+    ) -> None:
         super().__init__(observer, tape)
         self._students = students
         self._matching = matching
@@ -156,7 +158,7 @@ class VirtualTopicPeers(TopicPeers):
 class WallTopicPeers(TopicPeers):
     """Publishes on the wall clock, where a publisher stays for a while after its last message."""
 
-    def __init__(self, observer: Observer, tape: Tape) -> None:
+    def __init__(self, observer: Observer, tape: TraceRecorder) -> None:
         super().__init__(observer, tape)
         self._leaving: list[tuple[int, str]] = []
 

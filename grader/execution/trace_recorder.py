@@ -22,7 +22,7 @@ ENDPOINTS, GRAPH_PARTS, FAULTS, OFFERS = 500, 100_000, 200, 2_000
 FLOOD_HZ, BURST = 1_000, 100
 
 
-class Tape:
+class TraceRecorder:
     """The observations of one run, in order.
 
     Args:

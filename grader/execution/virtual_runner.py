@@ -12,14 +12,14 @@ from dataclasses import replace
 from typing import Any
 
 from grader.core.trace import ClockKind, Fault, Mark, Offer
-from grader.execution.discovery import Matching, announce, compatible, counts, is_claim, readers_of
+from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
 from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveServer
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
 from grader.execution.virtual_time_suitability import hopeless, unfit
@@ -34,17 +34,17 @@ STEPS = 400_000
 WORDS, CLAIMS = 10_000, 1_000
 
 
-class Conductor(Runner):
+class VirtualRunner(Runner):
     """Runs one plan on the virtual clock; see `Runner`."""
 
     clock = ClockKind.VIRTUAL
 
-    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
         self._now_ns = 0
         self._free_until_ns = 0
         self._steps = 0
-        self._matching = Matching(students, observer, self._tape, self._desk, self._bury)
+        self._matching = Discovery(students, observer, self._tape, self._desk, self._bury)
         self._topics = VirtualTopicPeers(students, observer, self._tape, self._matching)
 
     def _time_ns(self) -> int:
@@ -77,7 +77,7 @@ class Conductor(Runner):
         self._now_ns = self._stop_ns
         super()._shut_down()
 
-    def _interrupt(self, student: Student) -> None:
+    def _interrupt(self, student: NodeProcess) -> None:
         self._step(student)
 
     def _next_ns(self) -> int:
@@ -98,7 +98,7 @@ class Conductor(Runner):
             elif not self._due or self._due[0].t_ns > self._now_ns:
                 return
 
-    def _next_student(self) -> Student | None:
+    def _next_student(self) -> NodeProcess | None:
         return next(
             (
                 s
@@ -108,7 +108,7 @@ class Conductor(Runner):
             None,
         )
 
-    def _step(self, student: Student) -> None:
+    def _step(self, student: NodeProcess) -> None:
         """Tell one process the time and what is on its way, and handle its report."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
         if self._starts_ns.pop(student.name, 0):
@@ -131,7 +131,7 @@ class Conductor(Runner):
             self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
         self._end_if_full(self._now_ns)
 
-    def _quiet_until(self, student: Student) -> int:
+    def _quiet_until(self, student: NodeProcess) -> int:
         """Return the next moment at which anything but one process wants to do something."""
         moments = [self._end_ns]
         moments += [self._due[0].t_ns] if self._due else []
@@ -147,7 +147,7 @@ class Conductor(Runner):
         if isinstance(now_ns, int):
             self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
 
-    def _hear(self, student: Student, workload: Workload) -> None:
+    def _hear(self, student: NodeProcess, workload: Workload) -> None:
         """Wait until a process has nothing left to do at this instant, or has ended."""
         for _ in range(WORDS):
             report = student.report()
@@ -182,7 +182,7 @@ class Conductor(Runner):
             return
         self._bury(student)
 
-    def _account(self, student: Student, report: Mapping[str, Any]) -> None:
+    def _account(self, student: NodeProcess, report: Mapping[str, Any]) -> None:
         """Take what a process has published, let it reach everybody, and match new endpoints."""
         for channel, count in counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
@@ -203,7 +203,7 @@ class Conductor(Runner):
             for due in self._desk.ready(self._is_served):
                 self._later(replace(due, t_ns=self._now_ns))
 
-    def _note_offers(self, student: Student) -> None:
+    def _note_offers(self, student: NodeProcess) -> None:
         """Write down the services, clients and parameters that a process has not told of before."""
         for claim in student.claims:
             offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
@@ -251,7 +251,7 @@ class Conductor(Runner):
         if isinstance(event, (AddServer, RemoveServer)):
             self._matching.tell_all()
 
-    def _forward(self, sender: Student, sent: Mapping[str, int]) -> None:
+    def _forward(self, sender: NodeProcess, sent: Mapping[str, int]) -> None:
         """Tell every process what is on its way to it."""
         for channel, count in sorted(sent.items()):
             kind, _, name = channel.partition(" ")
@@ -280,10 +280,10 @@ class Conductor(Runner):
                 if answer is None or answer.get("kind") != "arrived":
                     self._bury(student)
 
-    def _write_output(self, student: Student, *, final: bool) -> None:
+    def _write_output(self, student: NodeProcess, *, final: bool) -> None:
         self._tape.add(*student.output(self._now_ns, final=final))
 
-    def _bury(self, student: Student) -> None:
+    def _bury(self, student: NodeProcess) -> None:
         """Note the end of a process that ended without a word, and what it wrote before."""
         death = student.death(self._now_ns)
         student.drain()
@@ -295,7 +295,7 @@ class Conductor(Runner):
         self._matching.lose(student)
         self._end(student, death)
 
-    def _end(self, student: Student, *endings: Fault | Mark) -> None:
+    def _end(self, student: NodeProcess, *endings: Fault | Mark) -> None:
         self._tape.add(*endings)
         student.ended = True
         student.wake_ns = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.core.trace import Fault, FaultKind, Observation
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 
 #: Why a program needs the wall clock: what it waits for, or how much it works.
 THREADS = "the node's threads wait for each other without blocking"
@@ -15,12 +15,12 @@ BUSY = "the node needs so much processor time that virtual time would hide it"
 UNSETTLED = {"threads": THREADS, "outside": OUTSIDE}
 
 
-def hopeless(students: Sequence[Student]) -> bool:
+def hopeless(students: Sequence[NodeProcess]) -> bool:
     """Return whether it is clear already that virtual time hides how late a node would be."""
     return any(student.workload is not None and student.workload.delay.hopeless for student in students)
 
 
-def unfit(students: Sequence[Student], seen: Sequence[Observation], *, full: bool) -> str:
+def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full: bool) -> str:
     """Say why virtual time does not do these nodes justice, if it does not.
 
     Args:

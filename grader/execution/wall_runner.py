@@ -18,7 +18,7 @@ from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
 from grader.execution.stimuli import Offer, RemoveServer
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
 
 #: How much of a flood is taken in one look, so as not to hold up the reference: messages of a topic, pieces of output.
@@ -31,13 +31,13 @@ LEAD_NS = 300 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 
 
-class WallConductor(Runner):
+class WallRunner(Runner):
     """Runs one plan on the real clock; see `Runner`."""
 
     clock = ClockKind.WALL
     clock_reason = "it was asked for"
 
-    def __init__(self, plan: Plan, students: list[Student], observer: Observer) -> None:
+    def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
         early = (replace(e, t_ns=max(0, e.t_ns - LEAD_NS)) if isinstance(e, Offer) else e for e in self._due)
         self._due = sorted(early, key=lambda e: e.t_ns)
@@ -69,7 +69,7 @@ class WallConductor(Runner):
         self._look_at_graph(self._end_ns)
         return self._end_ns
 
-    def _interrupt(self, student: Student) -> None:
+    def _interrupt(self, student: NodeProcess) -> None:
         student.tell({"stop": True})
 
     def _harness_problem(self) -> str:
@@ -103,7 +103,7 @@ class WallConductor(Runner):
             self._look_at_graph(now_ns)
             self._next_graph_ns = now_ns + GRAPH_EVERY_NS
 
-    def _hear(self, student: Student, now_ns: int) -> None:
+    def _hear(self, student: NodeProcess, now_ns: int) -> None:
         student.drain(READS_A_LOOK)
         reports = [] if student.ended else student.reports()
         for report in reports:

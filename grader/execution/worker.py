@@ -21,18 +21,18 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S, duration
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
-from grader.execution.bare_runner import BareStudent
+from grader.execution.bare_runner import BareProcess
 from grader.execution.bare_start import bare_arguments
 from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.notes import Places
 from grader.execution.plan import Plan
-from grader.execution.resource_monitor import Budget, Guard
+from grader.execution.resource_monitor import Budget, ResourceMonitor
 from grader.execution.ros_installation import PythonRuntime
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Isolation, StudentProcess
 from grader.execution.sandbox.tiers import isolation_from_name
-from grader.execution.student_process import LOG_FORMAT, Student
+from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
 
 #: More than anything takes, for recordings that are not of one submission.
@@ -133,7 +133,7 @@ class Worker:
         return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
 
     def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
-        students: list[Student] = []
+        students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
             for name, file in plan.processes:
@@ -141,29 +141,29 @@ class Worker:
                 students.append(start(plan, name, file, domain))
             # rclpy takes long to import: the students' processes start meanwhile.
             from grader.execution.observer import Observer  # noqa: PLC0415
-            from grader.execution.virtual_runner import Conductor  # noqa: PLC0415
-            from grader.execution.wall_runner import WallConductor  # noqa: PLC0415
+            from grader.execution.virtual_runner import VirtualRunner  # noqa: PLC0415
+            from grader.execution.wall_runner import WallRunner  # noqa: PLC0415
 
             observer = Observer(domain, plan.limits)
             stack.callback(observer.close)
-            guard = stack.enter_context(Guard(students, plan.limits, budget))
+            guard = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
             stack.callback(self._account, guard)
-            conductor: Callable[..., Conductor | WallConductor] = WallConductor if plan.clock == "wall" else Conductor
+            conductor: Callable[..., VirtualRunner | WallRunner] = WallRunner if plan.clock == "wall" else VirtualRunner
             if plan.bare:
-                from grader.execution.bare_runner import BareConductor  # noqa: PLC0415 - as above
+                from grader.execution.bare_runner import BareRunner  # noqa: PLC0415 - as above
 
-                conductor = BareConductor
+                conductor = BareRunner
             else:
                 for student in students:
                     _await_ready(student)
             trace = guard.reviewed(conductor(plan, students, observer).run())
             return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
 
-    def _account(self, guard: Guard) -> None:
+    def _account(self, guard: ResourceMonitor) -> None:
         self._real_ns += guard.real_ns
         self._starved_ns += guard.starved_ns
 
-    def _start(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+    def _start(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         ours, theirs = socket.socketpair()
         root = self._isolation.submission_seen_at or plan.root
         request = {
@@ -194,7 +194,7 @@ class Worker:
             plan.limits,
         )
         try:
-            student = Student.start(name, root, command, ours, plan.limits)
+            student = NodeProcess.start(name, root, command, ours, plan.limits)
         except OSError:
             ours.close()
             raise
@@ -203,7 +203,7 @@ class Worker:
         student.file, student.places = file, Places(Path(plan.root))
         return student
 
-    def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> Student:
+    def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         """Start a file with nothing of the grader in its process; see `bare`."""
         root = self._isolation.submission_seen_at or plan.root
         command = self._isolation.student_command(
@@ -217,7 +217,7 @@ class Worker:
             ),
             plan.limits,
         )
-        student = BareStudent.begin(name, root, command, plan.limits)
+        student = BareProcess.begin(name, root, command, plan.limits)
         student.file, student.places = file, Places(Path(plan.root))
         return student
 
@@ -246,19 +246,19 @@ def is_worn(trace: Trace) -> bool:
     return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
 
 
-def _await_ready(student: Student) -> None:
+def _await_ready(student: NodeProcess) -> None:
     """Wait until a process is about to run its file; until then nothing of the student's has run."""
     if not student.is_ready():
         raise RuntimeError(f"a student's process did not start: {student.stopped or _last_words(student)}")
 
 
-def _last_words(student: Student) -> str:
+def _last_words(student: NodeProcess) -> str:
     student.drain()
     words = [getattr(line, "text", "") for line in student.output(0, final=True)]
     return " | ".join(words[-3:])[:500] or "no output"
 
 
-def stop(students: list[Student]) -> None:
+def stop(students: list[NodeProcess]) -> None:
     """Send the stop signal to every process that still runs, give it a moment, end it."""
     for student in students:
         if not student.ended:

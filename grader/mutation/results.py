@@ -24,7 +24,7 @@ class Fate(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ResultRank:
     """What a program is worth under a rubric.
 
     Attributes:
@@ -62,9 +62,9 @@ class Standing:
         return Fate.SURVIVED if self.decided else Fate.UNDECIDED
 
 
-def standing_of(report: ExerciseReport) -> Standing:
+def standing_of(report: ExerciseReport) -> ResultRank:
     """Return what a report says a program is worth."""
-    return Standing(
+    return ResultRank(
         score=report.score,
         max_score=report.max_score,
         outcomes={verdict.id: verdict.outcome for verdict in report.verdicts},
@@ -90,7 +90,7 @@ class Trial:
     file: str
     operator: str
     change: str
-    standing: Standing
+    standing: ResultRank
     expected: tuple[str, ...] = ()
     because: str = ""
 
@@ -106,7 +106,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class SelftestResult:
     """What came of testing one rubric.
 
     Attributes:
@@ -128,8 +128,8 @@ class Result:
     rubric: str
     exercise: str
     criteria: tuple[str, ...]
-    reference: Standing
-    template: Standing | None
+    reference: ResultRank
+    template: ResultRank | None
     baseline: Fraction | None
     mutants: tuple[Trial, ...]
     variants: tuple[Trial, ...]

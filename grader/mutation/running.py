@@ -15,21 +15,21 @@ from pathlib import Path
 from libcst import ParserSyntaxError
 
 from grader.app.grade import Progress, plan_jobs, read_exercises, read_recording
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
 from grader.core.submission import Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry
-from grader.execution.recording_session import Studio, open_studio
+from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, beside, idle, read_explained
 from grader.mutation.operators.mutants import mutants_of
 from grader.mutation.operators.program import Program
 from grader.mutation.operators.variants import variants_of
-from grader.mutation.results import Fate, Result, Standing, Trial, one_line_change, standing_of
+from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial, one_line_change, standing_of
 from grader.submissions.sources import read_sources
 from grader.submissions.submission import stage_submission
 
@@ -48,12 +48,12 @@ class Candidate:
 
 
 @dataclass(slots=True)
-class Bench:
+class TrialRunner:
     """What the programs of one rubric are tried with."""
 
-    studio: Studio
+    studio: RecordingSession
     workers: int
-    request: Request
+    request: GradeRequest
     exercise: Exercise
     odometry: Odometry | None
     seed: int
@@ -63,16 +63,16 @@ class Bench:
     traces: dict[str, Trace] = field(default_factory=dict)
     recordings: int = 0
 
-    def measure_reference(self) -> Standing:
+    def measure_reference(self) -> ResultRank:
         """Return what the reference solution is worth, and keep what was recorded of it."""
         standing, self.traces = self._recorded(self.reference)
         return standing
 
-    def standing(self, submission: Submission) -> Standing:
+    def standing(self, submission: Submission) -> ResultRank:
         """Return what a whole submission is worth."""
         return self._recorded(submission)[0]
 
-    def _recorded(self, submission: Submission) -> tuple[Standing, dict[str, Trace]]:
+    def _recorded(self, submission: Submission) -> tuple[ResultRank, dict[str, Trace]]:
         jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
         recorded = self.studio.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
@@ -80,7 +80,7 @@ class Bench:
         sources = read_sources(submission)
         return standing_of(judge_exercise(self.exercise, traces, submission, sources)), traces
 
-    def standings(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, Standing]]:
+    def standings(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, ResultRank]]:
         """Yield what each changed program is worth; scenarios without the changed file are those of the reference."""
         done, waiting = 0, iter(candidates)
         at_once = _AT_ONCE * self.workers
@@ -105,7 +105,7 @@ class Bench:
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
-    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> Standing:
+    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> ResultRank:
         sources = {**self.sources, candidate.file: candidate.source}
         return standing_of(judge_exercise(self.exercise, {**self.traces, **own}, submission, sources))
 
@@ -121,7 +121,7 @@ _MUTANTS_A_VARIANT = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class SelftestOptions:
     """How rubrics are tested.
 
     Attributes:
@@ -145,7 +145,7 @@ class Options:
     isolation: str = "auto"
 
 
-def selftest(rubrics: Sequence[Path], options: Options, progress: Progress) -> Iterator[Result]:
+def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progress) -> Iterator[SelftestResult]:
     """Test rubrics, and yield what came of each as soon as it is there.
 
     Args:
@@ -158,14 +158,14 @@ def selftest(rubrics: Sequence[Path], options: Options, progress: Progress) -> I
     """
     prepared = [_prepared(path, options) for path in rubrics]
     workers = options.jobs or len(os.sched_getaffinity(0))
-    with open_studio(options.isolation, workers) as studio:
+    with open_session(options.isolation, workers) as studio:
         for path, exercise, explained in prepared:
             bench = _bench(path, exercise, explained, studio, replace(options, jobs=workers), progress)
             yield _tested(path, bench, explained, options)
 
 
-def _prepared(path: Path, options: Options) -> tuple[Path, Exercise, Explained]:
-    (exercise,) = read_exercises(Request("", rubrics=(path,)))
+def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Explained]:
+    (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
     said = read_explained(beside(path), exercise)
     explained = replace(said, reference=options.reference or said.reference, template=options.template or said.template)
     if explained.reference is None:
@@ -175,13 +175,18 @@ def _prepared(path: Path, options: Options) -> tuple[Path, Exercise, Explained]:
 
 
 def _bench(  # noqa: PLR0913  each comes from another stage
-    path: Path, exercise: Exercise, explained: Explained, studio: Studio, options: Options, progress: Progress
-) -> Bench:
-    request = Request(
+    path: Path,
+    exercise: Exercise,
+    explained: Explained,
+    studio: RecordingSession,
+    options: SelftestOptions,
+    progress: Progress,
+) -> TrialRunner:
+    request = GradeRequest(
         "", rubrics=(path,), clock=options.clock, isolation=options.isolation, workers=options.jobs, seed=options.seed
     )
     reference = _staged(explained.reference, exercise, studio, "reference")
-    return Bench(
+    return TrialRunner(
         studio=studio,
         request=request,
         exercise=exercise,
@@ -194,7 +199,7 @@ def _bench(  # noqa: PLR0913  each comes from another stage
     )
 
 
-def _staged(folder: Path | None, exercise: Exercise, studio: Studio, name: str) -> Submission:
+def _staged(folder: Path | None, exercise: Exercise, studio: RecordingSession, name: str) -> Submission:
     root = studio.folder / exercise.id / name
     root.mkdir(parents=True)
     return stage_submission(str(folder), exercise.files, root)
@@ -214,7 +219,7 @@ def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
     return sources
 
 
-def _tested(path: Path, bench: Bench, explained: Explained, options: Options) -> Result:
+def _tested(path: Path, bench: TrialRunner, explained: Explained, options: SelftestOptions) -> SelftestResult:
     started = time.perf_counter()
     exercise = bench.exercise
     bench.progress(f"{exercise.id}: reference and template")
@@ -226,7 +231,7 @@ def _tested(path: Path, bench: Bench, explained: Explained, options: Options) ->
     tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
     correct = tuple(_variants(bench, explained, options)) if reference.full else ()
     whole = reference.full and not options.only and options.sample is None
-    return Result(
+    return SelftestResult(
         rubric=str(path),
         exercise=exercise.id,
         criteria=tuple(criterion.id for criterion in exercise.criteria),
@@ -243,7 +248,7 @@ def _tested(path: Path, bench: Bench, explained: Explained, options: Options) ->
     )
 
 
-def _mutants(bench: Bench, explained: Explained, options: Options) -> Iterator[Trial]:
+def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
     """Yield the mutants that were asked for, tried."""
     found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
     wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
@@ -256,7 +261,7 @@ def _mutants(bench: Bench, explained: Explained, options: Options) -> Iterator[T
         yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
 
 
-def _variants(bench: Bench, explained: Explained, options: Options) -> Iterator[Trial]:
+def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
     """Yield the correct variants that were asked for, tried."""
     found = [variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name)]
     wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
@@ -268,12 +273,12 @@ def _variants(bench: Bench, explained: Explained, options: Options) -> Iterator[
         yield replace(trial, because=because.because if because else "")
 
 
-def _trial(candidate: Candidate, standing: Standing, bench: Bench) -> Trial:
+def _trial(candidate: Candidate, standing: ResultRank, bench: TrialRunner) -> Trial:
     change = one_line_change(bench.sources[candidate.file], candidate.source)
     return Trial(candidate.id, candidate.file, candidate.operator, change, standing)
 
 
-def _wanted(id_: str, options: Options) -> bool:
+def _wanted(id_: str, options: SelftestOptions) -> bool:
     return not options.only or fnmatchcase(id_, options.only)
 
 

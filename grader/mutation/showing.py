@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, Result, Standing, Trial
+from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial
 from grader.reporting.escape import shown, valid_unicode
 
 SCHEMA = "grader/mutation/v1"
@@ -21,7 +21,7 @@ _NARROWEST = 80
 _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
-def render_results(results: Sequence[Result], *, width: int, colour: bool) -> str:
+def render_results(results: Sequence[SelftestResult], *, width: int, colour: bool) -> str:
     """Return what came of some rubrics as text.
 
     Args:
@@ -46,7 +46,7 @@ def render_results(results: Sequence[Result], *, width: int, colour: bool) -> st
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines()) + "\n"
 
 
-def _result(console: Console, result: Result) -> None:
+def _result(console: Console, result: SelftestResult) -> None:
     verdict = Text("no hole found" if result.passed else "HAS HOLES", style=_GOOD if result.passed else _BAD)
     console.print(Text(f"{shown(result.exercise)} ({shown(result.rubric)}): ").append(verdict))
     console.print(f"  reference  {_standing(result.reference)}", style="" if result.reference.full else _BAD)
@@ -80,7 +80,7 @@ def _result(console: Console, result: Result) -> None:
         _put(console, 2, line, "yellow")
 
 
-def _count(result: Result) -> str:
+def _count(result: SelftestResult) -> str:
     fates = [trial.fate for trial in result.mutants]
     explained = sum(bool(trial.because) for trial in result.mutants)
     counts = f"{len(fates)} tried, {fates.count(Fate.KILLED)} killed, {len(result.survivors)} survived"
@@ -90,7 +90,7 @@ def _count(result: Result) -> str:
     )
 
 
-def _operators(result: Result) -> Table:
+def _operators(result: SelftestResult) -> Table:
     """Return a row an operator."""
     table = _table("operator", "made", "killed", "as said", "by other", "excused", "undecided", "SURVIVED")
     for name in dict.fromkeys(trial.operator for trial in result.mutants):
@@ -112,7 +112,7 @@ def _operators(result: Result) -> Table:
     return table
 
 
-def _criteria(result: Result) -> Table:
+def _criteria(result: SelftestResult) -> Table:
     """Return a row a criterion."""
     table = _table("criterion", "turned by", "alone", "expected", "of these turned", "")
     for id_ in result.criteria:
@@ -150,7 +150,7 @@ def _listed(console: Console, title: str, trials: Iterable[Trial], style: str) -
             _put(console, 4, f"expected {' or '.join(trial.expected)}")
 
 
-def _reasons(console: Console, standing: Standing) -> None:
+def _reasons(console: Console, standing: ResultRank) -> None:
     for id_, reason in standing.reasons.items():
         if standing.outcomes[id_] is not Outcome.BLOCKED:
             _put(console, 4, f"{id_}: {shown(reason, limit=300)}")
@@ -160,7 +160,7 @@ def _put(console: Console, indent: int, text: str, style: str = "") -> None:
     console.print(Padding(Text(text, style=style), (0, 0, 0, indent), expand=False))
 
 
-def _standing(standing: Standing) -> str:
+def _standing(standing: ResultRank) -> str:
     return f"{_points(standing.score)}/{_points(standing.max_score)}"
 
 
@@ -172,13 +172,13 @@ def _undecided(trials: Sequence[Trial]) -> int:
     return sum(trial.fate is Fate.UNDECIDED for trial in trials)
 
 
-def results_to_json(results: Sequence[Result]) -> str:
+def results_to_json(results: Sequence[SelftestResult]) -> str:
     """Return what came of some rubrics as JSON text; selftest.schema.json describes it."""
     data = {"schema": SCHEMA, "passed": all(r.passed for r in results), "rubrics": [_as_data(r) for r in results]}
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
 
 
-def _as_data(result: Result) -> Mapping[str, Any]:
+def _as_data(result: SelftestResult) -> Mapping[str, Any]:
     return {
         "rubric": valid_unicode(result.rubric),
         "exercise": result.exercise,
@@ -214,7 +214,7 @@ def _trial_data(trial: Trial) -> Mapping[str, Any]:
     }
 
 
-def _standing_data(standing: Standing) -> Mapping[str, Any]:
+def _standing_data(standing: ResultRank) -> Mapping[str, Any]:
     return {
         "score": float(standing.score),
         "max_score": float(standing.max_score),

@@ -18,7 +18,7 @@ from grader.core.errors import GraderError
 from grader.core.report import Report
 from grader.reporting.audience import ANYBODY, Readers
 from grader.reporting.escape import encoded
-from grader.reporting.formats import FORMATS, Layout, check_surroundings, rendered
+from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, rendered
 
 
 def check_writable(path: Path) -> None:
@@ -145,7 +145,7 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
     return write if files else None
 
 
-def show(render: Callable[[Layout], str], *, for_people: bool) -> None:
+def show(render: Callable[[PageLayout], str], *, for_people: bool) -> None:
     """Print something on standard output.
 
     Args:
@@ -156,7 +156,7 @@ def show(render: Callable[[Layout], str], *, for_people: bool) -> None:
         OSError: It cannot be written; a reader that had enough is no problem.
     """
     if sys.stdout is not None:
-        layout = Layout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
+        layout = PageLayout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
         _print(encoded(render(layout), sys.stdout.encoding if for_people else "utf-8"))
 
 
@@ -190,7 +190,7 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
 
 def _write(report: Report, output: Output, readers: Readers) -> None:
     if output.path is not None:
-        text = rendered(output.format, report, Layout(_FILE_WIDTH, colour=False), readers)
+        text = rendered(output.format, report, PageLayout(_FILE_WIDTH, colour=False), readers)
         write_whole(output.path, text.encode("utf-8"))
     else:
         show(lambda layout: rendered(output.format, report, layout, readers), for_people=output.format == "text")

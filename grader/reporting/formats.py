@@ -14,31 +14,31 @@ from grader.reporting.audience import ANYBODY, Readers
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class PageLayout:
     """How a text is laid out; formats for programs do not care."""
 
     width: int
     colour: bool
 
 
-def _nothing(report: Report, layout: Layout) -> Mapping[str, Any]:
+def _nothing(report: Report, layout: PageLayout) -> Mapping[str, Any]:
     del report, layout
     return {}
 
 
-def _layout(report: Report, layout: Layout) -> Mapping[str, Any]:
+def _layout(report: Report, layout: PageLayout) -> Mapping[str, Any]:
     del report
     return {"width": layout.width, "colour": layout.colour}
 
 
-def _folder(report: Report, layout: Layout) -> Mapping[str, Any]:
+def _folder(report: Report, layout: PageLayout) -> Mapping[str, Any]:
     from grader.reporting.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
 
     del layout
     return {"folder": repository_folder(report.path, os.environ)}
 
 
-def _handed_in(report: Report, layout: Layout) -> Mapping[str, Any]:
+def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
     from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
 
     del report, layout
@@ -62,12 +62,12 @@ class Format:
     renderer: str
     suffix: str
     usual: Audience
-    arguments: Callable[[Report, Layout], Mapping[str, Any]] = _nothing
+    arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing
     withholds: bool = False
     illustrated: bool = False
     written_early: bool = False
 
-    def __call__(self, report: Report, layout: Layout, **arguments: Any) -> str:
+    def __call__(self, report: Report, layout: PageLayout, **arguments: Any) -> str:
         """Return the text of a report."""
         module, _, function = self.renderer.partition(":")
         text: str = getattr(import_module(f"grader.reporting.{module}"), function)(
@@ -105,7 +105,7 @@ def check_surroundings(name: str) -> None:
         handed_in(os.environ)
 
 
-def rendered(name: str, report: Report, layout: Layout, readers: Readers = ANYBODY) -> str:
+def rendered(name: str, report: Report, layout: PageLayout, readers: Readers = ANYBODY) -> str:
     """Return a report in a format, with what its reader may see of it.
 
     Args:

@@ -11,7 +11,7 @@ from grader.reporting.escape import shown
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ReportStanding:
     """What a criterion came to in one report, as its JSON says."""
 
     outcome: str
@@ -26,8 +26,8 @@ class CriterionChange:
 
     exercise: str
     criterion: str
-    before: Standing | None
-    after: Standing | None
+    before: ReportStanding | None
+    after: ReportStanding | None
 
     @property
     def gain(self) -> float:
@@ -36,7 +36,7 @@ class CriterionChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ReportChange:
     """What changed for one submission.
 
     Attributes:
@@ -66,7 +66,7 @@ class Change:
         return round(_share(self.after, self.after_max) - _share(self.before, self.before_max), 9)
 
 
-def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Change:
+def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> ReportChange:
     """Return what changed between two reports as JSON, of the exercises that the second one has.
 
     Raises:
@@ -80,22 +80,24 @@ def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Ch
         for key in dict.fromkeys([*new, *old])
         if _mark(old.get(key)) != _mark(new.get(key))
     ]
-    return Change(name, *_sums(old.values()), *_sums(new.values()), tuple(changed))
+    return ReportChange(name, *_sums(old.values()), *_sums(new.values()), tuple(changed))
 
 
-def dropped_first(changes: Sequence[Change]) -> list[Change]:
+def dropped_first(changes: Sequence[ReportChange]) -> list[ReportChange]:
     """Return those with any difference: the greatest loss first, by the share of the points, the greatest gain last."""
     return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
 
 
-def _standings(report: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], Standing]]:
+def _standings(report: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], ReportStanding]]:
     for exercise in report["exercises"]:
         for row in exercise["criteria"]:
-            standing = Standing(str(row["outcome"]), float(row["score"]), float(row["max_score"]), str(row["reason"]))
+            standing = ReportStanding(
+                str(row["outcome"]), float(row["score"]), float(row["max_score"]), str(row["reason"])
+            )
             yield (str(exercise["id"]), str(row["id"])), standing
 
 
-def _mark(standing: Standing | None) -> tuple[str, float, float] | None:
+def _mark(standing: ReportStanding | None) -> tuple[str, float, float] | None:
     return None if standing is None else (standing.outcome, standing.score, standing.max_score)
 
 
@@ -113,7 +115,7 @@ _OUTCOMES = {"not_met": "not met"}
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class RejudgedResult:
     """One submission judged again, or refused.
 
     Attributes:
@@ -131,11 +133,11 @@ class Result:
     score: float = 0.0
     max_score: float = 0.0
     code: int = 0
-    change: Change | None = None
+    change: ReportChange | None = None
     report: str = ""
 
 
-def render_results(results: Sequence[Result]) -> str:
+def render_results(results: Sequence[RejudgedResult]) -> str:
     """Return one line for each submission, in the order given, and what was refused."""
     judged = [r for r in results if not r.problem]
     width = max((len(_name(r.name)) for r in judged), default=0)
@@ -143,7 +145,7 @@ def render_results(results: Sequence[Result]) -> str:
     return "\n".join([*lines, *_refused(results), _count(results)]) + "\n"
 
 
-def render_changes(results: Sequence[Result]) -> str:
+def render_changes(results: Sequence[RejudgedResult]) -> str:
     """Return what changed for whom, dropped marks first, and what was refused."""
     judged = [r for r in results if not r.problem]
     changes = dropped_first([r.change for r in judged if r.change is not None])
@@ -153,7 +155,7 @@ def render_changes(results: Sequence[Result]) -> str:
     return "\n".join([*lines, *incomparable, *_refused(results), f"unchanged: {same} of {len(judged)}"]) + "\n"
 
 
-def results_to_json(results: Sequence[Result], *, changes: bool) -> str:
+def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
     """Return a class as JSON text: every report, or with `changes` what changed, dropped marks first."""
     judged = [r for r in results if not r.problem]
     data: dict[str, Any] = {"schema": SCHEMA}
@@ -168,7 +170,7 @@ def results_to_json(results: Sequence[Result], *, changes: bool) -> str:
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
 
 
-def _change(change: Change) -> Iterator[str]:
+def _change(change: ReportChange) -> Iterator[str]:
     of, said = _points(change.after_max), f"{_signed(change.gain)} points"
     if change.before_max != change.after_max:
         of += f" (of {_points(change.before_max)} before)"
@@ -185,18 +187,18 @@ def _row(row: CriterionChange) -> str:
     return f"{before}, is {_standing(row.after)}: {shown(row.after.reason, limit=200)}"
 
 
-def _standing(standing: Standing | None) -> str:
+def _standing(standing: ReportStanding | None) -> str:
     if standing is None:
         return "nothing"
     outcome = _OUTCOMES.get(standing.outcome, standing.outcome)
     return f"{shown(outcome)} {_points(standing.score)}/{_points(standing.max_score)}"
 
 
-def _refused(results: Sequence[Result]) -> list[str]:
+def _refused(results: Sequence[RejudgedResult]) -> list[str]:
     return [f"refused: {_name(r.name)}: {shown(r.problem)}" for r in results if r.problem]
 
 
-def _count(results: Sequence[Result]) -> str:
+def _count(results: Sequence[RejudgedResult]) -> str:
     refused = sum(bool(r.problem) for r in results)
     judged = len(results) - refused
     return f"judged: {judged}" + (f", refused: {refused}" if refused else "")

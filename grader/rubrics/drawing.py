@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Stri
 from typing_extensions import Self, TypeAliasType
 
 from grader.core.scenario import AnyOrder, Between, Choose, CountBetween, InOrder, SomeOf, TimeBetween, Written
-from grader.rubrics.types import Duration, LongDuration, Matching, Real, Shape, Text, Whole, YesNo, build, wrong
+from grader.rubrics.types import Duration, LongDuration, MatchingText, Real, Shape, Text, Whole, YesNo, build, wrong
 
 #: Most decimals that a text shows of a drawn number.
 DECIMALS = 9
@@ -31,7 +31,7 @@ def _decimals(count: int) -> int:
 
 #: Unlike the numbers of checks, a field may be `.nan` or `.inf`: sensors send them.
 FieldNumber = Annotated[float, Strict()]
-FieldName = Annotated[str, Matching("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
+FieldName = Annotated[str, MatchingText("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
 LowHigh = Annotated[tuple[Real, Real], AfterValidator(rising)]
 Option = Annotated[str, Strict()] | YesNo | Whole | FieldNumber
 

@@ -36,7 +36,7 @@ from grader.rubrics.types import CHECK_FILE, build
 from grader.rubrics.variants import (
     Draw,
     First,
-    Options,
+    VariantOptions,
     has_variants,
     options_of,
     tried,
@@ -227,7 +227,9 @@ def read_rubric(
     return replace(exercise, variant=variant)
 
 
-def _variant(path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[Options], draw: Draw | None) -> Variant:
+def _variant(
+    path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[VariantOptions], draw: Draw | None
+) -> Variant:
     """Return the values that were drawn; raises RubricError where nobody is named, or a value is not known."""
     if draw is None:
         hint = "name the student and the course key: --student ID --variant-key FILE"

@@ -74,7 +74,7 @@ def build(value: Any) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Matching:
+class MatchingText:
     """Marks a text that has to match a pattern as a whole.
 
     Attributes:
@@ -160,27 +160,33 @@ def _as_text(value: object) -> object:
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 
-Text = Annotated[str, Matching(r"[\s\S]*\S[\s\S]*", "text that is not empty", "Publishes at 20 Hz")]
-Id = Annotated[str, Matching("[a-z][a-z0-9_]*", "an id of small letters, digits and _, a letter first", "rate")]
-Topic = Annotated[str, Matching(f"(?:/{_NAME})+", "an absolute topic name such as /cmd_vel", "/cmd_vel")]
+Text = Annotated[str, MatchingText(r"[\s\S]*\S[\s\S]*", "text that is not empty", "Publishes at 20 Hz")]
+Id = Annotated[str, MatchingText("[a-z][a-z0-9_]*", "an id of small letters, digits and _, a letter first", "rate")]
+Topic = Annotated[str, MatchingText(f"(?:/{_NAME})+", "an absolute topic name such as /cmd_vel", "/cmd_vel")]
 MessageType = Annotated[
-    str, Matching(f"[a-z][a-z0-9_]*/msg/{_NAME}", "a message type such as std_msgs/msg/Float32", "std_msgs/msg/Float32")
+    str,
+    MatchingText(f"[a-z][a-z0-9_]*/msg/{_NAME}", "a message type such as std_msgs/msg/Float32", "std_msgs/msg/Float32"),
 ]
 ServiceType = Annotated[
-    str, Matching(f"[a-z][a-z0-9_]*/srv/{_NAME}", "a service type such as std_srvs/srv/Trigger", "std_srvs/srv/Trigger")
+    str,
+    MatchingText(f"[a-z][a-z0-9_]*/srv/{_NAME}", "a service type such as std_srvs/srv/Trigger", "std_srvs/srv/Trigger"),
 ]
 ActionType = Annotated[
     str,
-    Matching(f"[a-z][a-z0-9_]*/action/{_NAME}", "an action type such as pkg/action/Move", "test_msgs/action/Fibonacci"),
+    MatchingText(
+        f"[a-z][a-z0-9_]*/action/{_NAME}", "an action type such as pkg/action/Move", "test_msgs/action/Fibonacci"
+    ),
 ]
 PythonFile = Annotated[
     str,
-    Matching(r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"),
+    MatchingText(
+        r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"
+    ),
 ]
 #: Where a file of checks may lie: beside the rubric or below; never outside, never hidden.
 CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
 CheckFile = Annotated[
-    str, Matching(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
+    str, MatchingText(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
 ]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]

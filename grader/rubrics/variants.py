@@ -121,7 +121,7 @@ def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class VariantOptions:
     """All that a variant may be.
 
     Attributes:
@@ -159,7 +159,7 @@ class Draw(Protocol):
         """Whose values they are."""
         ...
 
-    def value(self, exercise: str, options: Options) -> Value | None:
+    def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Return the value of a variant; None if it is not known."""
         ...
 
@@ -170,7 +170,7 @@ class First:
 
     student: str = ""
 
-    def value(self, exercise: str, options: Options) -> Value | None:
+    def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Return the first value."""
         del exercise
         return options.value(0)
@@ -191,12 +191,12 @@ class Recorded:
         """Whose values they are."""
         return self.drawn.student
 
-    def value(self, exercise: str, options: Options) -> Value | None:
+    def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Return the value that was kept."""
         return self.drawn.values.get(exercise, {}).get(options.name)
 
 
-def tried(options: Sequence[Options], usual: Mapping[str, Value]) -> Iterator[Mapping[str, Value]]:
+def tried(options: Sequence[VariantOptions], usual: Mapping[str, Value]) -> Iterator[Mapping[str, Value]]:
     """Yield the combinations that a check of the rubric tries: each value once, the others as usual."""
     for option in options:
         yield from ({**usual, option.name: value} for value in option.tried())
@@ -215,11 +215,11 @@ def variants_model() -> type[Shape]:
     return _Variants
 
 
-def options_of(validated: Shape) -> tuple[Options, ...]:
+def options_of(validated: Shape) -> tuple[VariantOptions, ...]:
     """Return what the variants may be, of a rubric that `variants_model` has validated."""
     assert isinstance(validated, _Variants)
     return tuple(
-        Options(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
+        VariantOptions(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
         for name, shape in validated.variants.items()
     )
 

@@ -15,12 +15,12 @@ from pathlib import Path
 from grader.core.errors import ClassError, GraderError
 from grader.similarity.library import (
     PIECE,
+    ComparedProgram,
     Handed,
     Likeness,
     Pair,
     Print,
-    Program,
-    Same,
+    SameText,
     Side,
     Similar,
     TooSlow,
@@ -35,7 +35,7 @@ MAX_BYTES = 64 << 10
 MAX_ALL_BYTES = 2 * MAX_BYTES
 
 
-def read_programs(path: Path) -> tuple[tuple[Program, ...], tuple[str, ...]]:
+def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
     """Return the Python files of a submission, and what cannot be compared and why; it never raises for a student.
 
     Args:
@@ -48,9 +48,9 @@ def read_programs(path: Path) -> tuple[tuple[Program, ...], tuple[str, ...]]:
         return (), ("it cannot be read",)
 
 
-def read_given(folders: Iterable[Path]) -> tuple[Program, ...]:
+def read_given(folders: Iterable[Path]) -> tuple[ComparedProgram, ...]:
     """Return the Python files that everybody was given; raises ClassError for a folder without any."""
-    given: list[Program] = []
+    given: list[ComparedProgram] = []
     for folder in folders:
         programs, _ = read_programs(folder)
         if not programs:
@@ -59,7 +59,7 @@ def read_given(folders: Iterable[Path]) -> tuple[Program, ...]:
     return tuple(given)
 
 
-def programs_of(collected: Collected) -> tuple[tuple[Program, ...], tuple[str, ...]]:
+def programs_of(collected: Collected) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
     """Return what of the files that were read can be compared, and what cannot and why."""
     programs, passed_over, room = [], [], MAX_ALL_BYTES
     for name, content in sorted(collected.files):
@@ -70,7 +70,7 @@ def programs_of(collected: Collected) -> tuple[tuple[Program, ...], tuple[str, .
             passed_over.append(f"{name}: {why}")
             continue
         room -= len(content)
-        programs.append(Program(name, text_of(content), hashlib.sha256(content).hexdigest()))
+        programs.append(ComparedProgram(name, text_of(content), hashlib.sha256(content).hexdigest()))
     return tuple(programs), tuple(passed_over)
 
 
@@ -106,11 +106,11 @@ class _File:
     """One file that takes part: whose it is, and what stands for it."""
 
     owner: int
-    program: Program
+    program: ComparedProgram
     print: Print
 
 
-def find_similar(handed: Sequence[Handed], given: Sequence[Program]) -> Similar:
+def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> Similar:
     """Return which submissions of a class are alike.
 
     Args:
@@ -149,14 +149,14 @@ def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
     return files, told
 
 
-def _print(program: Program) -> Print | None:
+def _print(program: ComparedProgram) -> Print | None:
     try:
         return make_print(program.text)
     except (TooSlow, MemoryError, RecursionError):
         return None
 
 
-def _take_out(files: Sequence[_File], given: Sequence[Program], common_from: int) -> None:
+def _take_out(files: Sequence[_File], given: Sequence[ComparedProgram], common_from: int) -> None:
     """Leave each file its own pieces: those that were not given, and that only few others have."""
     owners: dict[int, set[int]] = defaultdict(set)
     for file in files:
@@ -210,15 +210,15 @@ def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tu
             yield left, right
 
 
-def _same(handed: Sequence[Handed]) -> list[Same]:
+def _same(handed: Sequence[Handed]) -> list[SameText]:
     """Return files that several people handed in byte for byte; empty ones say nothing."""
-    holders: dict[str, list[tuple[Handed, Program]]] = defaultdict(list)
+    holders: dict[str, list[tuple[Handed, ComparedProgram]]] = defaultdict(list)
     for one in handed:
         for digest, program in {program.digest: program for program in one.programs}.items():
             if program.text.strip():
                 holders[digest].append((one, program))
     found = [
-        Same(who[0][1].name, tuple(h for h, _ in who), len({_all_of(h) for h, _ in who}) == 1)
+        SameText(who[0][1].name, tuple(h for h, _ in who), len({_all_of(h) for h, _ in who}) == 1)
         for who in holders.values()
         if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
     ]

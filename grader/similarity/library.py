@@ -16,7 +16,7 @@ Lines = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class ComparedProgram:
     """One Python file.
 
     Attributes:
@@ -45,7 +45,7 @@ class Handed:
 
     name: str
     label: str
-    programs: tuple[Program, ...]
+    programs: tuple[ComparedProgram, ...]
     passed_over: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
     reported: bool = False
@@ -62,7 +62,7 @@ class Side:
         alike: Lines whose code is in the other file too.
     """
 
-    program: Program
+    program: ComparedProgram
     share: float
     alike: Lines
 
@@ -107,7 +107,7 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
-class Same:
+class SameText:
     """Submissions that hold the same file, byte for byte.
 
     Attributes:
@@ -138,7 +138,7 @@ class Similar:
 
     handed: Sequence[Handed]
     pairs: tuple[Pair, ...]
-    same: tuple[Same, ...] = ()
+    same: tuple[SameText, ...] = ()
     given: tuple[tuple[Handed, str], ...] = ()
     common_from: int = 0
     threshold: float = 0.0

@@ -12,7 +12,18 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
 from typing import Any
 
-from .packages import MAIN, MODULE, NAMELESS, SCRIPT, Layout, calls, layout_of, never_true, package_folders, start_of
+from .packages import (
+    MAIN,
+    MODULE,
+    NAMELESS,
+    SCRIPT,
+    PackageLayout,
+    calls,
+    layout_of,
+    never_true,
+    package_folders,
+    start_of,
+)
 from .shadows import Shadows
 
 #: Takes a code and what belongs to it: `started`, and what the report has to mention.
@@ -78,7 +89,7 @@ def _parse(path: str) -> ast.Module:
     return ast.parse(text, path)
 
 
-def _run_as_main(path: str, name: str, layout: Layout) -> dict[str, Any]:
+def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:
     """Run a file as `__main__` and keep its module alive, as the interpreter does.
 
     Args:
@@ -106,7 +117,7 @@ def _run_as_main(path: str, name: str, layout: Layout) -> dict[str, Any]:
     return module.__dict__
 
 
-def _make_nameless(path: str, layout: Layout) -> None:
+def _make_nameless(path: str, layout: PackageLayout) -> None:
     """Make the package whose own folder is all that was handed in: no folder on the path holds it."""
     parts = layout.module.split(".")
     if layout.base or parts[0] != NAMELESS:

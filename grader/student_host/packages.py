@@ -25,7 +25,7 @@ FOLDERS = 500
 SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
 
 
-class Layout(NamedTuple):
+class PackageLayout(NamedTuple):
     """Where a file lies.
 
     Attributes:
@@ -39,7 +39,7 @@ class Layout(NamedTuple):
     package: str | None = None
 
 
-class Start(NamedTuple):
+class StartMethod(NamedTuple):
     """How a file is started.
 
     Attributes:
@@ -47,7 +47,7 @@ class Start(NamedTuple):
             main(), `entry_point` calls what setup.py names for it.
         module: Dotted name; empty for a script.
         function: What is called, empty if nothing is.
-        base: As for `Layout`.
+        base: As for `PackageLayout`.
     """
 
     way: str
@@ -56,7 +56,7 @@ class Start(NamedTuple):
     base: str = ""
 
 
-def layout_of(root: str, file: str) -> Layout:
+def layout_of(root: str, file: str) -> PackageLayout:
     """Return where a file lies; it is in a package with `__init__.py` beside it or a setup.py or package.xml above."""
     folder = os.path.dirname(file)
     above = [folder]
@@ -67,9 +67,9 @@ def layout_of(root: str, file: str) -> Layout:
     chain = above[: next((n for n, f in enumerate(above) if f not in inside), len(above))]
     stem = os.path.splitext(os.path.basename(file))[0]
     if not chain and package is None:
-        return Layout()
+        return PackageLayout()
     if not chain and package is not None and _is_file(root, package, CMAKE) and not _is_file(root, package, "setup.py"):
-        return Layout(package=package)
+        return PackageLayout(package=package)
     if not chain and package is not None:
         below = os.path.relpath(folder, package) if folder != package else ""
         names, base = [part for part in below.split("/") if part], os.path.join(root, package)
@@ -77,7 +77,11 @@ def layout_of(root: str, file: str) -> Layout:
         names = [os.path.basename(f) or NAMELESS for f in reversed(chain)]
         base = "" if chain[-1] == "" else os.path.join(root, os.path.dirname(chain[-1]))
     names.append(stem)
-    return Layout() if any("." in name for name in names) else Layout(".".join(names), base.rstrip("/"), package)
+    return (
+        PackageLayout()
+        if any("." in name for name in names)
+        else PackageLayout(".".join(names), base.rstrip("/"), package)
+    )
 
 
 def _is_file(root: str, folder: str, name: str) -> bool:
@@ -95,7 +99,7 @@ def package_folders(root: str) -> list[str]:
     return found
 
 
-def start_of(root: str, file: str, layout: Layout, tree: ast.Module) -> Start:
+def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module) -> StartMethod:
     """Return how a file is started.
 
     Args:
@@ -105,16 +109,16 @@ def start_of(root: str, file: str, layout: Layout, tree: ast.Module) -> Start:
         tree: Its code.
     """
     if not layout.module:
-        return Start(SCRIPT)
+        return StartMethod(SCRIPT)
     if layout.package is not None:
         found = _entry_point(root, file, layout)
         if found is not None:
             return found
     way = MAIN if _offers_main(tree) else MODULE
-    return Start(way, layout.module, "main" if way == MAIN else "", layout.base)
+    return StartMethod(way, layout.module, "main" if way == MAIN else "", layout.base)
 
 
-def _entry_point(root: str, file: str, layout: Layout) -> Start | None:
+def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | None:
     """Return the console script that runs a file, that of the file's own name before others."""
     folder = os.path.join(root, layout.package or "")
     has_init = _is_file(root, os.path.dirname(file), "__init__.py")
@@ -126,7 +130,7 @@ def _entry_point(root: str, file: str, layout: Layout) -> Start | None:
         # without an __init__.py the package is what setup.py says; with one, the name must be right
         if module == layout.module or (not has_init and base + path == os.path.join(root, file) and inside):
             base = layout.base if module == layout.module else base
-            found.append((name == module.rpartition(".")[2], Start(ENTRY_POINT, module, function, base)))
+            found.append((name == module.rpartition(".")[2], StartMethod(ENTRY_POINT, module, function, base)))
     return max(found, key=lambda pair: pair[0], default=(False, None))[1]
 
 

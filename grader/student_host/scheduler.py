@@ -12,7 +12,7 @@ from typing import Any
 from . import originals
 
 
-class Strand:
+class GreenThread:
     """One thread of the student's program, and what it waits for."""
 
     __slots__ = ("deadline_ns", "gate", "native", "parked", "polled_in", "polls")
@@ -39,20 +39,20 @@ class Scheduler:
     def __init__(self, now_ns: Callable[[], int], ask_for_time: Callable[[int | None], None]) -> None:
         self._now_ns = now_ns
         self._ask_for_time = ask_for_time
-        self._strands: dict[int, Strand] = {}
-        self._parked: list[Strand] = []
-        self._runnable: deque[Strand] = deque()
+        self._strands: dict[int, GreenThread] = {}
+        self._parked: list[GreenThread] = []
+        self._runnable: deque[GreenThread] = deque()
         self._round = 0
         self.current = self._adopt()
 
-    def _adopt(self) -> Strand:
+    def _adopt(self) -> GreenThread:
         """Make the calling thread a strand that holds the baton."""
-        strand = Strand()
+        strand = GreenThread()
         strand.native = originals.get_native_id()
         self._strands[originals.get_ident()] = strand
         return strand
 
-    def mine(self) -> Strand | None:
+    def mine(self) -> GreenThread | None:
         """Return the calling thread's strand, or None for a thread that is not the student's."""
         return self._strands.get(originals.get_ident())
 
@@ -93,7 +93,7 @@ class Scheduler:
                 strand.parked = False
             raise
 
-    def wake(self, strand: Strand) -> None:
+    def wake(self, strand: GreenThread) -> None:
         """Make a parked strand runnable."""
         if strand.parked:
             self._parked.remove(strand)
@@ -103,7 +103,7 @@ class Scheduler:
 
     def start(self, body: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[[], None]:
         """Register a new strand at once, and return the function that its thread must run."""
-        strand = Strand()
+        strand = GreenThread()
         self._runnable.append(strand)
         self._round += 1
 
@@ -118,14 +118,14 @@ class Scheduler:
 
         return run
 
-    def _end(self, strand: Strand) -> None:
+    def _end(self, strand: GreenThread) -> None:
         self._strands.pop(originals.get_ident(), None)
         self._round += 1
         following = self._choose()
         self.current = following
         following.gate.release()
 
-    def _hand_on(self, strand: Strand) -> None:
+    def _hand_on(self, strand: GreenThread) -> None:
         following = self._choose()
         if following is strand:
             return
@@ -139,7 +139,7 @@ class Scheduler:
             strand.gate.acquire()
             raise
 
-    def _choose(self) -> Strand:
+    def _choose(self) -> GreenThread:
         """Return the strand that runs next; when none can, let time move until one can."""
         while True:
             if self._runnable:
@@ -155,10 +155,10 @@ class Scheduler:
             self._ask_for_time(min((s.deadline_ns for s in self._parked if s.deadline_ns is not None), default=None))
             self._round += 1
 
-    def _poller(self) -> Strand | None:
+    def _poller(self) -> GreenThread | None:
         return next((s for s in self._parked if s.polls and s.polled_in != self._round), None)
 
-    def _due(self) -> Strand | None:
+    def _due(self) -> GreenThread | None:
         now_ns = self._now_ns()
         due = [s for s in self._parked if s.deadline_ns is not None and s.deadline_ns <= now_ns]
         return min(due, key=lambda s: s.deadline_ns or 0, default=None)

@@ -17,7 +17,7 @@ from typing import Any
 from . import originals
 from .clock import VirtualClock
 from .outside import any_outside
-from .scheduler import Scheduler, Strand
+from .scheduler import GreenThread, Scheduler
 
 NS_PER_S = 1_000_000_000
 
@@ -50,7 +50,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
 
         def __init__(self) -> None:
             self._locked = False
-            self._waiters: deque[Strand] = deque()
+            self._waiters: deque[GreenThread] = deque()
 
         def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
             if not blocking and timeout != -1:
@@ -81,7 +81,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
                 return False
             return True
 
-        def _leave(self, strand: Strand) -> None:
+        def _leave(self, strand: GreenThread) -> None:
             """Stop waiting; a lock that was handed over in the same moment is passed on."""
             if strand in self._waiters:
                 self._waiters.remove(strand)
@@ -184,7 +184,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
         while strand is not None and not getattr(self, "_grader_finished", False):
             if timeouts.over(deadline_ns):
                 return
-            joiners: list[Strand] = self.__dict__.setdefault("_grader_joiners", [])
+            joiners: list[GreenThread] = self.__dict__.setdefault("_grader_joiners", [])
             joiners.append(strand)
             try:
                 scheduler.pause(deadline_ns)

@@ -17,11 +17,11 @@ from own_check_samples import CHECKS_FILE, PUMP, RUBRIC, write_rubric
 from ruamel.yaml import YAML
 
 from grader.app.grade import read_exercises
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.classroom.cache_key import Conditions
 from grader.classroom.cluster.jobs import lay_out
 from grader.classroom.cluster.sending import checks_of
-from grader.classroom.messages import Errand, Terms
+from grader.classroom.messages import GradingJob, Terms
 from grader.cli import main
 from grader.core.errors import RubricError
 from grader.core.exercise import Outcome
@@ -132,11 +132,11 @@ def test_a_file_is_never_taken_from_where_students_write(tmp_path: Path) -> None
     """Neither from the submission that is graded nor from a class; nothing of it is run."""
     path = write_rubric(tmp_path, checks="raise AssertionError('it was run')")
     assert "expected a file that students cannot write" in refused(path, submissions=[tmp_path]).message
-    request = Request(str(tmp_path), rubrics=(path,))
+    request = GradeRequest(str(tmp_path), rubrics=(path,))
     with pytest.raises(RubricError, match="expected a file that students cannot write"):
         read_exercises(request)
     with pytest.raises(RubricError, match="expected a file that students cannot write"):
-        read_exercises(Request("", rubrics=(path,)), [tmp_path / "elsewhere", tmp_path])
+        read_exercises(GradeRequest("", rubrics=(path,)), [tmp_path / "elsewhere", tmp_path])
 
 
 def test_a_link_does_not_lead_out_of_the_folder(tmp_path: Path) -> None:
@@ -239,7 +239,7 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
     conditions = Conditions("0", (), "", None, "auto", "auto")
     terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), b"", (), False, 1.0, checks)
-    task = lay_out(terms, Errand("ada", b"ada", b"class/ada", b""), tmp_path / "there")
+    task = lay_out(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
     assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
 

@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 
 from grader.authoring.checking import check_rubric
 from grader.authoring.questions import Seen, questions
-from grader.authoring.skeleton import Draft, DraftCriterion, DraftStimulus, Quantity, as_id, rubric_text
+from grader.authoring.skeleton import Draft, DraftCriterion, DraftQuantity, DraftStimulus, as_id, rubric_text
 from grader.authoring.starting import stimuli_for
 from grader.cli import main
 from grader.core.trace import Offer
@@ -153,7 +153,9 @@ def test_the_text_can_be_read_whatever_files_are_called(tmp_path: Path) -> None:
     row = DraftCriterion(
         "logs", 'Logs: "all" #1', "uses_logger", {"process": name}, "log\nit: {now}", comment="x\ny: z"
     )
-    given = DraftStimulus("numbers", {"topic": "/a", "type": FLOAT, "values": [1, -0.5], "period": Quantity("1 s")})
+    given = DraftStimulus(
+        "numbers", {"topic": "/a", "type": FLOAT, "values": [1, -0.5], "period": DraftQuantity("1 s")}
+    )
     draft = Draft("e", (name,), 5.0, stimuli=(given,), criteria=(row,), remarks=("a\nb: c",))
     data = YAML(typ="safe", pure=True).load(rubric_text(draft, [(row, "why\nnot: {")]))
     assert data["files"] == [name]

@@ -10,7 +10,7 @@ from class_samples import course
 
 from grader.classroom.class_run import grade_class
 from grader.classroom.local import Attempt
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.classroom.watching import Watcher
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
@@ -56,10 +56,10 @@ class MadeUp:
             digest = stage_submission(str(task.submission), (), Path(staged)).digest
         key = task.conditions.key(digest)
         if number == FAILED:
-            return Standing(State.FAILED, "", "", task.label, f"{task.submission}: the worker ended (signal 9)")
+            return ResultStatus(State.FAILED, "", "", task.label, f"{task.submission}: the worker ended (signal 9)")
         if number == REFUSED:
             problem = f"{task.submission}: expected a Python file, found none"
-            return Standing(State.REFUSED, key, digest, task.label, problem, "hand in a .py file")
+            return ResultStatus(State.REFUSED, key, digest, task.label, problem, "hand in a .py file")
         report = replace(class_reports.drawn_report(number, task.label), digest=digest)
         task.into.mkdir()
         (task.into / "report.json").write_text(dumps(report), encoding="utf-8")
@@ -67,7 +67,7 @@ class MadeUp:
         state = State.GRADED if report.final else State.UNDECIDED
         usage = {"processor_s": 2.5, "peak_bytes": 90 << 20}
         score, most = float(report.score), float(report.max_score)
-        return Standing(state, key, digest, task.label, score=score, max_score=most, usage=usage)
+        return ResultStatus(state, key, digest, task.label, score=score, max_score=most, usage=usage)
 
 
 def names(count):

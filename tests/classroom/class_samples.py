@@ -12,8 +12,8 @@ from typing import Any
 from grader.app.grade import Request
 from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
-from grader.classroom.request import Course
-from grader.classroom.store import Standing, State
+from grader.classroom.request import ClassRequest
+from grader.classroom.store import ResultStatus, State
 from grader.classroom.summary import Graded
 from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
@@ -55,7 +55,7 @@ class FakeScheduler:
             self.tasks[task.name] = task
             yield Attempt(task, self.standing(task))
 
-    def standing(self, task: Task) -> Standing:
+    def standing(self, task: Task) -> ResultStatus:
         staging = task.into.parent / "staging"
         staging.mkdir()
         try:
@@ -63,13 +63,13 @@ class FakeScheduler:
             said = next(iter(staging.rglob("score.py"))).read_text(encoding="utf-8").strip()
         except SubmissionError as error:
             key = task.conditions.key(unusable_digest(error))
-            return Standing(State.REFUSED, key, "", task.label, error.message)
+            return ResultStatus(State.REFUSED, key, "", task.label, error.message)
         finally:
             import shutil
 
             shutil.rmtree(staging)
         if said == "failed":
-            return Standing(State.FAILED, "", "", task.label, "the grader ended without a result")
+            return ResultStatus(State.FAILED, "", "", task.label, "the grader ended without a result")
         final = not said.startswith("undecided")
         score = int(said.removeprefix("undecided "))
         task.into.mkdir()
@@ -80,7 +80,7 @@ class FakeScheduler:
         (task.into / "gradescope.json").write_text(json.dumps(gradescope), encoding="utf-8")
         state = State.GRADED if final else State.UNDECIDED
         key = task.conditions.key(submission.digest)
-        return Standing(state, key, submission.digest, task.label, score=float(score), max_score=10.0)
+        return ResultStatus(state, key, submission.digest, task.label, score=float(score), max_score=10.0)
 
 
 def hand_in(folder: Path, **scores: int | str) -> Path:
@@ -91,12 +91,12 @@ def hand_in(folder: Path, **scores: int | str) -> Path:
     return folder
 
 
-def course(source: Path, results: Path, **changes: Any) -> Course:
+def course(source: Path, results: Path, **changes: Any) -> ClassRequest:
     """Return what to grade."""
-    return replace(Course((source,), results, grading=GRADING), **changes)
+    return replace(ClassRequest((source,), results, grading=GRADING), **changes)
 
 
-def grade(wanted: Course, scheduler: FakeScheduler | None = None, watcher: None = None) -> Graded | None:
+def grade(wanted: ClassRequest, scheduler: FakeScheduler | None = None, watcher: None = None) -> Graded | None:
     """Grade a class with the fake scheduler, or another one."""
     from grader.classroom.class_run import grade_class
 

@@ -14,8 +14,8 @@ from distributed.scheduler import KilledWorker
 from grader.classroom import store as kept
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.messages import Answer, Errand, Fitness, pack, unpack
-from grader.classroom.store import Standing, State
+from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
+from grader.classroom.store import ResultStatus, State
 
 CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "auto", "auto")
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
@@ -44,11 +44,11 @@ def task(folder: Path, name: str = "ada", **changes: Path | str | tuple[Path]) -
 
 def graded(
     name: str = "ada", machine: str = f"worker {ONE} on lab", score: float = 3.0, key: str | None = None
-) -> Answer:
+) -> JobResult:
     """Return an answer with a result."""
     key = CONDITIONS.key("sha256:2") if key is None else key
-    standing = Standing(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
-    return Answer(machine, kept.dump(standing), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
+    standing = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
+    return JobResult(machine, kept.dump(standing), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
 
 
 class FakeFuture:
@@ -125,10 +125,10 @@ class FakeClient:
         assert pure is False
         assert key not in self.keys
         self.keys.append(key)
-        name = unpack(errand.data if isinstance(errand, SimpleNamespace) else errand, Errand).name
+        name = unpack(errand.data if isinstance(errand, SimpleNamespace) else errand, GradingJob).name
         self.sent.append(name)
         said = self.answers(name, workers)
-        if isinstance(said, Answer):
+        if isinstance(said, JobResult):
             return FakeFuture(key, "finished", pack(said))
         if isinstance(said, Exception):
             return FakeFuture(key, "error", said)

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from grader.classroom.downloads import AUTO
-from grader.classroom.intake import Entry, Intake, take_in
+from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.core.errors import ClassError
 
 PY = b"print('hello')\n"
@@ -58,7 +58,7 @@ def names(intake: Intake) -> list[str]:
     return [entry.name for entry in intake.entries]
 
 
-def contents(entry: Entry) -> list[str]:
+def contents(entry: HandedInEntry) -> list[str]:
     """Return the files of an entry that is a folder."""
     return sorted(p.relative_to(entry.path).as_posix() for p in entry.path.rglob("*") if p.is_file())
 

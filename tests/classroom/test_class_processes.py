@@ -15,10 +15,10 @@ import pytest
 
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import LocalScheduler, Task
-from grader.classroom.store import Standing, State, dump
+from grader.classroom.store import ResultStatus, State, dump
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
-DONE = json.loads(dump(Standing(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
+DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
 
 #: What stands in for the grader: does as the label of its task says.
 PROGRAM = f"""
@@ -57,7 +57,7 @@ def scheduler(jobs: int = 2) -> LocalScheduler:
 
 def graded(
     tasks: Sequence[Task], jobs: int = 2, hear: Callable[..., Any] = lambda name, step: None
-) -> dict[str, Standing]:
+) -> dict[str, ResultStatus]:
     return {a.task.name: a.standing for a in scheduler(jobs).run(tasks, hear)}
 
 

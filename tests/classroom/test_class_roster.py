@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classroom.intake import Entry, safe_name
-from grader.classroom.roster import Matching, Person, match, read_roster
+from grader.classroom.intake import HandedInEntry, safe_name
+from grader.classroom.roster import Person, RosterMatch, match, read_roster
 from grader.core.errors import ClassError
 
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Homework (12345)
@@ -33,11 +33,11 @@ def roster(tmp_path: Path, text: str, encoding: str = "utf-8") -> list[Person]:
     return read_roster(tmp_path / "roster.csv")
 
 
-def entry(label: str, **identity: str) -> Entry:
-    return Entry(safe_name(label), label, Path(label), identity)
+def entry(label: str, **identity: str) -> HandedInEntry:
+    return HandedInEntry(safe_name(label), label, Path(label), identity)
 
 
-def who(matching: Matching) -> dict[str, str]:
+def who(matching: RosterMatch) -> dict[str, str]:
     return {name: person.name for name, person in matching.people.items()}
 
 
@@ -102,7 +102,12 @@ def test_two_submissions_of_one_person_are_listed(tmp_path: Path) -> None:
 def test_without_a_roster_everybody_is_who_the_submission_says() -> None:
     """A folder and an archive of one name are of one student."""
     found = match(
-        [Entry("ada-1", "ada", Path("ada")), Entry("ada-2", "Ada", Path("ada.zip")), entry("b", name="Bo")], None
+        [
+            HandedInEntry("ada-1", "ada", Path("ada")),
+            HandedInEntry("ada-2", "Ada", Path("ada.zip")),
+            entry("b", name="Bo"),
+        ],
+        None,
     )
     assert found.duplicates == (("ada-1", "ada-2"),)
     assert found.people["b"].name == "Bo"

@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.store import Standing, State, Store, dump, load, open_store
+from grader.classroom.store import ResultStatus, State, Store, dump, load, open_store
 from grader.core.errors import HarnessError
 
 
-def standing(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> Standing:
-    return Standing(state, key, "sha256:1", "ada", score=score, max_score=10.0)
+def standing(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> ResultStatus:
+    return ResultStatus(state, key, "sha256:1", "ada", score=score, max_score=10.0)
 
 
-def commit(store: Store, new: Standing, name: str = "ada", text: str = "report") -> bool | None:
+def commit(store: Store, new: ResultStatus, name: str = "ada", text: str = "report") -> bool | None:
     """Commit a result with one file."""
     fresh = store.fresh(name)
     fresh.mkdir()
@@ -128,7 +128,7 @@ def test_a_damaged_standing_is_none(data: bytes) -> None:
 
 def test_a_standing_survives_names_that_are_no_text() -> None:
     """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
-    odd = Standing(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
+    odd = ResultStatus(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
     assert load(dump(odd)).state is State.REFUSED
 
 

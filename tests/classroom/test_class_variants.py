@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in
 
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.app.variants import by_key
 from grader.classroom import worker
 from grader.classroom.cache_key import Conditions
@@ -87,7 +87,7 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     """So that it can be anywhere; the line that repeats the run names student and key."""
     heard = []
 
-    def refuse(request: Request, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    def refuse(request: GradeRequest, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
         heard.append(request)
         raise HarnessError("enough")
 

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TextColumn
 
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.classroom.watching import LiveWatcher, Watcher, clock_time, outcome_words
 
 
@@ -21,8 +21,8 @@ class Clock:
         return self.now
 
 
-def standing(state: State = State.GRADED, problem: str = "") -> Standing:
-    return Standing(state, "", "", "x", problem, score=87.5, max_score=100.0, duration_s=2.06)
+def standing(state: State = State.GRADED, problem: str = "") -> ResultStatus:
+    return ResultStatus(state, "", "", "x", problem, score=87.5, max_score=100.0, duration_s=2.06)
 
 
 def test_each_one_is_a_line_with_rate_and_time_left() -> None:

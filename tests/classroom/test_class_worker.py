@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.classroom import worker
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
@@ -23,10 +23,10 @@ from grader.core.trace import ClockKind
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 
 
-def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> Standing:
+def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> ResultStatus:
     """Return what an attempt comes to in which grading ends with an error."""
 
-    def grade(request: Request, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    def grade(request: GradeRequest, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
         raise error
 
     monkeypatch.setattr(worker, "grade", grade)

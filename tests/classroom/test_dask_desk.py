@@ -14,8 +14,8 @@ from dask_samples import ONE, TWO, FakeClient, graded, task
 from distributed import KilledWorker
 
 from grader.classroom.cluster.dispatcher import ClusterScheduler
-from grader.classroom.messages import Answer
-from grader.classroom.store import Standing, State
+from grader.classroom.messages import JobResult
+from grader.classroom.store import ResultStatus, State
 from grader.core.errors import HarnessError
 
 
@@ -34,7 +34,7 @@ def run(
     jobs: int | None = None,
     names: tuple[str, ...] = NAMES,
     hear: Callable[..., Any] = lambda name, step: None,
-) -> dict[str, Standing]:
+) -> dict[str, ResultStatus]:
     """Grade on a cluster, and return name -> standing; each name comes once."""
     here = ClusterScheduler(client, jobs, lambda line: None)
     here.prepare("auto")
@@ -84,10 +84,10 @@ def test_whoever_ends_workers_fails_alone(tmp_path: Path) -> None:
 
 def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path: Path) -> None:
     """What it was sent goes to another one, and so does all that follows."""
-    wrong = Answer(f"worker {TWO} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
+    wrong = JobResult(f"worker {TWO} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
     allowed = []
 
-    def answers(name: str, only: Sequence[str] | None) -> Answer:
+    def answers(name: str, only: Sequence[str] | None) -> JobResult:
         allowed.append((name, only))
         return wrong if name == "bob" and only is None else graded(name)
 
@@ -98,7 +98,7 @@ def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path: Path) -> None:
 
 def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path: Path) -> None:
     """As a failure of the machine, never as a mark."""
-    wrong = Answer(f"worker {ONE} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
+    wrong = JobResult(f"worker {ONE} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
     found = run(tmp_path, FakeClient(answers=lambda name, only: wrong, threads={ONE: 1}))
     assert {s.state for s in found.values()} == {State.FAILED}
     assert found["ada"].problem == f"worker {ONE} on lab: isolation: found none"
@@ -110,7 +110,7 @@ def test_what_the_cluster_loses_is_sent_again(tmp_path: Path, trouble: ImportErr
     """A few times; then it is a failure, and the others go on."""
     count = Counter()
 
-    def answers(name: str, only: None) -> Answer | ImportError | str:
+    def answers(name: str, only: None) -> JobResult | ImportError | str:
         count[name] += 1
         return trouble if name == "ada" or (name, count[name]) == ("bob", 1) else graded(name)
 
@@ -123,7 +123,7 @@ def test_submissions_of_workers_that_are_gone_go_elsewhere(tmp_path: Path) -> No
     """Also where they were bound to them, because others could not grade."""
     client = FakeClient(versions={TWO: "0.2.0"}, threads={ONE: 1, TWO: 1})
 
-    def answers(name: str, only: Sequence[str]) -> Answer | str:
+    def answers(name: str, only: Sequence[str]) -> JobResult | str:
         if only == [ONE] and name == "bob":
             client.threads = {TWO: 1, "tcp://10.0.0.3:1": 1}
             return "pending"
@@ -140,7 +140,7 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path: Path) -> None:
     """What was graded before is handed over."""
     client = FakeClient()
 
-    def answers(name: str, only: None) -> Answer:
+    def answers(name: str, only: None) -> JobResult:
         if name == "cleo":
             client.status = "connecting"
         return graded(name)
@@ -187,7 +187,7 @@ def test_steps_are_heard_while_a_submission_is_under_way(tmp_path: Path) -> None
     """And neither late nor from strangers."""
     client, heard = FakeClient(), []
 
-    def answers(name: str, only: None) -> Answer:
+    def answers(name: str, only: None) -> JobResult:
         for said in ({"name": name, "step": "alone"}, {"name": "nobody", "step": "x"}, "nonsense"):
             client.handler((0.0, said))
         return graded(name)

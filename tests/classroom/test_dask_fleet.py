@@ -8,17 +8,17 @@ from typing import Any
 import pytest
 from dask_samples import ONE, TWO, FakeClient
 
-from grader.classroom.cluster.worker_pool import Fleet
+from grader.classroom.cluster.worker_pool import WorkerPool
 from grader.classroom.messages import Fitness
 from grader.core.errors import EnvironmentFault, HarnessError
 
 WALLS = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 
 
-def fleet(client: FakeClient) -> tuple[Fleet, list[Any]]:
+def fleet(client: FakeClient) -> tuple[WorkerPool, list[Any]]:
     """Return the workers, and what is said of those that join later."""
     said = []
-    return Fleet(client, "0.1.0", said.append), said
+    return WorkerPool(client, "0.1.0", said.append), said
 
 
 @pytest.mark.parametrize(

@@ -12,17 +12,17 @@ from dask_samples import CONDITIONS, graded, task
 from grader.classroom.cluster.jobs import lay_out
 from grader.classroom.cluster.sending import errand_of, failed, taken_in, terms_of
 from grader.classroom.local import Attempt, Task
-from grader.classroom.messages import Answer, Errand, Terms, pack, read_collected, unpack, write_answer
+from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError
 from grader.submissions.submission import stage_collected, stage_submission
 
 
-def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Terms, Errand]:
+def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Terms, GradingJob]:
     """Return terms and submission as they come out at the other end."""
     errand = errand_of(one, wanted)
-    assert isinstance(errand, Errand), errand
-    return unpack(pack(terms_of(one)), Terms), unpack(pack(errand), Errand)
+    assert isinstance(errand, GradingJob), errand
+    return unpack(pack(terms_of(one)), Terms), unpack(pack(errand), GradingJob)
 
 
 def test_a_submission_is_the_same_on_the_other_machine(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_nothing_is_laid_out_elsewhere(tmp_path: Path, rubric: bytes, bag: bytes
     """A path that leads out is refused before it is written."""
     terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bag, ((part, b"x"),), standalone=False, deadline_s=1.0)
     with pytest.raises(HarnessError, match="expected paths that stay inside"):
-        lay_out(terms, Errand("a", b"a", b"a", b""), tmp_path)
+        lay_out(terms, GradingJob("a", b"a", b"a", b""), tmp_path)
 
 
 def test_a_recording_travels_with_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,7 +119,7 @@ def test_a_result_is_written_down(tmp_path: Path) -> None:
 )
 def test_a_machine_writes_nothing_but_a_result(tmp_path: Path, name: bytes) -> None:
     """Other files, and names that lead elsewhere, make the answer a failure; nothing of it is written."""
-    answer = Answer("worker", graded().standing, ((b"report.json", b"{}"), (name, b"x")))
+    answer = JobResult("worker", graded().standing, ((b"report.json", b"{}"), (name, b"x")))
     attempt = taken_in(task(tmp_path), answer)
     assert (attempt.standing.state, attempt.standing.score) == (State.FAILED, 0.0)
     assert "expected the files of a result" in attempt.standing.problem
@@ -133,7 +133,7 @@ def test_another_rubric_is_no_result(tmp_path: Path) -> None:
     assert "other rubrics" in attempt.standing.problem
 
 
-@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(Answer("w", b"[]"))])
+@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
 def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
     from grader.classroom.cluster.sending import answer_in

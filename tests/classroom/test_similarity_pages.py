@@ -12,7 +12,7 @@ import pytest
 from copies import handed
 
 from grader.similarity import pages
-from grader.similarity.library import Handed, Likeness, Pair, Program, Same, Side, Similar
+from grader.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
 from grader.similarity.pages import Line, lines_of, render_overview, render_pair, render_table, report_of
 
 EVIL = "<script>document.title='owned'</script>\u202e\x1b[31m=cmd|'/C calc'!A0\" onmouseover=\"alert(1)"
@@ -39,9 +39,9 @@ def similar(
     name: str = "ada", file: str = "velocity_publisher.py", text: str = "a = 1\nb = 2\n", count: int = 1
 ) -> Similar:
     """Return what was found in a class: so many pairs of the same two submissions."""
-    sides = [Handed(n, n, (Program(file, text, n),), (f"{n}: not text",), reported=True) for n in (name, "bob")]
+    sides = [Handed(n, n, (ComparedProgram(file, text, n),), (f"{n}: not text",), reported=True) for n in (name, "bob")]
     likeness = Likeness(Side(sides[0].programs[0], 0.999, (1,)), Side(sides[1].programs[0], 0.5, (2,)), 90)
-    same = (Same(file, tuple(sides)),)
+    same = (SameText(file, tuple(sides)),)
     given = ((sides[0], file),)
     found = (Pair(*sides, (likeness,)),) * count
     return Similar(sides, found, same, given, common_from=4, threshold=0.65, least_share=0.4, given_files=(file,))
@@ -87,7 +87,7 @@ def test_the_marked_lines_are_those_that_are_alike() -> None:
 def test_a_long_file_is_shown_around_what_is_alike() -> None:
     """The rest is counted."""
     text = "".join(f"x{k} = {k}\n" for k in range(1, 1001))
-    lines = lines_of(Side(Program("a.py", text, ""), 1.0, (500,)))
+    lines = lines_of(Side(ComparedProgram("a.py", text, ""), 1.0, (500,)))
     assert lines[0] == Line(0, "496 lines not shown")
     assert [line.number for line in lines if line.alike] == [500]
     assert [line.number for line in lines[1:-1]] == list(range(497, 504))
@@ -97,9 +97,9 @@ def test_a_long_file_is_shown_around_what_is_alike() -> None:
 def test_no_file_makes_a_huge_page() -> None:
     """However much of it is alike."""
     text = "x\n" * 30_000
-    lines = lines_of(Side(Program("a.py", text, ""), 1.0, tuple(range(1, 30_001))))
+    lines = lines_of(Side(ComparedProgram("a.py", text, ""), 1.0, tuple(range(1, 30_001))))
     assert len(lines) == pages.MOST_LINES + 1
-    assert len(lines_of(Side(Program("a.py", "y" * 60_000, ""), 1.0, (1,)))[0].text) < 500
+    assert len(lines_of(Side(ComparedProgram("a.py", "y" * 60_000, ""), 1.0, (1,)))[0].text) < 500
 
 
 def test_pairs_without_a_page_are_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from grader.core.limits import Limits
 from grader.core.trace import Trace
 from grader.execution.plan import Plan
-from grader.execution.recording_session import Studio
+from grader.execution.recording_session import RecordingSession
 from grader.execution.supervisor import Job
 
 MS = 1_000_000
@@ -69,7 +69,7 @@ def hostile(harm: str = "", later: str = "", before: str = "") -> str:
     )
 
 
-def staging(studio: Studio) -> Studio:
+def staging(studio: RecordingSession) -> RecordingSession:
     """Have a studio copy what is recorded into its own folder, because workers see no other."""
     each = studio.recorder.each
 
@@ -86,7 +86,9 @@ def staging(studio: Studio) -> Studio:
     return studio
 
 
-def record(studio: Studio, folder: Path, *programs: str, limits: Limits | None = None, **fields: object) -> Trace:
+def record(
+    studio: RecordingSession, folder: Path, *programs: str, limits: Limits | None = None, **fields: object
+) -> Trace:
     """Record programs together for ten seconds, on the virtual clock unless another is named."""
     folder.mkdir(exist_ok=True)
     folder.chmod(0o755)

@@ -30,7 +30,7 @@ from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapsh
 from grader.execution import discovery, machine, trace_recorder, virtual_time_suitability
 from grader.execution import virtual_runner as module
 from grader.execution.plan import PlannedRecording
-from grader.execution.virtual_runner import Conductor
+from grader.execution.virtual_runner import VirtualRunner
 from grader.student_host import clock as host_clock
 
 
@@ -49,7 +49,7 @@ class Run:
         names = ("a.py", "b.py", "c.py")
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(names, programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
-        self.trace = Conductor(plan(**fields), self.students, self.observer).run()
+        self.trace = VirtualRunner(plan(**fields), self.students, self.observer).run()
 
     def seen(self, *kinds):
         """Return observations in short, with their milliseconds, without the graph."""

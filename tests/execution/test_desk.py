@@ -14,9 +14,9 @@ from grader.core.trace import Mark, Request, Response
 from grader.execution.ending import is_free_exit, is_normal_stop
 from grader.execution.exchanges import Call, PlannedCalls, PlannedServer
 from grader.execution.service_ends import Arrived
-from grader.execution.service_peers import Desk
+from grader.execution.service_peers import ServicePeers
 from grader.execution.stimuli import Answer, Ask
-from grader.execution.trace_recorder import Tape
+from grader.execution.trace_recorder import TraceRecorder
 
 #: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
@@ -63,9 +63,9 @@ class Run:
     def __init__(self, *, nodes=("/node",), limits=None, **planned):
         self.ends = Ends()
         self.due = []
-        self.tape = Tape(limits or Limits())
+        self.tape = TraceRecorder(limits or Limits())
         made = plan(limits=limits or Limits(), **planned)
-        self.desk = Desk(made, self.ends, self.tape, nodes=lambda: nodes, later=self.due.append)
+        self.desk = ServicePeers(made, self.ends, self.tape, nodes=lambda: nodes, later=self.due.append)
 
     def ask(self, *headers, at_ns=0):
         """Let requests come that were sent in the order of their headers' numbers."""

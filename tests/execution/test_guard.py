@@ -12,7 +12,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S
 from grader.core.trace import ClockKind, Trace
 from grader.execution import resource_monitor as module
-from grader.execution.resource_monitor import Budget, Guard
+from grader.execution.resource_monitor import Budget, ResourceMonitor
 from grader.execution.usage import Usage
 
 TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
@@ -43,9 +43,9 @@ def machine(monkeypatch):
     return told
 
 
-def watch(student: Watched, **limits: int) -> Guard:
+def watch(student: Watched, **limits: int) -> ResourceMonitor:
     """Watch until a limit is reached."""
-    with Guard([student], Limits(**limits)) as guard:
+    with ResourceMonitor([student], Limits(**limits)) as guard:
         student.held.wait(30)
     return guard
 
@@ -72,7 +72,7 @@ def test_within_its_limits_nobody_is_ended(machine):
     """Exactly the limit is not beyond it; what was used is kept for others to see."""
     student = Watched()
     machine[student.process.pid] = Usage(200 * MIB, 6 * NS_PER_S, 20)
-    with Guard([student], Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
+    with ResourceMonitor([student], Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
         while not student.most_threads:
             os.sched_yield()
     assert not student.stopped
@@ -82,7 +82,7 @@ def test_within_its_limits_nobody_is_ended(machine):
 def test_messages_that_fill_the_worker_end_the_nodes(machine):
     """The grader's own memory is not the student's to fill."""
     students = [Watched(4_000_000), Watched(4_000_001)]
-    with Guard(students, Limits()):
+    with ResourceMonitor(students, Limits()):
         machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
         for student in students:
             student.held.wait(30)
@@ -107,7 +107,7 @@ def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waite
 def test_a_budget_that_is_used_up_ends_the_nodes(machine):
     """Before their own real time is over, and with the words of the budget."""
     student = Watched()
-    with Guard([student], Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
+    with ResourceMonitor([student], Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
         student.held.wait(30)
     assert (student.stopped, guard.reviewed(TRACE)) == ("stopped: enough", TRACE)
 
@@ -115,7 +115,7 @@ def test_a_budget_that_is_used_up_ends_the_nodes(machine):
 def test_the_workers_own_processor_time_is_limited(machine, monkeypatch):
     """It goes to what the nodes send."""
     student = Watched()
-    with Guard([student], Limits(processor_ns=NS_PER_S)):
+    with ResourceMonitor([student], Limits(processor_ns=NS_PER_S)):
         monkeypatch.setattr(module.time, "process_time_ns", lambda: 10_000 * NS_PER_S)
         student.held.wait(30)
     assert student.stopped == "stopped at 1 s of processor time to take what was sent"
@@ -124,6 +124,6 @@ def test_the_workers_own_processor_time_is_limited(machine, monkeypatch):
 def test_the_guard_ends_with_its_block(machine):
     """No thread stays."""
     before = threading.active_count()
-    with Guard([Watched()], Limits()):
+    with ResourceMonitor([Watched()], Limits()):
         assert threading.active_count() == before + 1
     assert threading.active_count() == before

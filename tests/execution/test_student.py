@@ -17,7 +17,7 @@ from grader.core.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.execution import student_process as module
 from grader.execution.notes import Places
 from grader.execution.sandbox.protocol import Command
-from grader.execution.student_process import Student
+from grader.execution.student_process import NodeProcess
 
 ROOT = "/submission"
 TOKEN = "0123456789abcdef" * 2
@@ -33,9 +33,9 @@ class OneFile(Places):
         return 100 if file == "pkg/a.py" else 0
 
 
-def silent() -> Student:
+def silent() -> NodeProcess:
     """Return a student whose output a test makes up."""
-    return Student("a.py", ROOT, None, None, log_token=TOKEN, file="pkg/a.py", places=OneFile())
+    return NodeProcess("a.py", ROOT, None, None, log_token=TOKEN, file="pkg/a.py", places=OneFile())
 
 
 def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> list:
@@ -147,7 +147,7 @@ def test_what_only_looks_like_a_record_is_a_line(hostile, texts):
 
 def test_without_a_token_there_are_no_records():
     """A process that never said which one it has writes lines."""
-    student = Student("a.py", ROOT, None, None)
+    student = NodeProcess("a.py", ROOT, None, None)
     student._streams["stderr"] += record(token="")
     assert [type(o) for o in student.output(7, final=True)] == [OutputLine]
 
@@ -291,10 +291,10 @@ def start():
     """Start a process that talks as a test says, and end it afterwards."""
     started = []
 
-    def start_one(code: str) -> Student:
+    def start_one(code: str) -> NodeProcess:
         ours, theirs = socket.socketpair()
         argv = (sys.executable, "-I", "-S", "-u", "-c", BEGIN + code, str(theirs.fileno()))
-        student = Student.start("a.py", ROOT, Command(argv, dict(os.environ), (theirs.fileno(),)), ours, Limits())
+        student = NodeProcess.start("a.py", ROOT, Command(argv, dict(os.environ), (theirs.fileno(),)), ours, Limits())
         theirs.close()
         started.append(student)
         return student

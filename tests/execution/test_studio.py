@@ -6,7 +6,7 @@ import pytest
 
 from grader.core.trace import ClockKind, Trace
 from grader.execution.plan import Plan
-from grader.execution.recording_session import AUTO, VIRTUAL, WALL, Studio
+from grader.execution.recording_session import AUTO, VIRTUAL, WALL, RecordingSession
 from grader.execution.supervisor import Job
 
 
@@ -36,7 +36,7 @@ def job(scenario):
 def recorded(recorder, clock, *scenarios):
     """Return what was heard, in order, and the traces at the end."""
     heard = []
-    studio = Studio(*(None,) * (len(Studio.__slots__) - 2), recorder, Path("nowhere"))
+    studio = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
     jobs = {name: job(name) for name in scenarios}
     traces = studio.record(jobs, clock, lambda step: None, lambda key, trace: heard.append((key, trace)))
     return heard, traces
@@ -90,7 +90,7 @@ def test_all_recordings_of_a_submission_share_one_budget():
             budgets.extend(job.budget for job in jobs)
             yield from super().each(jobs, progress)
 
-    studio = Studio(*(None,) * (len(Studio.__slots__) - 2), Listening("a"), Path("nowhere"))
+    studio = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), Listening("a"), Path("nowhere"))
     for budget_s in (20, 30):
         studio.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
     first, second = budgets[:3], budgets[3:]

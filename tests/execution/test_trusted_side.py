@@ -19,7 +19,7 @@ from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.trace import FaultKind
 from grader.execution.plan import PlannedNumbers
-from grader.execution.recording_session import open_studio
+from grader.execution.recording_session import open_session
 from grader.execution.usage import usage
 
 pytestmark = pytest.mark.ros
@@ -402,7 +402,7 @@ def ancestors(pid: int) -> list[int]:
 def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
     """Its scenario is recorded again by another worker; what a killed one had is gone with it."""
     tmp_path.chmod(0o755)
-    with open_studio("auto") as opened:
+    with open_session("auto") as opened:
         studio = staging(opened)
         killed = threading.Event()
 
@@ -424,7 +424,7 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
 def test_a_worker_that_is_always_killed_decides_nothing(tmp_path):
     """No trace, no marks: a problem of ours."""
     tmp_path.chmod(0o755)
-    with open_studio("auto") as opened:
+    with open_session("auto") as opened:
         studio = staging(opened)
         done = threading.Event()
 

@@ -12,7 +12,7 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, FaultKind
 from grader.execution import wall_runner as module
 from grader.execution.plan import PlannedRecording
-from grader.execution.wall_runner import WallConductor
+from grader.execution.wall_runner import WallRunner
 
 SILENT = {"kind": "silent"}
 
@@ -46,7 +46,7 @@ class Run:
         self.world = World()
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(("a.py", "b.py"), programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
-        self.trace = WallConductor(plan(clock="wall", **fields), self.students, self.observer).run()
+        self.trace = WallRunner(plan(clock="wall", **fields), self.students, self.observer).run()
 
 
 def publisher(topic, *, every_ms, first_ms=0, interface=FLOAT):

@@ -13,19 +13,19 @@ import pytest
 
 import grader.mutation
 from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, Result, Standing, Trial, one_line_change
+from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial, one_line_change
 from grader.mutation.showing import render_results, results_to_json
 
 MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
 SCHEMA = json.loads((Path(grader.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
 
 
-def standing(rate: Outcome = MET, speed: Outcome = MET) -> Standing:
+def standing(rate: Outcome = MET, speed: Outcome = MET) -> ResultRank:
     """Return what a program is worth under two criteria."""
     outcomes = {"rate": rate, "speed": speed}
     reasons = {id_: f"{id_} is {outcome.value}" for id_, outcome in outcomes.items() if outcome is not MET}
     points = {MET: 2, PARTLY: 1, NOT_MET: 0, BLOCKED: 0, UNDECIDED: 0}
-    return Standing(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
+    return ResultRank(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
 
 
 def trial(number: int, **attributes: Any) -> Trial:
@@ -34,7 +34,7 @@ def trial(number: int, **attributes: Any) -> Trial:
     return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", standing(**outcomes), **attributes)
 
 
-def result(*mutants: Trial, **attributes: Any) -> Result:
+def result(*mutants: Trial, **attributes: Any) -> SelftestResult:
     """Return what came of a rubric whose every criterion was turned once."""
     always = (trial(1, rate=NOT_MET), trial(2, speed=PARTLY))
     given: dict[str, Any] = {
@@ -43,7 +43,7 @@ def result(*mutants: Trial, **attributes: Any) -> Result:
         "variants": (),
         **attributes,
     }
-    return Result(
+    return SelftestResult(
         "r.yaml", "fan", ("rate", "speed"), given.pop("reference", standing()), mutants=(*always, *mutants), **given
     )
 
@@ -79,7 +79,7 @@ def test_a_rubric_without_a_known_hole_passes() -> None:
     ],
     ids=["survivor", "reference", "template", "variant", "never turned"],
 )
-def test_a_hole_is_a_hole(holed: Result) -> None:
+def test_a_hole_is_a_hole(holed: SelftestResult) -> None:
     """A survivor, a reference or a variant that loses points, another baseline, a criterion that never turned."""
     assert not holed.passed
 
@@ -126,7 +126,7 @@ def test_a_change_fits_on_one_line(before: str, after: str, change: str) -> None
     assert one_line_change(before, after) == change
 
 
-def everything() -> Result:
+def everything() -> SelftestResult:
     """Return a result with something of every kind, and hostile text."""
     hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", standing())
     return result(

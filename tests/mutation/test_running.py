@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from grader.cli.main import app
 from grader.core.errors import RubricError
-from grader.mutation.running import Candidate, Options, _sampled, _sources, selftest
+from grader.mutation.running import Candidate, SelftestOptions, _sampled, _sources, selftest
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.submissions.submission import stage_submission
@@ -49,7 +49,7 @@ def test_a_rubric_without_a_reference_is_refused(tmp_path: Path) -> None:
     rubric = tmp_path / "mine.yaml"
     rubric.write_bytes(builtin_rubrics()["velocity_publisher"].read_bytes())
     with pytest.raises(RubricError, match="expected a reference solution") as error:
-        next(selftest([rubric], Options(), lambda step: None))
+        next(selftest([rubric], SelftestOptions(), lambda step: None))
     assert "mine.selftest.yaml" in error.value.hint
 
 

@@ -16,7 +16,7 @@ from urllib.parse import unquote
 import class_reports
 import pytest
 
-from grader.reporting.class_page.contents import ClassPage, Entry, Listing, PageLink, RunFacts, Student
+from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RunFacts, StudentRow
 from grader.reporting.class_page.counts import distribution, exercise_counts
 from grader.reporting.class_page.render import class_assets, page_link, render_class, result_link
 from grader.reporting.json_report import report_to_json
@@ -75,20 +75,20 @@ class Parsed(HTMLParser):
         return [value for tag, name, value in self.attributes if (tag, name) == ("a", "href")]
 
 
-def student(number: int = 1, name: str = "Ada", **changes: Any) -> Student:
+def student(number: int = 1, name: str = "Ada", **changes: Any) -> StudentRow:
     """Return a student with a drawn report."""
     report = report_to_json(class_reports.drawn_report(number, name))
     score, most = (Fraction(str(report[key])) for key in ("score", "max_score"))
-    given = Student(folder=f"s{number}", name=name, raw=score, max_score=most, final=score, report=report)
+    given = StudentRow(folder=f"s{number}", name=name, raw=score, max_score=most, final=score, report=report)
     return replace(given, **changes)
 
 
-def page(*students: Student, **changes: Any) -> ClassPage:
+def page(*students: StudentRow, **changes: Any) -> ClassPage:
     """Return the page of a class."""
     return replace(ClassPage("homework", RunFacts("took 1:00"), students), **changes)
 
 
-def parsed(*students: Student, **changes: Any) -> tuple[Parsed, dict[str, Any]]:
+def parsed(*students: StudentRow, **changes: Any) -> tuple[Parsed, dict[str, Any]]:
     """Return the page as a parser reads it, and the data in it."""
     found = Parsed(render_class(page(*students, **changes)))
     assert found.open == []
@@ -174,7 +174,7 @@ def test_scores_that_are_not_final_are_no_scores() -> None:
 
 def test_a_class_without_reports_has_a_page() -> None:
     """Also one of nobody at all."""
-    for students in ((), (Student("", "Zoë", status="nothing handed in"),)):
+    for students in ((), (StudentRow("", "Zoë", status="nothing handed in"),)):
         found, data = parsed(*students)
         assert data["causes"] == []
         assert "There are no scores yet." in "".join(found.texts)
@@ -189,15 +189,15 @@ def test_hostile_text_stays_text(text: str) -> None:
         exercise["title"] = text
         for criterion in exercise["criteria"]:
             criterion |= {"title": text, "reason": text, "hint": text, "outcome": "not_met", "score": 0}
-    plain = parsed(student(), listings=(Listing("l", "List", "about", (Entry("x", 0),)),), links=(PageLink("t", "p"),))[
-        0
-    ]
+    plain = parsed(
+        student(), listings=(Listing("l", "List", "about", (PageEntry("x", 0),)),), links=(PageLink("t", "p"),)
+    )[0]
     bad = student(report=report, name=text, also=(text,), adjustments=(text,), remarks=(text,), folder=f"f{text[:50]}")
     found, data = parsed(
         bad,
         title=text,
         run=RunFacts(text, ((text, text),), (text,)),
-        listings=(Listing("l", "List", text, (Entry(text, 0, text),)),),
+        listings=(Listing("l", "List", text, (PageEntry(text, 0, text),)),),
         links=(PageLink(text, f"similarity/{text}", text),),
     )
     assert found.tags["script"] == plain.tags["script"]

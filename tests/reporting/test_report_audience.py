@@ -14,10 +14,10 @@ from grader.core.exercise import Audience, Feedback, Location, Outcome, Shows
 from grader.core.report import Report, ReportedFault, Reproduction
 from grader.core.trace import ClockKind, GraphSnapshot
 from grader.reporting.audience import Readers, for_student, told, withholds
-from grader.reporting.formats import FORMATS, Layout, rendered
+from grader.reporting.formats import FORMATS, PageLayout, rendered
 from grader.reporting.surroundings import COMMIT_DATETIME, VARIABLES
 
-LAYOUT = Layout(width=100, colour=False)
+LAYOUT = PageLayout(width=100, colour=False)
 BEFORE, AFTER = "2026-12-01", "2026-12-02"
 STUDENT, INSTRUCTOR = Readers(Audience.STUDENT, BEFORE), Readers(Audience.INSTRUCTOR, BEFORE)
 #: Stands in every text of a report that some criterion keeps from students; 7357 is what a number may be known by.

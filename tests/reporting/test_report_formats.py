@@ -15,7 +15,7 @@ import pytest
 from report_samples import HANDED_IN, SAMPLES, hostile, middling, partial, perfect, undecided
 
 from grader.core.report import Report
-from grader.reporting.formats import FORMATS, Layout
+from grader.reporting.formats import FORMATS, PageLayout
 from grader.reporting.html.render import render_html
 from grader.reporting.json_report import dumps
 from grader.reporting.junit import render_junit
@@ -114,4 +114,4 @@ def test_the_table_of_formats_names_the_right_renderer(name: str, monkeypatch: p
         "classroom": render_classroom,
         "html": render_html,
     }.get(name, RENDERERS[name])
-    assert FORMATS[name](sample, Layout(100, colour=False)) == expected(sample)
+    assert FORMATS[name](sample, PageLayout(100, colour=False)) == expected(sample)

@@ -20,7 +20,7 @@ from distributed import Client, Future, KilledWorker, Security
 import grader
 from grader.classroom.cluster import jobs as remote
 from grader.classroom.cluster.sending import answer_in, errand_of, failed, files_wanted, taken_in, terms_of
-from grader.classroom.cluster.worker_pool import Fleet, lost
+from grader.classroom.cluster.worker_pool import WorkerPool, lost
 from grader.classroom.local import Attempt, Hear, MakeScheduler, Task
 from grader.classroom.messages import Terms, pack
 from grader.core.errors import EnvironmentFault, HarnessError
@@ -52,7 +52,7 @@ class _Sending:
     parcels: list[object] = field(default_factory=list)
 
 
-class Desk:
+class Dispatcher:
     """Grades one batch.
 
     Args:
@@ -65,7 +65,7 @@ class Desk:
     """
 
     def __init__(  # noqa: PLR0913  each is needed for as long as the batch runs
-        self, client: Client, fleet: Fleet, jobs: int | None, terms: Terms, hear: Hear, topic: str
+        self, client: Client, fleet: WorkerPool, jobs: int | None, terms: Terms, hear: Hear, topic: str
     ) -> None:
         self._client = client
         self._fleet = fleet
@@ -236,7 +236,7 @@ class ClusterScheduler:
     def __init__(self, client: Client, jobs: int | None, warn: Callable[[str], None]) -> None:
         self._client = client
         self._jobs = jobs
-        self._fleet = Fleet(client, grader.__version__, warn)
+        self._fleet = WorkerPool(client, grader.__version__, warn)
 
     def prepare(self, isolation: str) -> Sequence[str]:
         """Ask every worker whether it can grade; see `Scheduler`."""
@@ -246,7 +246,9 @@ class ClusterScheduler:
         """Yield what comes of each task; see `Scheduler`."""
         if not tasks:
             return
-        desk = Desk(self._client, self._fleet, self._jobs, terms_of(tasks[0]), hear, f"grade-{secrets.token_hex(8)}")
+        desk = Dispatcher(
+            self._client, self._fleet, self._jobs, terms_of(tasks[0]), hear, f"grade-{secrets.token_hex(8)}"
+        )
         try:
             yield from desk.serve(tasks)
         finally:

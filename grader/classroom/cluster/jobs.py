@@ -17,12 +17,22 @@ from distributed import Worker, get_worker
 import grader
 from grader.classroom import store as kept
 from grader.classroom.local import Attempt, LocalScheduler, Task
-from grader.classroom.messages import MAX_ANSWER_BYTES, Answer, Errand, Files, Fitness, Terms, files_below, pack, unpack
-from grader.classroom.store import Standing, State
+from grader.classroom.messages import (
+    MAX_ANSWER_BYTES,
+    Files,
+    Fitness,
+    GradingJob,
+    JobResult,
+    Terms,
+    files_below,
+    pack,
+    unpack,
+)
+from grader.classroom.store import ResultStatus, State
 from grader.core.checkup import NO_WALLS, missing
 from grader.core.errors import EnvironmentFault, GraderError, HarnessError
 from grader.execution.ros_installation import find_ros
-from grader.execution.sandbox.choose import Choice, choose_isolation
+from grader.execution.sandbox.choose import TierChoice, choose_isolation
 from grader.execution.temp_dirs import scratch_folder
 
 _AGAIN = "run the same command again"
@@ -46,7 +56,7 @@ def fitness(isolation: str, machine: str) -> Fitness:
     return Fitness(machine, remarks=tuple(remarks))
 
 
-def fulfil(terms: Terms, errand: Errand, machine: str, hear: Callable[[str], None]) -> Answer:
+def fulfil(terms: Terms, errand: GradingJob, machine: str, hear: Callable[[str], None]) -> JobResult:
     """Grade a submission, in a process of its own and by this machine's own choice of sandbox.
 
     Args:
@@ -58,7 +68,7 @@ def fulfil(terms: Terms, errand: Errand, machine: str, hear: Callable[[str], Non
     try:
         choice = choose_isolation(terms.conditions.isolation, find_ros())
     except EnvironmentFault as fault:
-        return Answer(machine, unfit=fault.message, hint=fault.hint)
+        return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:
         with _alone() if _one_at_a_time(choice) else nullcontext(), scratch_folder() as scratch:
             return _graded(terms, errand, scratch, machine, hear)
@@ -68,7 +78,7 @@ def fulfil(terms: Terms, errand: Errand, machine: str, hear: Callable[[str], Non
         return failure(machine, f"the submission cannot be laid out or read back: {error.strerror}")
 
 
-def _graded(terms: Terms, errand: Errand, scratch: Path, machine: str, hear: Callable[[str], None]) -> Answer:
+def _graded(terms: Terms, errand: GradingJob, scratch: Path, machine: str, hear: Callable[[str], None]) -> JobResult:
     task = lay_out(terms, errand, scratch)
     here = LocalScheduler(1, folder=_start(terms, scratch))
     with closing(here.run([task], lambda _, step: hear(step))) as attempts:
@@ -76,10 +86,10 @@ def _graded(terms: Terms, errand: Errand, scratch: Path, machine: str, hear: Cal
     files = files_below(task.into) if task.into.is_dir() else ()
     if sum(len(content) for _, content in files) > MAX_ANSWER_BYTES:
         return failure(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")
-    return Answer(machine, kept.dump(_placed(attempt, machine)), files)
+    return JobResult(machine, kept.dump(_placed(attempt, machine)), files)
 
 
-def _placed(attempt: Attempt, machine: str) -> Standing:
+def _placed(attempt: Attempt, machine: str) -> ResultStatus:
     """Return how a submission stands; of a failure, with the machine that it happened on."""
     standing = attempt.standing
     if standing.state is not State.FAILED:
@@ -87,12 +97,12 @@ def _placed(attempt: Attempt, machine: str) -> Standing:
     return replace(standing, problem=f"{machine}: {standing.problem}")
 
 
-def failure(machine: str, problem: str, hint: str = _AGAIN) -> Answer:
+def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
     """Return the answer that this machine failed, which is never a mark."""
-    return Answer(machine, kept.dump(Standing(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
+    return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
 
-def lay_out(terms: Terms, errand: Errand, scratch: Path) -> Task:
+def lay_out(terms: Terms, errand: GradingJob, scratch: Path) -> Task:
     """Write what was sent into an empty folder, and return the task to grade it.
 
     Files get the relative paths that they have where the class is graded, so that reports call them the same.
@@ -141,7 +151,7 @@ def _write(start: Path, name: str, content: bytes, scratch: Path) -> None:
     path.write_bytes(content)
 
 
-def _one_at_a_time(choice: Choice) -> bool:
+def _one_at_a_time(choice: TierChoice) -> bool:
     return choice.isolation.shares_network and choice.isolation.name != NO_WALLS
 
 
@@ -189,7 +199,7 @@ def grade(version: str, terms: bytes, errand: bytes, topic: str) -> bytes:
     worker = get_worker()
     machine = _machine(worker)
     if version != grader.__version__:
-        return pack(Answer(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
+        return pack(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
     key = worker.get_current_task()
 
     def hear(step: str) -> None:
@@ -199,12 +209,12 @@ def grade(version: str, terms: bytes, errand: bytes, topic: str) -> bytes:
         worker.log_event(topic, {NAME: what.name, STEP: step})
 
     try:
-        what = unpack(errand, Errand)
+        what = unpack(errand, GradingJob)
         return pack(fulfil(unpack(terms, Terms), what, machine, hear))
     except _UnwantedError:
         return b""
     except HarnessError as error:
-        return pack(Answer(machine, unfit=error.message, hint=error.hint))
+        return pack(JobResult(machine, unfit=error.message, hint=error.hint))
     except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
         return pack(failure(machine, f"the grader failed: {type(error).__name__}: {error}"))
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.app.grade import read_exercises, wanted_files
-from grader.app.request import Request
+from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
 from grader.classroom.messages import (
-    Answer,
-    Errand,
     Files,
+    GradingJob,
+    JobResult,
     Terms,
     files_below,
     pack_collected,
@@ -24,7 +24,7 @@ from grader.classroom.messages import (
     unpack,
     write_answer,
 )
-from grader.classroom.store import Standing, State
+from grader.classroom.store import ResultStatus, State
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.rubrics.loader import own_check_files
@@ -58,11 +58,11 @@ def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
 
 def files_wanted(task: Task) -> Sequence[str]:
     """Return the names of the files that a class is asked for, of which this is one submission."""
-    asked = Request("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
+    asked = GradeRequest("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
     return wanted_files(read_exercises(asked))
 
 
-def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
+def errand_of(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
     """Return a submission as it travels, or at once what comes of it if it cannot be used.
 
     Args:
@@ -75,10 +75,10 @@ def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
     except SubmissionError as error:
         digest = unusable_digest(error)
         key = task.conditions.key(digest)
-        return Attempt(task, Standing(State.REFUSED, key, digest, task.label, error.message, error.hint))
+        return Attempt(task, ResultStatus(State.REFUSED, key, digest, task.label, error.message, error.hint))
     except (OSError, MemoryError, RecursionError) as error:
         return failed(task, f"the submission cannot be read: {type(error).__name__}")
-    return Errand(
+    return GradingJob(
         task.name,
         os.fsencode(task.label),
         travelling_name(task.submission),
@@ -88,7 +88,7 @@ def errand_of(task: Task, wanted: Sequence[str]) -> Errand | Attempt:
     )
 
 
-def taken_in(task: Task, answer: Answer) -> Attempt:
+def taken_in(task: Task, answer: JobResult) -> Attempt:
     """Write down what a machine answers, in the folder that the task names."""
     standing = kept.load(answer.standing)
     if standing is None:
@@ -107,19 +107,19 @@ def taken_in(task: Task, answer: Answer) -> Attempt:
     return Attempt(task, replace(standing, label=task.label))
 
 
-def answer_in(data: object, machine: str) -> Answer:
+def answer_in(data: object, machine: str) -> JobResult:
     """Return the answer that a cluster hands over; one that is none says so itself."""
     try:
         if isinstance(data, bytes):
-            return unpack(data, Answer)
+            return unpack(data, JobResult)
     except HarnessError:
         pass
-    return Answer(machine)
+    return JobResult(machine)
 
 
 def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
     """Return that grading failed through no fault of the student."""
-    return Attempt(task, Standing(State.FAILED, "", "", task.label, problem, hint))
+    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))
 
 
 def _content(path: Path) -> bytes:

@@ -15,7 +15,7 @@ from grader.core.errors import EnvironmentFault, HarnessError
 PACKAGE = "rclpy-grader"
 
 
-class Fleet:
+class WorkerPool:
     """Knows which workers can grade; each is asked once, when it is seen first.
 
     Args:

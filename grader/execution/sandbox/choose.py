@@ -21,7 +21,7 @@ MOST_CHARACTERS = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class TierChoice:
     """The tier to record in.
 
     Attributes:
@@ -37,7 +37,7 @@ def _silent(step: str) -> None:
     """Take no note of a step."""
 
 
-def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> Choice:
+def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
     """Return the isolation to record in.
 
     Args:
@@ -50,14 +50,14 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
         EnvironmentFault: The tier asked for does not exist or does not hold here, or none does, with what mends it.
     """
     if wanted == NO_WALLS:
-        return Choice(isolation_from_name(wanted))
+        return TierChoice(isolation_from_name(wanted))
     if wanted != AUTO:
         return _named(wanted, ros, progress)
     tried: list[TierReport] = []
     for name in WALLED:
         tried.append(inspect_tier(name, ros, progress))
         if tried[-1].usable:
-            return Choice(isolation_from_name(name), tried[-1].properties)
+            return TierChoice(isolation_from_name(name), tried[-1].properties)
     raise _refusal(tried)
 
 
@@ -112,12 +112,12 @@ def inspect_tier(
     return report
 
 
-def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -> Choice:
+def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -> TierChoice:
     isolation = isolation_from_name(wanted)
     report = inspect_tier(wanted, ros, progress)
     if not _kept(report):
         raise EnvironmentFault(f"isolation {wanted}: expected a sandbox that holds, found: {report.why}", report.remedy)
-    return Choice(isolation, report.properties)
+    return TierChoice(isolation, report.properties)
 
 
 def _kept(report: TierReport) -> bool:

@@ -11,8 +11,8 @@ from libcst import matchers as m
 from grader.mutation.operators.program import (
     CREATORS,
     LEVELS,
-    Change,
     Edit,
+    Mutation,
     Program,
     argument,
     called,
@@ -58,87 +58,87 @@ def alone(program: Program, node: cst.CSTNode) -> bool:
 _REPEATED = ("publish", "call_async", "call", *LEVELS)
 
 
-def missing_call(program: Program) -> Iterator[Change]:
+def missing_call(program: Program) -> Iterator[Mutation]:
     """A call that is forgotten: publish, spin, init, super().__init__, create_timer, a log."""
     for node in program.all(cst.Expr):
         if isinstance(node.value, cst.Call) and alone(program, node):
-            yield Change(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
 
 
-def missing_assignment(program: Program) -> Iterator[Change]:
+def missing_assignment(program: Program) -> Iterator[Mutation]:
     """A value that is never set, a counter that never counts, a publisher that is never made."""
     for node in [*program.all(cst.Assign), *program.all(cst.AugAssign), *program.all(cst.AnnAssign)]:
         if alone(program, node) and not (isinstance(node, cst.AnnAssign) and node.value is None):
-            yield Change(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
 
 
-def missing_import(program: Program) -> Iterator[Change]:
+def missing_import(program: Program) -> Iterator[Mutation]:
     """An import that is forgotten."""
     for node in [*program.all(cst.Import), *program.all(cst.ImportFrom)]:
         if alone(program, node):
-            yield Change(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
 
 
-def missing_return(program: Program) -> Iterator[Change]:
+def missing_return(program: Program) -> Iterator[Mutation]:
     """A callback that does not return its response, a function that returns nothing."""
     for node in program.all(cst.Return):
         if node.value is not None:
-            yield Change(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
 
 
-def missing_early_return(program: Program) -> Iterator[Change]:
+def missing_early_return(program: Program) -> Iterator[Mutation]:
     """A `return`, `break` or `continue` that is forgotten: the function goes on."""
     bare = [node for node in program.all(cst.Return) if node.value is None]
     for node in [*bare, *program.all(cst.Break), *program.all(cst.Continue)]:
-        yield Change(node, f"no {program.code(node)}", ((node, cst.Pass()),))
+        yield Mutation(node, f"no {program.code(node)}", ((node, cst.Pass()),))
 
 
-def missing_parameter(program: Program) -> Iterator[Change]:
+def missing_parameter(program: Program) -> Iterator[Mutation]:
     """A callback that does not take what it is given."""
     for function in program.callbacks:
         params = function.params.params
         if params:
             kept = function.params.with_changes(params=_without_comma(params[:-1]))
             detail = f"{function.name.value} without {params[-1].name.value}"
-            yield Change(function, detail, ((function.params, kept),))
+            yield Mutation(function, detail, ((function.params, kept),))
 
 
-def callback_called(program: Program) -> Iterator[Change]:
+def callback_called(program: Program) -> Iterator[Mutation]:
     """A callback that is called where it should be named: `self.tick()` for `self.tick`."""
     for call in program.calls(*CREATORS):
         arg = argument(call, "callback")
         if arg is not None and not isinstance(arg.value, (cst.Lambda, cst.Call)):
             after = cst.Call(arg.value)
-            yield Change(call, into(program.code(arg.value), program.code(after)), ((arg.value, after),))
+            yield Mutation(call, into(program.code(arg.value), program.code(after)), ((arg.value, after),))
 
 
-def timer_once(program: Program) -> Iterator[Change]:
+def timer_once(program: Program) -> Iterator[Mutation]:
     """A callback that is called once instead of by a timer."""
     for node in program.all(cst.Call):
         callback = argument(node, "callback") if called(node) == "create_timer" else None
         if callback is not None and isinstance(callback.value, (cst.Name, cst.Attribute)):
             after = cst.Call(callback.value)
-            yield Change(node, into(program.code(node), program.code(after)), ((node, after),))
+            yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
 
 
-def spins_once(program: Program) -> Iterator[Change]:
+def spins_once(program: Program) -> Iterator[Mutation]:
     """A node that spins once, not until the end."""
     for call in program.calls("spin"):
         if isinstance(call.func, cst.Attribute):
-            yield Change(call, "spin -> spin_once", ((call.func.attr, cst.Name("spin_once")),))
+            yield Mutation(call, "spin -> spin_once", ((call.func.attr, cst.Name("spin_once")),))
 
 
-def repeated_call(program: Program) -> Iterator[Change]:
+def repeated_call(program: Program) -> Iterator[Mutation]:
     """A message, request or log that is sent twice."""
     for line in program.all(cst.SimpleStatementLine):
         if m.matches(line, m.SimpleStatementLine(body=[m.Expr(m.Call())])):
             call = program.all(cst.Call, line)[0]
             if called(call) in _REPEATED:
                 twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
-                yield Change(line, f"twice {short(program.code(call))}", ((line, twice),))
+                yield Mutation(line, f"twice {short(program.code(call))}", ((line, twice),))
 
 
-def repeated_entity(program: Program) -> Iterator[Change]:
+def repeated_entity(program: Program) -> Iterator[Mutation]:
     """A second timer or subscription beside the first, with the same callback."""
     for line in program.all(cst.SimpleStatementLine):
         calls = [
@@ -146,17 +146,17 @@ def repeated_entity(program: Program) -> Iterator[Change]:
         ]
         if calls:
             twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
-            yield Change(line, f"two of {short(program.code(calls[0]))}", ((line, twice),))
+            yield Mutation(line, f"two of {short(program.code(calls[0]))}", ((line, twice),))
 
 
-def wrong_order(program: Program) -> Iterator[Change]:
+def wrong_order(program: Program) -> Iterator[Mutation]:
     """Two neighbouring lines in the wrong order: used before it is made, sent before it is filled."""
     for block in program.all(cst.IndentedBlock):
         for one, other in zip(block.body, block.body[1:], strict=False):
             if isinstance(one, cst.SimpleStatementLine) and _leads_to(program, one, other):
                 edits = ((one, other), (other, one))
                 texts = (short(program.code(line).strip(), 30) for line in (one, other))
-                yield Change(one, " after ".join(texts), edits)
+                yield Mutation(one, " after ".join(texts), edits)
 
 
 def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode) -> bool:
@@ -180,59 +180,59 @@ _COUNT = "{owner}.calls_so_far = getattr({owner}, 'calls_so_far', 0) + 1"
 LATER = 10
 
 
-def exits_later(program: Program) -> Iterator[Change]:
+def exits_later(program: Program) -> Iterator[Mutation]:
     """A program that ends after a while."""
     for function in program.callbacks:
         yield _after(function, LATER, "raise SystemExit", "exits")
 
 
-def crashes_on_third(program: Program) -> Iterator[Change]:
+def crashes_on_third(program: Program) -> Iterator[Mutation]:
     """An error that comes with the third call of a callback."""
     for function in program.callbacks:
         yield _after(function, 2, "raise RuntimeError('the third time')", "raises")
 
 
-def stops_later(program: Program) -> Iterator[Change]:
+def stops_later(program: Program) -> Iterator[Mutation]:
     """A callback that does nothing any more after a while."""
     for function in program.callbacks:
         yield _after(function, LATER, "return", "does nothing")
 
 
-def frozen_value(program: Program) -> Iterator[Change]:
+def frozen_value(program: Program) -> Iterator[Mutation]:
     """A value or message that is made once and used for ever."""
     for function in program.callbacks:
         for assign in program.all(cst.Assign, function):
             target, value = assign.targets[0].target, assign.value
             own = isinstance(target, (cst.Name, cst.Attribute)) and alone(program, assign)
             if own and not isinstance(value, (cst.Integer, cst.Float, cst.SimpleString)):
-                yield Change(assign, f"once {short(program.code(assign))}", _kept(program, function, value))
+                yield Mutation(assign, f"once {short(program.code(assign))}", _kept(program, function, value))
         for call in program.all(cst.Call, function):
             if called(call) == "publish" and call.args and isinstance(call.args[0].value, cst.Call):
                 value = call.args[0].value
-                yield Change(call, f"once {short(program.code(value))}", _kept(program, function, value))
+                yield Mutation(call, f"once {short(program.code(value))}", _kept(program, function, value))
 
 
-def first_message_only(program: Program) -> Iterator[Change]:
+def first_message_only(program: Program) -> Iterator[Mutation]:
     """A message received that is kept for ever: only the first one counts."""
     for function in program.handed_to("create_subscription"):
         parameter = function.params.params[-1].name.value if function.params.params else ""
         if parameter and parameter != "self":
             place = f"{owner(function)}.first_heard"
             text = f"{place} = {parameter} = getattr({owner(function)}, 'first_heard', {parameter})"
-            yield Change(function, f"{function.name.value} keeps the first {parameter}", at_top(function, text))
+            yield Mutation(function, f"{function.name.value} keeps the first {parameter}", at_top(function, text))
 
 
-def one_behind(program: Program) -> Iterator[Change]:
+def one_behind(program: Program) -> Iterator[Mutation]:
     """A message that is used when the next one comes: always one behind."""
     for function in program.handed_to("create_subscription"):
         parameter = function.params.params[-1].name.value if function.params.params else ""
         if parameter and parameter != "self":
             own = owner(function)
             text = f"{own}.heard, {parameter} = {parameter}, getattr({own}, 'heard', {parameter})"
-            yield Change(function, f"{function.name.value} uses the {parameter} before", at_top(function, text))
+            yield Mutation(function, f"{function.name.value} uses the {parameter} before", at_top(function, text))
 
 
-def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Change:
+def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutation:
     own = owner(function)
     counted = statement(_COUNT.format(owner=own))
     stop = statement(f"if {own}.calls_so_far > {calls}:\n    {then}\n")
@@ -240,7 +240,7 @@ def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Chang
     for line, new in at_top(function, "pass"):
         first = list(new)[-1] if isinstance(new, cst.FlattenSentinel) else line
         edits = ((line, cst.FlattenSentinel([counted, stop, first])),)
-    return Change(function, f"{function.name.value} {word} after {calls} calls", edits)
+    return Mutation(function, f"{function.name.value} {word} after {calls} calls", edits)
 
 
 def _kept(program: Program, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
@@ -262,7 +262,7 @@ _BOUNDARIES: Mapping[type[cst.BaseCompOp], tuple[type[cst.BaseCompOp], ...]] = {
 }
 
 
-def comparison(program: Program) -> Iterator[Change]:
+def comparison(program: Program) -> Iterator[Mutation]:
     """A limit that belongs to the wrong side, a comparison the wrong way round, or with the one value only."""
     for node in program.all(cst.Comparison):
         for target in node.comparisons:
@@ -270,27 +270,27 @@ def comparison(program: Program) -> Iterator[Change]:
                 continue
             for other in _BOUNDARIES.get(type(target.operator), ()):
                 after = node.deep_replace(target.operator, other())
-                yield Change(node, into(program.code(node), program.code(after)), ((node, after),))
+                yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
 
 
-def swapped_branches(program: Program) -> Iterator[Change]:
+def swapped_branches(program: Program) -> Iterator[Mutation]:
     """What belongs to yes and what belongs to no in each other's place."""
     for node in program.all(cst.IfExp):
-        yield Change(
+        yield Mutation(
             node,
             f"{program.code(node.body)} <-> {program.code(node.orelse)}",
             ((node.body, node.orelse), (node.orelse, node.body)),
         )
     for branch in program.all(cst.If):
         if isinstance(branch.orelse, cst.Else):
-            yield Change(
+            yield Mutation(
                 branch,
                 f"if {program.code(branch.test)}: branches swapped",
                 ((branch.body, branch.orelse.body), (branch.orelse.body, branch.body)),
             )
 
 
-def constant_condition(program: Program) -> Iterator[Change]:
+def constant_condition(program: Program) -> Iterator[Mutation]:
     """A condition that is forgotten, or never true: what it guards happens always, or not at all."""
     tests = [branch.test for branch in program.all(cst.If)]
     tests += [choice.test for choice in program.all(cst.IfExp)]
@@ -298,39 +298,39 @@ def constant_condition(program: Program) -> Iterator[Change]:
     for test in tests:
         if not _is_guard(program, test):
             for value in ("True", "False"):
-                yield Change(test, into(program.code(test), value), ((test, expression(value)),))
+                yield Mutation(test, into(program.code(test), value), ((test, expression(value)),))
 
 
-def boolean(program: Program) -> Iterator[Change]:
+def boolean(program: Program) -> Iterator[Mutation]:
     """Yes for no, `and` for `or`, a `not` too few."""
     for name in program.all(cst.Name):
         if name.value in ("True", "False"):
             other = "False" if name.value == "True" else "True"
-            yield Change(name, into(name.value, other), ((name, cst.Name(other)),))
+            yield Mutation(name, into(name.value, other), ((name, cst.Name(other)),))
     for node in program.all(cst.BooleanOperation):
         operator = cst.Or() if isinstance(node.operator, cst.And) else cst.And()
         after = node.with_changes(operator=operator)
-        yield Change(node, into(program.code(node), program.code(after)), ((node, after),))
+        yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
     for negated in program.all(cst.UnaryOperation):
         if isinstance(negated.operator, cst.Not):
             inner = negated.expression
-            yield Change(negated, into(program.code(negated), program.code(inner)), ((negated, inner),))
+            yield Mutation(negated, into(program.code(negated), program.code(inner)), ((negated, inner),))
 
 
-def loop_once(program: Program) -> Iterator[Change]:
+def loop_once(program: Program) -> Iterator[Mutation]:
     """What should be repeated is tried once: `if` for `while`."""
     for loop in program.all(cst.While):
         if loop.orelse is None and not _breaks(program, loop):
             after = cst.If(test=loop.test, body=loop.body, whitespace_before_test=cst.SimpleWhitespace(" "))
-            yield Change(loop, f"while -> if {program.code(loop.test)}", ((loop, after),))
+            yield Mutation(loop, f"while -> if {program.code(loop.test)}", ((loop, after),))
 
 
-def unhandled(program: Program) -> Iterator[Change]:
+def unhandled(program: Program) -> Iterator[Mutation]:
     """An error that nobody catches."""
     for handler in program.all(cst.ExceptHandler):
         body = cst.IndentedBlock([cst.parse_statement("raise")])
         named = program.code(handler.type) if handler.type is not None else "everything"
-        yield Change(handler, f"except {' '.join(named.split())}: raise", ((handler.body, body),))
+        yield Mutation(handler, f"except {' '.join(named.split())}: raise", ((handler.body, body),))
 
 
 def _breaks(program: Program, loop: cst.While) -> bool:

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from grader.mutation.operators import flow, values, words
-from grader.mutation.operators.program import Change, Program, short
+from grader.mutation.operators.program import Mutation, Program, short
 
-Operator = Callable[[Program], Iterator[Change]]
+Operator = Callable[[Program], Iterator[Mutation]]
 #: Operator name -> what imitates the mistake; its docstring says which mistake that is.
 OPERATORS: Mapping[str, Operator] = {
     operator.__name__: operator

@@ -31,7 +31,7 @@ LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class Mutation:
     """One way to change a program.
 
     Attributes:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import libcst as cst
 
-from grader.mutation.operators.program import Change, Program, argument, called, expression, into, number, number_of
+from grader.mutation.operators.program import Mutation, Program, argument, called, expression, into, number, number_of
 
 _SIBLINGS: Mapping[str, str] = {
     "x": "y",
@@ -24,60 +24,60 @@ _LONGER: Mapping[str, str] = {
 }
 
 
-def wrong_field(program: Program) -> Iterator[Change]:
+def wrong_field(program: Program) -> Iterator[Mutation]:
     """The field beside the right one: x for y, linear for angular, orientation for position."""
     for node in program.all(cst.Attribute):
         other = _SIBLINGS.get(node.attr.value)
         if other is not None and not _is_own(node):
-            yield Change(node, f"{program.code(node)} -> .{other}", ((node.attr, cst.Name(other)),))
+            yield Mutation(node, f"{program.code(node)} -> .{other}", ((node.attr, cst.Name(other)),))
 
 
-def wrong_part(program: Program) -> Iterator[Change]:
+def wrong_part(program: Program) -> Iterator[Mutation]:
     """The speed where the position belongs."""
     for node in program.all(cst.Attribute):
         text = program.code(node)
         for ending, other in _LONGER.items():
             if text.endswith(ending):
                 after = text.removesuffix(ending) + other
-                yield Change(node, into(text, after), ((node, expression(after)),))
+                yield Mutation(node, into(text, after), ((node, expression(after)),))
 
 
-def swapped_arguments(program: Program) -> Iterator[Change]:
+def swapped_arguments(program: Program) -> Iterator[Mutation]:
     """Two neighbouring arguments in each other's place."""
     for call in program.all(cst.Call):
         for one, other in zip(call.args, call.args[1:], strict=False):
             if one.keyword is None and other.keyword is None and not one.star + other.star:
                 texts = program.code(one.value), program.code(other.value)
-                yield Change(call, f"{texts[0]} <-> {texts[1]}", ((one.value, other.value), (other.value, one.value)))
+                yield Mutation(call, f"{texts[0]} <-> {texts[1]}", ((one.value, other.value), (other.value, one.value)))
 
 
-def swapped_values(program: Program) -> Iterator[Change]:
+def swapped_values(program: Program) -> Iterator[Mutation]:
     """Two neighbouring values of a text in each other's place."""
     for text in program.all(cst.FormattedString):
         values = [part for part in text.parts if isinstance(part, cst.FormattedStringExpression)]
         for one, other in pairwise(values):
             a, b = one.expression, other.expression
-            yield Change(text, f"{program.code(a)} <-> {program.code(b)}", ((a, b), (b, a)))
+            yield Mutation(text, f"{program.code(a)} <-> {program.code(b)}", ((a, b), (b, a)))
 
 
-def missing_keyword(program: Program) -> Iterator[Change]:
+def missing_keyword(program: Program) -> Iterator[Mutation]:
     """A field or setting left out: `Float32()` for `Float32(data=speed)`."""
     for call in program.all(cst.Call):
         for arg in call.args:
             if arg.keyword is not None:
                 kept = tuple(other for other in call.args if other is not arg)
                 after = call.with_changes(args=tuple(_last(kept)))
-                yield Change(call, into(program.code(call), program.code(after)), ((call, after),))
+                yield Mutation(call, into(program.code(call), program.code(after)), ((call, after),))
 
 
-def stale_field(program: Program) -> Iterator[Change]:
+def stale_field(program: Program) -> Iterator[Mutation]:
     """A value that goes into a new field by another name: the field of the message stays as it was."""
     for assign in program.all(cst.Assign):
         target = assign.targets[0].target
         if isinstance(target, cst.Attribute) and not _is_own(target):
             other = cst.Name(f"{target.attr.value}_value")
             after = cst.Assign([cst.AssignTarget(other)], assign.value)
-            yield Change(assign, into(program.code(target), other.value), ((assign, after),))
+            yield Mutation(assign, into(program.code(target), other.value), ((assign, after),))
 
 
 def _last(args: tuple[cst.Arg, ...]) -> list[cst.Arg]:
@@ -98,89 +98,89 @@ _OPERATORS: dict[type[cst.BaseBinaryOp], type[cst.BaseBinaryOp]] = {
 }
 
 
-def constant(program: Program) -> Iterator[Change]:
+def constant(program: Program) -> Iterator[Mutation]:
     """A number that is off: by a tenth, by one where it is whole."""
     for node, value in _numbers(program):
         off = value + 1 if isinstance(value, int) else value * 1.1 or 0.1
-        yield Change(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
+        yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
 
 
-def constant_less(program: Program) -> Iterator[Change]:
+def constant_less(program: Program) -> Iterator[Mutation]:
     """A number that is off the other way."""
     for node, value in _numbers(program):
         off = value - 1 if isinstance(value, int) else value * 0.9 or -0.1
-        yield Change(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
+        yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
 
 
-def sign(program: Program) -> Iterator[Change]:
+def sign(program: Program) -> Iterator[Mutation]:
     """A lost minus, or one too many."""
     for node, value in _numbers(program):
         above = next(program.above(node), None)
         if isinstance(above, cst.UnaryOperation) and isinstance(above.operator, cst.Minus):
-            yield Change(node, into(program.code(above), program.code(node)), ((above, node),))
+            yield Mutation(node, into(program.code(above), program.code(node)), ((above, node),))
         elif value:
-            yield Change(node, into(program.code(node), f"-{program.code(node)}"), ((node, number(-value)),))
+            yield Mutation(node, into(program.code(node), f"-{program.code(node)}"), ((node, number(-value)),))
 
 
-def whole_number(program: Program) -> Iterator[Change]:
+def whole_number(program: Program) -> Iterator[Mutation]:
     """A whole number where a message wants a float: `0` for `0.0`."""
     for node, value in _numbers(program):
         if isinstance(value, float) and value.is_integer():
-            yield Change(node, into(program.code(node), str(int(value))), ((node, number(int(value))),))
+            yield Mutation(node, into(program.code(node), str(int(value))), ((node, number(int(value))),))
 
 
-def arithmetic(program: Program) -> Iterator[Change]:
+def arithmetic(program: Program) -> Iterator[Mutation]:
     """The wrong operation: plus for minus, times for divided by."""
     for node in program.all(cst.BinaryOperation):
         other = _OPERATORS.get(type(node.operator))
         if other is not None and not _of_texts(node):
             after = node.with_changes(operator=other())
-            yield Change(node, into(program.code(node), program.code(after)), ((node, after),))
+            yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
 
 
-def missing_operand(program: Program) -> Iterator[Change]:
+def missing_operand(program: Program) -> Iterator[Mutation]:
     """A forgotten factor, shift or conversion: one side of an operation is missing."""
     for node in program.all(cst.BinaryOperation):
         if not _of_texts(node):
             for side in (node.left, node.right):
-                yield Change(node, into(program.code(node), program.code(side)), ((node, side),))
+                yield Mutation(node, into(program.code(node), program.code(side)), ((node, side),))
 
 
-def missing_conversion(program: Program) -> Iterator[Change]:
+def missing_conversion(program: Program) -> Iterator[Mutation]:
     """A forgotten conversion or function: `degrees(x)` becomes `x`; or its opposite."""
     for call in program.calls("degrees", "radians", "sin", "cos", "round", "abs", "float", "int", "str", "max", "min"):
         if call.args:
             inner = call.args[0].value
-            yield Change(call, into(program.code(call), program.code(inner)), ((call, inner),))
+            yield Mutation(call, into(program.code(call), program.code(inner)), ((call, inner),))
     opposites = {"degrees": "radians", "radians": "degrees", "sin": "cos", "cos": "sin", "max": "min", "min": "max"}
     for call in program.calls(*opposites):
         name = call.func.attr if isinstance(call.func, cst.Attribute) else call.func
         after = opposites[called(call)]
-        yield Change(call, into(called(call), after), ((name, cst.Name(after)),))
+        yield Mutation(call, into(called(call), after), ((name, cst.Name(after)),))
 
 
-def cut_to_whole(program: Program) -> Iterator[Change]:
+def cut_to_whole(program: Program) -> Iterator[Mutation]:
     """Numbers cut to whole ones before they are compared or sent."""
     for comparison in program.all(cst.Comparison):
         text = program.code(comparison.left)
         if isinstance(
             comparison.comparisons[0].operator, (cst.GreaterThan, cst.LessThan, cst.GreaterThanEqual, cst.LessThanEqual)
         ):
-            yield Change(comparison, into(text, f"int({text})"), ((comparison.left, expression(f"int({text})")),))
+            yield Mutation(comparison, into(text, f"int({text})"), ((comparison.left, expression(f"int({text})")),))
     for keyword in _sent(program):
         text = program.code(keyword)
-        yield Change(keyword, into(text, f"float(int({text}))"), ((keyword, expression(f"float(int({text}))")),))
+        yield Mutation(keyword, into(text, f"float(int({text}))"), ((keyword, expression(f"float(int({text}))")),))
 
 
-def counter_step(program: Program) -> Iterator[Change]:
+def counter_step(program: Program) -> Iterator[Mutation]:
     """A counter that counts in other steps, or backwards."""
     for node in program.all(cst.AugAssign):
         if isinstance(node.operator, (cst.AddAssign, cst.SubtractAssign)):
             text = program.code(node.value)
             doubled = expression(f"2 * ({text})")
-            yield Change(node, f"step {into(text, f'2 * {text}')}", ((node.value, doubled),))
+            yield Mutation(node, f"step {into(text, f'2 * {text}')}", ((node.value, doubled),))
             other = cst.SubtractAssign() if isinstance(node.operator, cst.AddAssign) else cst.AddAssign()
-            yield Change(node, f"step {into(text, f'-{text}')}", ((node.operator, other),))
+            yield Mutation(node, f"step {into(text, f'-{text}')}", ((node.operator, other),))
 
 
 def _numbers(program: Program) -> Iterator[tuple[cst.CSTNode, float | int]]:
@@ -235,20 +235,20 @@ _LATCHED = (
 )
 
 
-def best_effort(program: Program) -> Iterator[Change]:
+def best_effort(program: Program) -> Iterator[Mutation]:
     """A publisher or subscription for sensor data, where messages may get lost."""
     yield from _with_profile(program, "best effort", _SENSOR)
 
 
-def transient_local(program: Program) -> Iterator[Change]:
+def transient_local(program: Program) -> Iterator[Mutation]:
     """A publisher or subscription that expects late joiners to be served."""
     yield from _with_profile(program, "transient local", _LATCHED)
 
 
-def _with_profile(program: Program, word: str, profile: tuple[str, str]) -> Iterator[Change]:
+def _with_profile(program: Program, word: str, profile: tuple[str, str]) -> Iterator[Mutation]:
     text, line = profile
     for call in program.calls("create_publisher", "create_subscription"):
         arg = argument(call, "qos_profile")
         if arg is not None:
             edits = ((arg.value, expression(text)), *program.importing(line))
-            yield Change(call, f"{called(call).removeprefix('create_')} {word}", edits)
+            yield Mutation(call, f"{called(call).removeprefix('create_')} {word}", edits)

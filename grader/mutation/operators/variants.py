@@ -333,7 +333,7 @@ VARIANTS: Mapping[str, Rewriter] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Variant:
+class ProgramVariant:
     """A correct program beside the reference solution.
 
     Attributes:
@@ -352,7 +352,7 @@ class Variant:
         return f"{self.file}:{self.name}"
 
 
-def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[Variant, ...]:
+def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[ProgramVariant, ...]:
     """Return the variants that differ from a program, in the order of the table.
 
     Args:
@@ -362,4 +362,6 @@ def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARI
     """
     program = Program(source)
     written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
-    return tuple(Variant(file, name, text) for name, text in written if text != source and meaning(text) is not None)
+    return tuple(
+        ProgramVariant(file, name, text) for name, text in written if text != source and meaning(text) is not None
+    )

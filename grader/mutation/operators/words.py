@@ -13,8 +13,8 @@ from grader.mutation.operators.program import (
     CREATORS,
     LEVELS,
     SLEEPS,
-    Change,
     Edit,
+    Mutation,
     Program,
     argument,
     called,
@@ -31,22 +31,22 @@ _WORD = re.compile(r"(?<![%{\\\w/~.])[A-Za-z]{3,}")
 _QUIET, _LOUD = "debug", "error"
 
 
-def print_instead(program: Program) -> Iterator[Change]:
+def print_instead(program: Program) -> Iterator[Mutation]:
     """`print` instead of the logger."""
     for call in _logs(program):
         after = cst.Call(cst.Name("print"), [_plain(arg) for arg in call.args[:1]])
-        yield Change(call, into(program.code(call), program.code(after)), ((call, after),))
+        yield Mutation(call, into(program.code(call), program.code(after)), ((call, after),))
 
 
-def log_level(program: Program) -> Iterator[Change]:
+def log_level(program: Program) -> Iterator[Mutation]:
     """A log that nobody sees because it is for debugging, or one that cries for help."""
     for call in _logs(program):
         for level in (_QUIET, _LOUD):
             if isinstance(call.func, cst.Attribute) and call.func.attr.value != level:
-                yield Change(call, into(call.func.attr.value, level), ((call.func.attr, cst.Name(level)),))
+                yield Mutation(call, into(call.func.attr.value, level), ((call.func.attr, cst.Name(level)),))
 
 
-def log_every_message(program: Program) -> Iterator[Change]:
+def log_every_message(program: Program) -> Iterator[Mutation]:
     """The report comes with each message, not by the timer."""
     for heard in program.handed_to("create_subscription"):
         for timer in program.handed_to("create_timer"):
@@ -54,40 +54,40 @@ def log_every_message(program: Program) -> Iterator[Change]:
             if lines and parameters(timer) == ["self"] and parameters(heard)[:1] == ["self"]:
                 last = lines[-1]
                 added = cst.FlattenSentinel([last, statement(f"self.{timer.name.value}()")])
-                yield Change(heard, f"{heard.name.value} calls {timer.name.value}", ((last, added),))
+                yield Mutation(heard, f"{heard.name.value} calls {timer.name.value}", ((last, added),))
 
 
-def text(program: Program) -> Iterator[Change]:
+def text(program: Program) -> Iterator[Mutation]:
     """Another text: a word that is misspelt, in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
         said = text_of(node)
         if said is not None and not is_docstring(program, node) and _is_prose(said) and (word := _WORD.search(said)):
             after = said[: word.start()] + word[0][:-1] + said[word.end() :]
-            yield Change(node, into(said, after), ((node, string(after)),))
+            yield Mutation(node, into(said, after), ((node, string(after)),))
     for part in program.all(cst.FormattedStringText):
         if word := _WORD.search(part.value):
             after = part.value[: word.start()] + word[0][:-1] + part.value[word.end() :]
-            yield Change(part, into(part.value, after), ((part, part.with_changes(value=after)),))
+            yield Mutation(part, into(part.value, after), ((part, part.with_changes(value=after)),))
 
 
-def rounding(program: Program) -> Iterator[Change]:
+def rounding(program: Program) -> Iterator[Mutation]:
     """Digits that are lost in a text: `.0f` for `.3f`."""
     for part in program.all(cst.FormattedStringExpression):
         spec = "".join(program.code(piece) for piece in part.format_spec or ())
         if spec.endswith("f") and spec != ".0f":
             after = part.with_changes(format_spec=[cst.FormattedStringText(".0f")])
-            yield Change(part, into(program.code(part), program.code(after)), ((part, after),))
+            yield Mutation(part, into(program.code(part), program.code(after)), ((part, after),))
     for node in program.all(cst.SimpleString):
         said = text_of(node)
         if said is not None and (match := re.search(r"%\.[1-9]f", said)):
             after_text = said[: match.start()] + "%.0f" + said[match.end() :]
-            yield Change(node, into(said, after_text), ((node, string(after_text)),))
+            yield Mutation(node, into(said, after_text), ((node, string(after_text)),))
 
 
-def missing_value(program: Program) -> Iterator[Change]:
+def missing_value(program: Program) -> Iterator[Mutation]:
     """A text that does not say the value."""
     for part in program.all(cst.FormattedStringExpression):
-        yield Change(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
+        yield Mutation(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
 
 
 def _logs(program: Program) -> list[cst.Call]:
@@ -136,42 +136,42 @@ _STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
-def topic_typo(program: Program) -> Iterator[Change]:
+def topic_typo(program: Program) -> Iterator[Mutation]:
     """A misspelt topic or service: its last letter is missing."""
     for node, name in names(program):
         yield _renamed(node, name, name[:-1] if len(name) > 2 else f"{name}s")
 
 
-def topic_namespace(program: Program) -> Iterator[Change]:
+def topic_namespace(program: Program) -> Iterator[Mutation]:
     """A topic or service of another tutorial: the right name inside a namespace, as `/turtle1/cmd_vel`."""
     for node, name in names(program):
         yield _renamed(node, name, f"/turtle1/{name.lstrip('/')}")
 
 
-def topic_private(program: Program) -> Iterator[Change]:
+def topic_private(program: Program) -> Iterator[Mutation]:
     """A name that is private to the node, `~/cmd_vel`."""
     for node, name in names(program):
         yield _renamed(node, name, f"~/{name.lstrip('/')}")
 
 
-def topic_swapped(program: Program) -> Iterator[Change]:
+def topic_swapped(program: Program) -> Iterator[Mutation]:
     """Two topics mistaken for each other: what is published is listened to, and the other way round."""
     for (one, name), (other, other_name) in combinations(names(program), 2):
         if name != other_name:
-            yield Change(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
+            yield Mutation(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
 
 
-def message_type(program: Program) -> Iterator[Change]:
+def message_type(program: Program) -> Iterator[Mutation]:
     """Another message or service type with the same fields, imported and used in the whole file."""
     for imported, alias in _imported_types(program, _TWINS):
         package, twin = _TWINS[alias]
         edits: list[Edit] = [(name, cst.Name(twin)) for name in _uses(program, alias) if not _is_import(program, name)]
         line = f"from {package} import {twin}"
         edits += program.importing(line)
-        yield Change(imported, into(alias, f"{package}.{twin}"), tuple(edits))
+        yield Mutation(imported, into(alias, f"{package}.{twin}"), tuple(edits))
 
 
-def stamped_type(program: Program) -> Iterator[Change]:
+def stamped_type(program: Program) -> Iterator[Mutation]:
     """The stamped relative of a type, with the fields where that has them: TwistStamped for Twist."""
     for imported, alias in _imported_types(program, _STAMPED):
         member, parts = _STAMPED[alias]
@@ -183,10 +183,10 @@ def stamped_type(program: Program) -> Iterator[Change]:
         edits += [(node.value, cst.Attribute(node.value, cst.Name(member))) for node in fields]
         package = program.code(imported.module) if imported.module is not None else ""
         edits += program.importing(f"from {package} import {stamped}")
-        yield Change(imported, into(alias, stamped), tuple(edits))
+        yield Mutation(imported, into(alias, stamped), tuple(edits))
 
 
-def message_type_once(program: Program) -> Iterator[Change]:
+def message_type_once(program: Program) -> Iterator[Mutation]:
     """A type that two ends of the same program disagree about: only one publisher or subscription has another one."""
     for call in program.calls(*CREATORS):
         arg = argument(call, CREATORS[called(call)][0])
@@ -194,7 +194,7 @@ def message_type_once(program: Program) -> Iterator[Change]:
             continue
         package, twin = _TWINS[arg.value.value]
         edits = ((arg.value, cst.Name(twin)), *program.importing(f"from {package} import {twin}"))
-        yield Change(call, f"{called(call)} {into(arg.value.value, twin)}", edits)
+        yield Mutation(call, f"{called(call)} {into(arg.value.value, twin)}", edits)
 
 
 def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
@@ -209,8 +209,8 @@ def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
     return list(found.items())
 
 
-def _renamed(node: cst.SimpleString, name: str, other: str) -> Change:
-    return Change(node, into(name, other), ((node, string(other)),))
+def _renamed(node: cst.SimpleString, name: str, other: str) -> Mutation:
+    return Mutation(node, into(name, other), ((node, string(other)),))
 
 
 def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
@@ -238,16 +238,16 @@ def _is_import(program: Program, node: cst.CSTNode) -> bool:
 _FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.25", "* 0.75")
 
 
-def period(program: Program) -> Iterator[Change]:
+def period(program: Program) -> Iterator[Mutation]:
     """A period that is wrong by a factor: ten, two, milliseconds for seconds, or a quarter."""
     for given in _periods(program):
         before = program.code(given)
         inside = before if isinstance(given, (cst.Name, cst.Attribute, cst.BaseNumber)) else f"({before})"
         for factor in _FACTORS:
-            yield Change(given, into(before, f"{inside} {factor}"), ((given, expression(f"{inside} {factor}")),))
+            yield Mutation(given, into(before, f"{inside} {factor}"), ((given, expression(f"{inside} {factor}")),))
 
 
-def rate_as_period(program: Program) -> Iterator[Change]:
+def rate_as_period(program: Program) -> Iterator[Mutation]:
     """The rate where the period belongs, and the other way round."""
     for given in _periods(program):
         before = program.code(given)
@@ -255,20 +255,20 @@ def rate_as_period(program: Program) -> Iterator[Change]:
         after = (
             program.code(given.right) if is_inverse and isinstance(given, cst.BinaryOperation) else f"1 / ({before})"
         )
-        yield Change(given, into(before, after), ((given, expression(after)),))
+        yield Mutation(given, into(before, after), ((given, expression(after)),))
 
 
-def sleeping_callback(program: Program) -> Iterator[Change]:
+def sleeping_callback(program: Program) -> Iterator[Mutation]:
     """A callback that sleeps, and keeps everything else waiting."""
     for function in program.callbacks:
         edits = (*program.importing("import time"), *at_top(function, "time.sleep(2.0)"))
-        yield Change(function, f"{function.name.value} sleeps 2 s", edits)
+        yield Mutation(function, f"{function.name.value} sleeps 2 s", edits)
 
 
-def busy_callback(program: Program) -> Iterator[Change]:
+def busy_callback(program: Program) -> Iterator[Mutation]:
     """A callback that loops for ever."""
     for function in program.callbacks[:1]:
-        yield Change(function, f"{function.name.value} loops", at_top(function, "while True:\n    pass\n"))
+        yield Mutation(function, f"{function.name.value} loops", at_top(function, "while True:\n    pass\n"))
 
 
 def _periods(program: Program) -> list[cst.BaseExpression]:

@@ -35,7 +35,7 @@ _EXCEPTION = re.compile(r"(?P<type>[A-Za-z_][\w.]{0,80})(?::\s*(?P<text>.*))?", 
 
 
 @dataclass(frozen=True, order=True, slots=True)
-class Kind:
+class CauseKind:
     """The kind of a cause.
 
     Attributes:
@@ -54,7 +54,7 @@ class Kind:
         return {"missing": "file missing", "fault": "fault"}.get(self.source, "as measured")
 
 
-def kind_of(criterion: Mapping[str, Any]) -> Kind:
+def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
     """Return the kind of cause for which a criterion lost points.
 
     What the diagnosis named is surest; then a missing file, a fault, and at last the words of the reason.
@@ -66,12 +66,12 @@ def kind_of(criterion: Mapping[str, Any]) -> Kind:
     evidence = evidence if isinstance(evidence, Mapping) else {}
     named, missing, fault = (evidence.get(key) for key in ("diagnosis", "missing", "fault"))
     if isinstance(named, str) and named:
-        return Kind("diagnosis", named)
+        return CauseKind("diagnosis", named)
     if isinstance(missing, str) and missing:
-        return Kind("missing", missing)
+        return CauseKind("missing", missing)
     if isinstance(fault, Mapping):
-        return Kind("fault", f"{fault.get('kind')} {_exception(str(fault.get('text', '')))}")
-    return Kind("reason", skeleton(str(criterion.get("reason", "")).split(";", 1)[0]))
+        return CauseKind("fault", f"{fault.get('kind')} {_exception(str(fault.get('text', '')))}")
+    return CauseKind("reason", skeleton(str(criterion.get("reason", "")).split(";", 1)[0]))
 
 
 def skeleton(text: str) -> str:
@@ -120,7 +120,7 @@ class Form:
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
+class CommonCause:
     """One cause for which students of a class lost points.
 
     Attributes:
@@ -136,7 +136,7 @@ class Cause:
     exercise: str
     criterion: str
     title: str
-    kind: Kind
+    kind: CauseKind
     students: tuple[int, ...]
     points: Fraction
     forms: tuple[Form, ...]
@@ -149,7 +149,7 @@ class _Cluster:
     points: Fraction = Fraction(0)
 
 
-def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[Cause, ...]:
+def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[CommonCause, ...]:
     """Return all causes, those of most students first, then those that cost most.
 
     A criterion that is blocked, or has the same cause as another, is counted with the one that names the cause.
@@ -157,7 +157,7 @@ def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[Cause, ...]:
     Args:
         reports: Index of a student and the report, in the order of the students.
     """
-    clusters: dict[tuple[str, str, Kind], _Cluster] = {}
+    clusters: dict[tuple[str, str, CauseKind], _Cluster] = {}
     for student, report in reports:
         for exercise in report["exercises"]:
             by_id = {criterion["id"]: criterion for criterion in exercise["criteria"]}
@@ -167,7 +167,7 @@ def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[Cause, ...]:
                 cluster.students.setdefault(student, root)
                 cluster.points += _lost(criterion)
     found = [
-        Cause(*key[:2], cluster.title, key[2], tuple(cluster.students), cluster.points, _forms(cluster.students))
+        CommonCause(*key[:2], cluster.title, key[2], tuple(cluster.students), cluster.points, _forms(cluster.students))
         for key, cluster in clusters.items()
     ]
     return tuple(sorted(found, key=lambda c: (-len(c.students), -c.points, c.exercise, c.criterion, c.kind)))

@@ -16,7 +16,7 @@ ReportData = Mapping[str, Any]
 LOST = (Outcome.NOT_MET.value, Outcome.PARTLY.value)
 
 
-class Tone(str, Enum):
+class RowTone(str, Enum):
     """How a status is to be taken."""
 
     FINE = "fine"
@@ -26,7 +26,7 @@ class Tone(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Student:
+class StudentRow:
     """One submission, or somebody who handed in nothing.
 
     Attributes:
@@ -49,7 +49,7 @@ class Student:
     name: str
     also: tuple[str, ...] = ()
     status: str = "graded"
-    tone: Tone = Tone.FINE
+    tone: RowTone = RowTone.FINE
     raw: Fraction | None = None
     max_score: Fraction | None = None
     final: Fraction | None = None
@@ -61,7 +61,7 @@ class Student:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class PageEntry:
     """A line of a list.
 
     Attributes:
@@ -82,7 +82,7 @@ class Listing:
     id: str
     title: str
     about: str
-    entries: tuple[Entry, ...]
+    entries: tuple[PageEntry, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +129,6 @@ class ClassPage:
 
     title: str
     run: RunFacts
-    students: tuple[Student, ...]
+    students: tuple[StudentRow, ...]
     listings: tuple[Listing, ...] = ()
     links: tuple[PageLink, ...] = ()

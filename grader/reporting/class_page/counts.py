@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from grader.core.exercise import Outcome
-from grader.reporting.class_page.contents import ReportData, Student
+from grader.reporting.class_page.contents import ReportData, StudentRow
 
 #: Parts of the scale, without the last one, which is the full score alone.
 _PARTS = 10
@@ -86,7 +86,7 @@ class ExerciseCount:
     criteria: tuple[CriterionCount, ...]
 
 
-def distribution(students: Sequence[Student]) -> Distribution:
+def distribution(students: Sequence[StudentRow]) -> Distribution:
     """Return how the scores of those that count are distributed; scores that are not final are left out."""
     counted = [student for student in students if student.counts]
     most = max((s.max_score for s in counted if s.max_score), default=Fraction(0))
@@ -118,7 +118,7 @@ def exercise_counts(reports: Iterable[ReportData]) -> tuple[ExerciseCount, ...]:
     )
 
 
-def _is_final(student: Student) -> bool:
+def _is_final(student: StudentRow) -> bool:
     return student.report is not None and bool(student.report["final"])
 
 

@@ -16,8 +16,8 @@ from markupsafe import Markup
 
 from grader.core.exercise import Outcome, exercise_name
 from grader.reporting import wording
-from grader.reporting.class_page.causes import Cause, causes
-from grader.reporting.class_page.contents import ClassPage, PageLink, ReportData, Student
+from grader.reporting.class_page.causes import CommonCause, causes
+from grader.reporting.class_page.contents import ClassPage, PageLink, ReportData, StudentRow
 from grader.reporting.class_page.counts import Distribution, ExerciseCount, distribution, exercise_counts
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
@@ -69,7 +69,7 @@ _NAME_LIMIT = 100
 
 
 def payload(
-    page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[Cause], spread: Distribution
+    page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[CommonCause], spread: Distribution
 ) -> dict[str, Any]:
     """Return the data of the page.
 
@@ -91,7 +91,7 @@ def payload(
 
 
 def _student(
-    student: Student, exercises: Sequence[ExerciseCount], criteria: Sequence[tuple[str, str]]
+    student: StudentRow, exercises: Sequence[ExerciseCount], criteria: Sequence[tuple[str, str]]
 ) -> dict[str, Any]:
     """Return what a row is sorted by, column by column, and the outcome of each criterion in one letter."""
     by_id = {} if student.report is None else {e["id"]: e for e in student.report["exercises"]}
@@ -195,7 +195,7 @@ def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
     return [*scores, *full, *((status, str(count)) for status, count in standing.most_common())]
 
 
-def _cause_anchor(cause: Cause) -> str:
+def _cause_anchor(cause: CommonCause) -> str:
     return f"{cause.exercise}-{cause.criterion}"
 
 
