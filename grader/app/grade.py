@@ -102,10 +102,10 @@ def grade(
         GraderError: Something that grading needs cannot be used; its class says who must act.
     """
     started = time.perf_counter()
-    with open_session(request.isolation, request.workers, progress) as studio:
+    with open_session(request.isolation, request.workers, progress) as session:
         progress("reading the submission")
         exercises = read_exercises(request)
-        root = studio.folder / "submission"
+        root = session.folder / "submission"
         root.mkdir()
         submission = _staged(request, exercises, root)
         if request.every:
@@ -117,14 +117,14 @@ def grade(
             submission=submission,
             traces={},
             sources=read_sources(submission),
-            environment=_environment(studio),
+            environment=_environment(session),
             seed=seed,
             duration_s=time.perf_counter() - started,
             notes=(
                 *submission.notes,
                 *_seed_notes(request),
-                *_release_notes(studio.ros.distro),
-                *_isolation_notes(studio),
+                *_release_notes(session.ros.distro),
+                *_isolation_notes(session),
             ),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
@@ -132,10 +132,10 @@ def grade(
         checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
         later = request.clock == AUTO and checks.certain
         first = None if later else take
-        traces = studio.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
+        traces = session.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
         if request.clock == AUTO:
             # what the grader itself wants to see twice takes nothing of a submission's time
-            record = partial(_record_one, studio, progress, RealTimeBudget(request.time_budget_s))
+            record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
             traces = check(checks, jobs, traces, record, take or _nobody_hears)
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if hear is not None:
@@ -143,8 +143,8 @@ def grade(
         return judge_run(exercises, run, pictures=pictures)
 
 
-def _record_one(studio: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
-    return studio.recorder.record([replace(job, budget=budget)], progress)[0]
+def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeBudget, job: Job) -> Trace:
+    return session.recorder.record([replace(job, budget=budget)], progress)[0]
 
 
 def _nobody_hears(key: tuple[str, str], trace: Trace) -> None:
@@ -234,21 +234,21 @@ def _release_notes(distro: str) -> tuple[str, ...]:
     return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
 
 
-def _isolation_notes(studio: RecordingSession) -> tuple[str, ...]:
+def _isolation_notes(session: RecordingSession) -> tuple[str, ...]:
     """Say that the submission ran without walls, or what its sandbox does not hold back."""
-    if studio.isolation.name == NO_ISOLATION:
+    if session.isolation.name == NO_ISOLATION:
         return ("the submission ran without a sandbox: as asked",)
-    open_ones = [str(found) for found in studio.containment if not found.holds]
-    return (f"sandbox {studio.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
+    open_ones = [str(found) for found in session.containment if not found.holds]
+    return (f"sandbox {session.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
 
 
-def _environment(studio: RecordingSession) -> Environment:
+def _environment(session: RecordingSession) -> Environment:
     return Environment(
         grader=grader.__version__,
-        ros_distro=studio.ros.distro,
-        rclpy=studio.ros.rclpy_version,
+        ros_distro=session.ros.distro,
+        rclpy=session.ros.rclpy_version,
         rmw="rmw_fastrtps_cpp",
         python=platform.python_version(),
-        isolation=studio.isolation.name,
-        containment=studio.containment,
+        isolation=session.isolation.name,
+        containment=session.containment,
     )

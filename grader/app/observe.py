@@ -86,14 +86,14 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
         scenario = _undisturbed(request, names)
     plays = any(isinstance(stimulus, OdometryStream) for stimulus in scenario.stimuli)
     odometry = read_odometry(request.odom_bag or builtin_odometry()) if plays else None
-    with open_session(request.isolation, progress=progress) as studio:
-        submission = _stage(request.files, names, studio.folder)
+    with open_session(request.isolation, progress=progress) as session:
+        submission = _stage(request.files, names, session.folder)
         seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
         plan = plan_scenario("observe", scenario, submission, seed=seed, odometry=odometry, clock=clock)
-        trace = studio.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
+        trace = session.record({scenario.id: Job("observing", plan)}, request.clock, progress)[scenario.id]
     if trace.harness_problem:
         raise HarnessError(f"observe: expected a trace, found none: {trace.harness_problem}")
-    return Watched(trace, tuple(names), studio.isolation.name)
+    return Watched(trace, tuple(names), session.isolation.name)
 
 
 def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:

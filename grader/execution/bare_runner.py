@@ -125,7 +125,7 @@ class BareRunner(WallRunner):
         begin_ns = time.monotonic_ns()
         deadline_ns = begin_ns + (IMPORTS_NS if self._plan.first_node_ns > PROMPT_NS else FIRST_NODE_NS)
         next_ns = 0
-        while not self._tape.graph.nodes and not self._finished() and (now_ns := time.monotonic_ns()) < deadline_ns:
+        while not self._recorder.graph.nodes and not self._finished() and (now_ns := time.monotonic_ns()) < deadline_ns:
             if now_ns >= next_ns:
                 self._look_at_graph(0)
                 next_ns = now_ns + FIRST_LOOK_NS
@@ -145,7 +145,7 @@ class BareRunner(WallRunner):
 
     def _read(self) -> Iterator[Observation]:
         """Yield what was observed, with log records and the faults of threads as lines tell of them."""
-        seen = self._tape.observations
+        seen = self._recorder.observations
         read: dict[int, list[Observation]] = {}
         for student in self._students:
             lines = [o for o in seen if isinstance(o, OutputLine) and o.process == student.name]

@@ -114,9 +114,9 @@ class Discovery:
     Args:
         students: The processes.
         observer: The grader's node.
-        tape: Where the graph is taken down.
-        desk: The grader's servers and clients.
-        bury: Called with a process that no longer answers.
+        recorder: Where the graph is taken down.
+        services: The grader's servers and clients.
+        mark_dead: Called with a process that no longer answers.
 
     Attributes:
         streams: The topics that stimuli publish on now, with their types.
@@ -129,15 +129,15 @@ class Discovery:
         self,
         students: list[NodeProcess],
         observer: Observer,
-        tape: TraceRecorder,
-        desk: ServicePeers,
-        bury: Callable[[NodeProcess], None],
+        recorder: TraceRecorder,
+        services: ServicePeers,
+        mark_dead: Callable[[NodeProcess], None],
     ) -> None:
         self._students = students
         self._observer = observer
-        self._tape = tape
-        self._desk = desk
-        self._bury = bury
+        self._recorder = recorder
+        self._services = services
+        self._mark_dead = mark_dead
         self.patience = Patience()
         self._departures = Patience(DEPARTURE_S)
         self._served: set[tuple[str, str]] = set()
@@ -151,12 +151,12 @@ class Discovery:
         """Wait until the graph holds what the processes have and nothing that has gone, and all of it is matched."""
         claims = self._claims()
         if not self.patience.wait(lambda: self._holds(now_ns, claims), pause_s=GRAPH_PAUSE_S):
-            self._tape.note("an endpoint that a node created was not seen in the graph")
+            self._recorder.note("an endpoint that a node created was not seen in the graph")
         if not self._departures.wait(lambda: not self._surplus(now_ns, claims), pause_s=GRAPH_PAUSE_S):
             self._strangers = self._strangers + self._surplus(now_ns, claims)
         self.look(now_ns)
-        unknown = self._observer.watch(self._tape.graph)
-        self._tape.note(*(f"the type of {name} is not known on this machine" for name in unknown))
+        unknown = self._observer.watch(self._recorder.graph)
+        self._recorder.note(*(f"the type of {name} is not known on this machine" for name in unknown))
         writers = [c for c in claims if c["kind"] == "publisher"]
         self.patience.wait(lambda: all(self._watched(c, writers) for c in writers))
         self.patience.wait(lambda: all(map(self.is_heard, self.streams)))
@@ -229,24 +229,24 @@ class Discovery:
         found.update(("node", name, "") for name in self._observer.students_nodes())
         for kind, name, _ in self._known:
             if kind in ("service", "client"):
-                found[kind, name, ""] = self._observer.ends_of(kind, name) - self._desk.ends_of(kind, name)
+                found[kind, name, ""] = self._observer.ends_of(kind, name) - self._services.ends_of(kind, name)
         return found
 
     def _graph_at(self, now_ns: int) -> GraphSnapshot:
         """Return the live graph, with services where a process has said that it has any."""
         services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
-        return self._observer.graph(now_ns, services=services or bool(self._tape.graph.services))
+        return self._observer.graph(now_ns, services=services or bool(self._recorder.graph.services))
 
     def is_served(self, calls: PlannedCalls) -> bool:
         """Return whether the server that some calls need is there and matched."""
-        service = self._desk.resolved(calls.service)
+        service = self._services.resolved(calls.service)
         claims = [c for s in self._students if not s.ended for c in s.claims]
         if service is None or not any(serves(c, service, calls.type) for c in claims):
             return False
-        self._desk.meet(calls)
+        self._services.meet(calls)
         if self.patience.wait(lambda: self._observer.services.met(service)):
             return True
-        self._tape.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
+        self._recorder.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
         return False
 
     def _watched(self, claim: dict[str, Any], writers: list[dict[str, Any]]) -> bool:
@@ -278,14 +278,14 @@ class Discovery:
         student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
         answer = student.report()
         if answer is None or answer.get("kind") != "matched":
-            self._bury(student)
+            self._mark_dead(student)
             return
         student.nudged = True  # a match is an event that a node may have a callback for
         missing = answer.get("missing")
         if missing:
             self.patience.lose()
         for name in filter(is_name, missing[:WORDS] if isinstance(missing, list) else ()):
-            self._tape.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
+            self._recorder.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
         kind, name = claim["kind"], claim["name"]
@@ -299,17 +299,17 @@ class Discovery:
         if kind == "service":
             asking = ("client", name, claim["type"])
             students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)
-            return students + self._desk.ends_of("client", name)
+            return students + self._services.ends_of("client", name)
         if kind != "client":
             return 0
         return int(
-            self._desk.serves(name, claim["type"])
+            self._services.serves(name, claim["type"])
             or any((c["kind"], c["name"], c["type"]) == ("service", name, claim["type"]) for c in claims)
         )
 
     def look(self, now_ns: int) -> None:
         """Take down the graph where it has changed."""
-        self._tape.look(self._graph_at(now_ns), self._observer.participants())
+        self._recorder.look(self._graph_at(now_ns), self._observer.participants())
 
 
 def _wanted(claims: list[dict[str, Any]]) -> Counter[Key]:

@@ -14,13 +14,13 @@ from grader.core.scenario import (
     ActionGoal,
     AnyOrder,
     Between,
+    CallStream,
     Choose,
     Count,
     CountBetween,
     FieldSpec,
     InOrder,
     MessageStream,
-    ServiceCalls,
     ServiceServer,
     SomeOf,
     Time,
@@ -101,7 +101,7 @@ class PlannedServer:
 
 @dataclass(frozen=True, slots=True)
 class PlannedCalls:
-    """Calls with every request drawn, `clients` of them for each call in turn; see `ServiceCalls`."""
+    """Calls with every request drawn, `clients` of them for each call in turn; see `CallStream`."""
 
     service: str
     type: str
@@ -112,7 +112,7 @@ class PlannedCalls:
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class PlannedCall:
     """One request that is to be sent.
 
     Attributes:
@@ -123,7 +123,7 @@ class Call:
 
     calls: PlannedCalls
     index: int
-    then: tuple[tuple[int, Call], ...] = ()
+    then: tuple[tuple[int, PlannedCall], ...] = ()
 
     @property
     def client(self) -> int:
@@ -143,19 +143,19 @@ class PlannedGoal:
     uuid: tuple[int, ...]
 
 
-def goal_call(goal: PlannedGoal) -> Call:
+def goal_call(goal: PlannedGoal) -> PlannedCall:
     """Return the request that sends a goal, and those that follow: for its result, and perhaps to cancel it."""
     name, identity = f"{goal.action}/_action", {"uuid": list(goal.uuid)}
 
     def once(service: str, interface: str, request: Fields) -> PlannedCalls:
         return PlannedCalls(f"{name}/{service}", interface, goal.start_ns, 1, 1, (request,))
 
-    then = [(0, Call(once("get_result", f"{goal.type}_GetResult", {"goal_id": identity}), 0))]
+    then = [(0, PlannedCall(once("get_result", f"{goal.type}_GetResult", {"goal_id": identity}), 0))]
     if goal.cancel_after_ns:
         asked = once("cancel_goal", "action_msgs/srv/CancelGoal", {"goal_info": {"goal_id": identity}})
-        then.append((goal.cancel_after_ns, Call(asked, 0)))
+        then.append((goal.cancel_after_ns, PlannedCall(asked, 0)))
     sent = once("send_goal", f"{goal.type}_SendGoal", {"goal_id": identity, "goal": goal.goal})
-    return Call(sent, 0, tuple(then))
+    return PlannedCall(sent, 0, tuple(then))
 
 
 def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:
@@ -181,7 +181,7 @@ def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
     )
 
 
-def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
+def plan_calls(calls: CallStream, draw: random.Random) -> PlannedCalls:
     """Return calls with every request drawn, for each call and client anew."""
     start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
     requests = in_drawn_order(calls.requests, draw)

@@ -16,10 +16,10 @@ from grader.execution.service_peers import ServicePeers
 from grader.execution.stimuli import (
     AddClients,
     AddServer,
-    Answer,
     Ask,
     Event,
     RemoveServer,
+    Respond,
     TopicEvent,
     schedule,
 )
@@ -50,19 +50,19 @@ class Runner(ABC):
         self._stop_ns = 0
         self._starts_ns = dict(plan.starts_ns)
         self._due = schedule(plan)
-        self._tape = TraceRecorder(plan.limits)
-        self._desk = ServicePeers(
-            plan, observer.services, self._tape, nodes=lambda: self._tape.graph.nodes, later=self._later
+        self._recorder = TraceRecorder(plan.limits)
+        self._services = ServicePeers(
+            plan, observer.services, self._recorder, nodes=lambda: self._recorder.graph.nodes, later=self._later
         )
 
     def run(self) -> Trace:
         """Run the plan to its end and return the trace."""
         self._begin()
         self._run_on()
-        self._tape.look_back(self._last_look())
+        self._recorder.look_back(self._last_look())
         self._stop_ns = self._end_ns
         unfit = self._unfit()
-        if self._plan.shutdown_ns and not (unfit or self._tape.full):
+        if self._plan.shutdown_ns and not (unfit or self._recorder.full):
             self._shut_down()
         return Trace(
             scenario=self._plan.scenario,
@@ -70,7 +70,7 @@ class Runner(ABC):
             clock_reason=unfit or self.clock_reason,
             stop_ns=self._stop_ns,
             observations=self._observations(),
-            notes=self._tape.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
+            notes=self._recorder.notes([*self._observer.notes(), *(note for s in self._students for note in s.notes)]),
             starts=tuple(s.start_told for s in self._students if s.start_told is not None),
             harness_problem=self._harness_problem(),
         )
@@ -109,7 +109,7 @@ class Runner(ABC):
 
     def _observations(self) -> tuple[Observation, ...]:
         """Return what was observed, in order."""
-        return tuple(self._tape.observations)
+        return tuple(self._recorder.observations)
 
     @abstractmethod
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
@@ -121,30 +121,30 @@ class Runner(ABC):
         for student in self._students:
             if not student.ended:
                 student.stop_signalled = True
-                self._tape.add(Mark(self._time_ns(), "stop_signal", student.name))
+                self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
                 self._interrupt(student)
         self._run_on()
         for student in self._students:
             if not student.ended:
-                self._tape.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
+                self._recorder.add(never_stopped(student.name, self._end_ns, self._plan.shutdown_ns))
 
     def _finished(self) -> bool:
         return all(s.ended for s in self._students) and not any(isinstance(d, TopicEvent) for d in self._due)
 
     def _record(self, now_ns: int, taken: Taken) -> None:
-        first = taken.topic == self._plan.first_message_on and not self._tape.seen(taken.topic)
+        first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
             self._end_ns = now_ns + self._plan.duration_ns
-        self._tape.message(now_ns, taken)
+        self._recorder.message(now_ns, taken)
 
     def _end_if_full(self, now_ns: int) -> None:
-        if self._tape.full:
+        if self._recorder.full:
             self._end_ns = min(self._end_ns, now_ns)
 
     def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
         """Take down a fault that a process has reported."""
         fault, limits = report.get("fault"), self._plan.limits
-        self._tape.add(reported_fault(student.name, now_ns, fault, limits, student.places))
+        self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
 
     def _later(self, event: Event) -> None:
         """Have something done at a time, after everything else that is due then."""
@@ -155,16 +155,16 @@ class Runner(ABC):
         if isinstance(event, TopicEvent):
             self._topics.do(event, now_ns)
         elif isinstance(event, AddServer):
-            self._desk.serve(now_ns, event.server)
+            self._services.serve(now_ns, event.server)
         elif isinstance(event, RemoveServer):
-            self._desk.dismiss(now_ns, event.server)
-        elif isinstance(event, Answer):
-            if self._desk.answer(now_ns, event.server, event.number):
+            self._services.dismiss(now_ns, event.server)
+        elif isinstance(event, Respond):
+            if self._services.answer(now_ns, event.server, event.number):
                 self._announce_exchange("response", event.server.service, 1)
         elif isinstance(event, AddClients):
-            self._desk.meet(event.calls)
+            self._services.meet(event.calls)
         elif isinstance(event, Ask):
             if self._is_served(event.call.calls):
-                self._announce_exchange("request", self._desk.call(now_ns, event.call), 1)
+                self._announce_exchange("request", self._services.call(now_ns, event.call), 1)
             else:
-                self._desk.wait(event)  # until its server is there
+                self._services.wait(event)  # until its server is there

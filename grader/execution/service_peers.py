@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from grader.core.trace import Mark, Request, Response
-from grader.execution.exchanges import Call, PlannedCalls, PlannedServer
+from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
 from grader.execution.interfaces import built, plain_fields, wanted_class
 from grader.execution.observer import size_of
 from grader.execution.plan import Plan
 from grader.execution.service_ends import Arrived, ServiceEnds
-from grader.execution.stimuli import Answer, Ask, Event
+from grader.execution.stimuli import Ask, Event, Respond
 from grader.execution.trace_recorder import TraceRecorder
 
 #: Of a flood of requests and responses no more is taken before it is written down.
@@ -37,7 +37,7 @@ class ServicePeers:
     Args:
         plan: Its servers and calls; refused with a HarnessError where a type or field is unknown on this machine.
         ends: The servers and clients of the grader's node.
-        tape: Where requests and responses are taken down.
+        recorder: Where requests and responses are taken down.
         nodes: Returns the names of the students' nodes.
         later: Takes what is to be done at a later time.
     """
@@ -46,13 +46,13 @@ class ServicePeers:
         self,
         plan: Plan,
         ends: ServiceEnds,
-        tape: TraceRecorder,
+        recorder: TraceRecorder,
         *,
         nodes: Callable[[], Sequence[str]],
         later: Callable[[Event], None],
     ) -> None:
         self._ends = ends
-        self._tape = tape
+        self._recorder = recorder
         self._nodes = nodes
         self._later = later
         self._message_bytes = plan.limits.message_bytes
@@ -61,7 +61,7 @@ class ServicePeers:
         self._clients: dict[tuple[str, int, int], int] = {}
         self._called: dict[str, str] = {}
         self._kept: list[PlannedCalls] = []  # clients are known by the identity of their calls, which must last
-        self._open: dict[tuple[str, int, int], tuple[int, Call]] = {}
+        self._open: dict[tuple[str, int, int], tuple[int, PlannedCall]] = {}
         self._waiting: list[Ask] = []
         self._arrived: list[Arrived] = []
         self._large = False
@@ -86,7 +86,7 @@ class ServicePeers:
         """Let a server appear."""
         self._ends.serve(server.service, server.type)
         self._servers[server.service] = _Served(server)
-        self._tape.add(Mark(now_ns, "server_starts", server.service))
+        self._recorder.add(Mark(now_ns, "server_starts", server.service))
 
     def dismiss(self, now_ns: int, server: PlannedServer) -> None:
         """Let a server disappear, if it has not done so; what it has not answered stays unanswered."""
@@ -94,7 +94,7 @@ class ServicePeers:
         if served is not None and served.plan is server:
             del self._servers[server.service]
             self._ends.dismiss(server.service)
-            self._tape.add(Mark(now_ns, "server_stops", server.service))
+            self._recorder.add(Mark(now_ns, "server_stops", server.service))
 
     def done(self) -> list[PlannedServer]:
         """Return the servers that were asked once more after all the answers they are to give."""
@@ -122,7 +122,7 @@ class ServicePeers:
         nodes = self._nodes()
         return nodes[0] + service[1:] if len(nodes) == 1 else None
 
-    def call(self, now_ns: int, call: Call) -> str:
+    def call(self, now_ns: int, call: PlannedCall) -> str:
         """Send a request, and return the service that was asked; its clients are there."""
         calls = call.calls
         service = self.meet(calls) or calls.service
@@ -130,7 +130,7 @@ class ServicePeers:
         request = built(wanted_class(calls.type, "srv", service).Request, calls.requests[call.index], service)
         count = self._numbered(service, GRADER)
         value = plain_fields(request)
-        self._tape.exchange(Request(now_ns, service, calls.type, count, GRADER, number, value), 0)
+        self._recorder.exchange(Request(now_ns, service, calls.type, count, GRADER, number, value), 0)
         self._open[service, number, self._ends.ask(service, number, request)] = (count, call)
         return service
 
@@ -187,10 +187,10 @@ class ServicePeers:
             return  # it disappears with the request before this one
         plan, number = served.plan, self._numbered(request.service, STUDENT)
         value, size = self._content(request.message)
-        self._tape.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
+        self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
         if plan.response(served.taken) is not None:
             served.unanswered[number] = (request.header, served.taken)
-            self._later(Answer(now_ns + plan.delay_ns, plan, number))
+            self._later(Respond(now_ns + plan.delay_ns, plan, number))
         served.taken += 1
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
@@ -202,7 +202,7 @@ class ServicePeers:
         interface = wanted_class(server.type, "srv", server.service)
         response = built(interface.Response, server.response(index) or {}, server.service)
         value = plain_fields(response)
-        self._tape.exchange(Response(now_ns, server.service, server.type, number, GRADER, 0, value), 0)
+        self._recorder.exchange(Response(now_ns, server.service, server.type, number, GRADER, 0, value), 0)
         self._ends.answer(server.service, header, response)
         return True
 
@@ -214,7 +214,7 @@ class ServicePeers:
         value, size = self._content(response.message)
         interface = self.calls()[response.service]
         answer = Response(now_ns, response.service, interface, number, STUDENT, response.client, value)
-        self._tape.exchange(answer, size)
+        self._recorder.exchange(answer, size)
         for delay_ns, following in call.then if value.get("accepted") else ():
             self._later(Ask(now_ns + delay_ns, following))
 
@@ -225,7 +225,7 @@ class ServicePeers:
             return plain_fields(message), size
         if not self._large:
             self._large = True
-            self._tape.note("a service: the content of a message that is larger than the limit was not looked at")
+            self._recorder.note("a service: the content of a message that is larger than the limit was not looked at")
         return {}, size
 
     def _numbered(self, service: str, sender: str) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.execution.exchanges import Call, PlannedCalls, PlannedMessages, PlannedServer, goal_call
+from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessages, PlannedServer, goal_call
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording
 
@@ -40,7 +40,7 @@ class Appear(TopicEvent):
 
 
 @dataclass(frozen=True, slots=True)
-class Offer(TopicEvent):
+class Advertise(TopicEvent):
     """A publisher of a fixed type appears."""
 
     stream: PlannedMessages
@@ -89,7 +89,7 @@ class RemoveServer(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer(Event):
+class Respond(Event):
     """A server answers the request with a number."""
 
     server: PlannedServer
@@ -107,11 +107,11 @@ class AddClients(Event):
 class Ask(Event):
     """A client sends a request."""
 
-    call: Call
+    call: PlannedCall
 
 
 #: What makes something appear; at the start it comes before everything else.
-APPEARANCES = (Appear, Offer, AddServer, AddClients)
+APPEARANCES = (Appear, Advertise, AddServer, AddClients)
 
 
 def schedule(plan: Plan) -> list[Event]:
@@ -126,7 +126,7 @@ def schedule(plan: Plan) -> list[Event]:
         due.append(AddClients(calls.start_ns, calls))
         for index in range(len(calls.requests)):
             t_ns = calls.start_ns + index // calls.clients * calls.period_ns
-            due.append(Ask(t_ns, Call(calls, index)))
+            due.append(Ask(t_ns, PlannedCall(calls, index)))
     for goal in plan.goals:
         call = goal_call(goal)
         parts = [call, *(following for _, following in call.then)]
@@ -136,7 +136,7 @@ def schedule(plan: Plan) -> list[Event]:
 
 
 def _message_events(stream: PlannedMessages) -> Iterator[Event]:
-    yield Offer(stream.start_ns, stream.topic, stream)
+    yield Advertise(stream.start_ns, stream.topic, stream)
     for index in range(len(stream.values) * stream.repeats):
         t_ns = stream.start_ns + index * stream.period_ns
         if not stream.stop_ns or t_ns < stream.stop_ns:

@@ -11,9 +11,9 @@ from grader.execution.exchanges import PlannedMessages
 from grader.execution.interfaces import built, message_class, plain_fields
 from grader.execution.observer import Observer
 from grader.execution.stimuli import (
+    Advertise,
     Appear,
     Disappear,
-    Offer,
     PublishFields,
     PublishNumber,
     PublishRecorded,
@@ -34,12 +34,12 @@ class TopicPeers(ABC):
 
     Args:
         observer: The grader's node.
-        tape: Where it is taken down.
+        recorder: Where it is taken down.
     """
 
-    def __init__(self, observer: Observer, tape: TraceRecorder) -> None:
+    def __init__(self, observer: Observer, recorder: TraceRecorder) -> None:
         self._observer = observer
-        self._tape = tape
+        self._recorder = recorder
         #: The topics that stimuli publish on now, with their types.
         self._streams: dict[str, str] = {}
 
@@ -57,13 +57,13 @@ class TopicPeers(ABC):
         elif isinstance(event, Disappear):
             self._streams.pop(topic, None)
             self._withdraw(topic, now_ns)
-            self._tape.add(Mark(now_ns, "stream_stops", topic))
+            self._recorder.add(Mark(now_ns, "stream_stops", topic))
         else:
-            if isinstance(event, Offer):
+            if isinstance(event, Advertise):
                 self._offer(event.stream)
             elif isinstance(event, Appear):
                 self._advertise(topic, event.type)
-            self._tape.add(Mark(now_ns, "stream_starts", topic))
+            self._recorder.add(Mark(now_ns, "stream_starts", topic))
 
     def follow_type(self, topic: str) -> None:
         """Change a publisher's type or durability when a student's node subscribed with another one."""
@@ -87,7 +87,7 @@ class TopicPeers(ABC):
         self._streams[topic] = interface
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
-        self._tape.add(delivery)
+        self._recorder.add(delivery)
         self._observer.publish(delivery.topic, message)
 
     @abstractmethod
@@ -105,17 +105,17 @@ class VirtualTopicPeers(TopicPeers):
     Args:
         students: The processes.
         observer: The grader's node.
-        tape: Where it is taken down.
-        matching: Knows which publishers there are, and tells the processes.
+        recorder: Where it is taken down.
+        discovery: Knows which publishers there are, and tells the processes.
     """
 
     def __init__(
-        self, students: list[NodeProcess], observer: Observer, tape: TraceRecorder, matching: Discovery
+        self, students: list[NodeProcess], observer: Observer, recorder: TraceRecorder, discovery: Discovery
     ) -> None:
-        super().__init__(observer, tape)
+        super().__init__(observer, recorder)
         self._students = students
-        self._matching = matching
-        self._streams = matching.streams
+        self._discovery = discovery
+        self._streams = discovery.streams
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
         """Let one event of a stimulus happen, for subscriptions as they are now."""
@@ -124,7 +124,7 @@ class VirtualTopicPeers(TopicPeers):
         super().do(event, now_ns)
 
     def _offer(self, stream: PlannedMessages) -> None:
-        self._matching.fixed[stream.topic] = stream
+        self._discovery.fixed[stream.topic] = stream
         self._streams[stream.topic] = stream.type
         super()._offer(stream)
         self._match(stream.topic)
@@ -134,15 +134,15 @@ class VirtualTopicPeers(TopicPeers):
         self._match(topic)
 
     def _match(self, topic: str) -> None:
-        self._matching.patience.wait(lambda: self._matching.is_heard(topic))
-        self._matching.tell_all()
+        self._discovery.patience.wait(lambda: self._discovery.is_heard(topic))
+        self._discovery.tell_all()
 
     def _publish(self, delivery: Delivery, message: Any) -> None:
         super()._publish(delivery, message)
         topic = delivery.topic
-        self._matching.said[topic] += 1
+        self._discovery.said[topic] += 1
         for student in self._students:
-            if any(self._matching.takes(reader, topic) for reader in readers_of(student, topic)):
+            if any(self._discovery.takes(reader, topic) for reader in readers_of(student, topic)):
                 announce(student.arrivals, f"topic {topic}", 1)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
@@ -150,16 +150,16 @@ class VirtualTopicPeers(TopicPeers):
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
         del now_ns
-        self._matching.fixed.pop(topic, None)
+        self._discovery.fixed.pop(topic, None)
         self._observer.withdraw(topic)
-        self._matching.tell_all()
+        self._discovery.tell_all()
 
 
 class WallTopicPeers(TopicPeers):
     """Publishes on the wall clock, where a publisher stays for a while after its last message."""
 
-    def __init__(self, observer: Observer, tape: TraceRecorder) -> None:
-        super().__init__(observer, tape)
+    def __init__(self, observer: Observer, recorder: TraceRecorder) -> None:
+        super().__init__(observer, recorder)
         self._leaving: list[tuple[int, str]] = []
 
     def follow_types(self) -> None:
@@ -174,13 +174,13 @@ class WallTopicPeers(TopicPeers):
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
         """Let one event happen; a publisher that stayed for its last message goes before the next one comes."""
-        if isinstance(event, (Appear, Offer)) and any(left == event.topic for _, left in self._leaving):
+        if isinstance(event, (Appear, Advertise)) and any(left == event.topic for _, left in self._leaving):
             self._leaving = [(at_ns, left) for at_ns, left in self._leaving if left != event.topic]
             self._observer.withdraw(event.topic)
         super().do(event, now_ns)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
-        asked = [e for e in self._tape.graph.endpoints if e.kind == "subscription" and e.topic == topic]
+        asked = [e for e in self._recorder.graph.endpoints if e.kind == "subscription" and e.topic == topic]
         return [(e.type, e.durability == "transient_local") for e in asked]
 
     def _withdraw(self, topic: str, now_ns: int) -> None:

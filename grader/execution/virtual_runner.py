@@ -44,8 +44,8 @@ class VirtualRunner(Runner):
         self._now_ns = 0
         self._free_until_ns = 0
         self._steps = 0
-        self._matching = Discovery(students, observer, self._tape, self._desk, self._bury)
-        self._topics = VirtualTopicPeers(students, observer, self._tape, self._matching)
+        self._discovery = Discovery(students, observer, self._recorder, self._services, self._mark_dead)
+        self._topics = VirtualTopicPeers(students, observer, self._recorder, self._discovery)
 
     def _time_ns(self) -> int:
         return self._now_ns
@@ -59,11 +59,11 @@ class VirtualRunner(Runner):
 
     def _last_look(self) -> int:
         if not any(s.ended for s in self._students):
-            self._matching.look(self._now_ns)  # when the endpoints of an ended process disappear is chance
+            self._discovery.look(self._now_ns)  # when the endpoints of an ended process disappear is chance
         return self._now_ns
 
     def _unfit(self) -> str:
-        return unfit(self._students, self._tape.observations, full=bool(self._tape.full))
+        return unfit(self._students, self._recorder.observations, full=bool(self._recorder.full))
 
     def _run_on(self) -> None:
         """Step through time until the end, or until nothing more can happen."""
@@ -112,7 +112,7 @@ class VirtualRunner(Runner):
         """Tell one process the time and what is on its way, and handle its report."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
         if self._starts_ns.pop(student.name, 0):
-            self._tape.add(Mark(self._now_ns, "process_starts", student.name))
+            self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
         self._free_until_ns = self._quiet_until(student)
         free_ns = EPOCH_NS + self._free_until_ns
         answer = {"now_ns": EPOCH_NS + self._now_ns, "free_until_ns": free_ns, "arrivals": arrivals}
@@ -125,10 +125,10 @@ class VirtualRunner(Runner):
         self._steps += 1
         hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._unfit()
         # A flood is wrong on every clock: it goes on to its limit, which is the same on every machine.
-        if hopeless_now and not self._tape.floods(self._now_ns):
+        if hopeless_now and not self._recorder.floods(self._now_ns):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
-            self._tape.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
+            self._recorder.stop(self._now_ns, f"more than {STEPS:,} wake-ups")
         self._end_if_full(self._now_ns)
 
     def _quiet_until(self, student: NodeProcess) -> int:
@@ -153,7 +153,7 @@ class VirtualRunner(Runner):
             report = student.report()
             kind = None if report is None else report.get("kind")
             if report is None or kind not in ("arrived", "note", "fault", "idle", "exited"):
-                self._bury(student)
+                self._mark_dead(student)
                 return
             if kind == "arrived":
                 workload.arrived()
@@ -173,21 +173,21 @@ class VirtualRunner(Runner):
                 stopped, places = student.stop_signalled, student.places
                 self._end(student, ending(student.name, self._now_ns, report, self._plan, places, stopped=stopped))
                 if report.get("left"):
-                    self._matching.see_off(self._now_ns)
+                    self._discovery.see_off(self._now_ns)
                 return
             if report.get("leaving"):
                 self._hand_over()
             wake_ns = report.get("wake_ns")
             student.wake_ns = wake_ns - EPOCH_NS if isinstance(wake_ns, int) else None
             return
-        self._bury(student)
+        self._mark_dead(student)
 
     def _account(self, student: NodeProcess, report: Mapping[str, Any]) -> None:
         """Take what a process has published, let it reach everybody, and match new endpoints."""
         for channel, count in counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
-            self._tape.note(f"{student.name}: {some} on {where} did not arrive in time")
+            self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
         sent = counts(report.get("sent"))
         self._collect({c[6:]: n for c, n in sent.items() if c.startswith("topic ")})
         self._collect_exchanges(sent)
@@ -195,12 +195,12 @@ class VirtualRunner(Runner):
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
             if len(endpoints) > CLAIMS:
-                self._tape.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
+                self._recorder.stop(self._now_ns, f"more than {CLAIMS:,} endpoints and parameters of {student.name}")
             student.claims, student.renewed = [c for c in endpoints[:CLAIMS] if is_claim(c)], True
             student.sees_graph = report.get("sees_graph") is True
             self._note_offers(student)
-            self._matching.match(self._now_ns)
-            for due in self._desk.ready(self._is_served):
+            self._discovery.match(self._now_ns)
+            for due in self._services.ready(self._is_served):
                 self._later(replace(due, t_ns=self._now_ns))
 
     def _note_offers(self, student: NodeProcess) -> None:
@@ -210,7 +210,7 @@ class VirtualRunner(Runner):
             told = offer in student.offers or len(student.offers) >= OFFERS
             if claim["kind"] in ("service", "client", "parameter") and not told:
                 student.offers.add(offer)
-                self._tape.add(Offer(self._now_ns, student.name, *offer))
+                self._recorder.add(Offer(self._now_ns, student.name, *offer))
 
     def _collect(self, sent: Mapping[str, int]) -> None:
         """Wait until everything published has been taken here, and write it down."""
@@ -222,34 +222,34 @@ class VirtualRunner(Runner):
             for message in self._observer.take():
                 self._record(self._now_ns, message)
                 expected[message.topic] -= 1
-            return bool(self._tape.full) or all(count <= 0 for count in expected.values())
+            return bool(self._recorder.full) or all(count <= 0 for count in expected.values())
 
-        if not self._matching.patience.wait(complete):
+        if not self._discovery.patience.wait(complete):
             for topic in sorted(t for t, n in expected.items() if n > 0):
-                self._tape.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
+                self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
     def _collect_exchanges(self, sent: Mapping[str, int]) -> None:
         """Wait until the requests and responses for the grader have been taken here, and write them down."""
-        expected = self._desk.expected(sent)
+        expected = self._services.expected(sent)
         if not expected:
             return
 
         def complete() -> bool:
-            expected.subtract(self._desk.take())
+            expected.subtract(self._services.take())
             return all(count <= 0 for count in expected.values())
 
-        if not self._matching.patience.wait(complete):
+        if not self._discovery.patience.wait(complete):
             for channel in sorted(c for c, n in expected.items() if n > 0):
-                self._tape.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
-        self._desk.write_down(self._now_ns)
+                self._recorder.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
+        self._services.write_down(self._now_ns)
 
     def _is_served(self, calls: PlannedCalls) -> bool:
-        return self._matching.is_served(calls)
+        return self._discovery.is_served(calls)
 
     def _do(self, event: Event, now_ns: int) -> None:
         super()._do(event, now_ns)
         if isinstance(event, (AddServer, RemoveServer)):
-            self._matching.tell_all()
+            self._discovery.tell_all()
 
     def _forward(self, sender: NodeProcess, sent: Mapping[str, int]) -> None:
         """Tell every process what is on its way to it."""
@@ -278,25 +278,25 @@ class VirtualRunner(Runner):
                 student.arrivals, student.nudged = {}, True
                 answer = student.report()
                 if answer is None or answer.get("kind") != "arrived":
-                    self._bury(student)
+                    self._mark_dead(student)
 
     def _write_output(self, student: NodeProcess, *, final: bool) -> None:
-        self._tape.add(*student.output(self._now_ns, final=final))
+        self._recorder.add(*student.output(self._now_ns, final=final))
 
-    def _bury(self, student: NodeProcess) -> None:
+    def _mark_dead(self, student: NodeProcess) -> None:
         """Note the end of a process that ended without a word, and what it wrote before."""
         death = student.death(self._now_ns)
         student.drain()
         self._write_output(student, final=True)
         for message in self._observer.take_rest():
             self._record(self._now_ns, message)
-        if self._desk.take():
-            self._desk.write_down(self._now_ns)
-        self._matching.lose(student)
+        if self._services.take():
+            self._services.write_down(self._now_ns)
+        self._discovery.lose(student)
         self._end(student, death)
 
     def _end(self, student: NodeProcess, *endings: Fault | Mark) -> None:
-        self._tape.add(*endings)
+        self._recorder.add(*endings)
         student.ended = True
         student.wake_ns = None
         student.claims = []
@@ -313,6 +313,6 @@ class VirtualRunner(Runner):
 
     def _dismiss_done(self) -> None:
         """Let servers go that have given their last answer, when it has arrived."""
-        for server in self._desk.done():
+        for server in self._services.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)

@@ -17,7 +17,7 @@ from grader.execution.exchanges import PlannedCalls
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
 from grader.execution.runner import Runner
-from grader.execution.stimuli import Offer, RemoveServer
+from grader.execution.stimuli import Advertise, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
 
@@ -39,9 +39,9 @@ class WallRunner(Runner):
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
-        early = (replace(e, t_ns=max(0, e.t_ns - LEAD_NS)) if isinstance(e, Offer) else e for e in self._due)
+        early = (replace(e, t_ns=max(0, e.t_ns - LEAD_NS)) if isinstance(e, Advertise) else e for e in self._due)
         self._due = sorted(early, key=lambda e: e.t_ns)
-        self._topics: WallTopicPeers = WallTopicPeers(observer, self._tape)
+        self._topics: WallTopicPeers = WallTopicPeers(observer, self._recorder)
         self._next_graph_ns = 0
         self._started = 0
         self.held_up_ns = 0
@@ -74,7 +74,7 @@ class WallRunner(Runner):
 
     def _harness_problem(self) -> str:
         """Say that the machine did not keep up, if it did not; a node that floods holds it up itself."""
-        if self.held_up_ns <= HELD_UP_NS or self._tape.full:
+        if self.held_up_ns <= HELD_UP_NS or self._recorder.full:
             return ""
         return "the machine was too busy: a reference timer beside the node was held up as well"
 
@@ -82,18 +82,18 @@ class WallRunner(Runner):
         while self._due and self._due[0].t_ns <= now_ns:
             self._do(self._due.pop(0), now_ns)
         self._topics.leave(now_ns)
-        for due in self._desk.ready(self._is_served):
+        for due in self._services.ready(self._is_served):
             self._later(replace(due, t_ns=now_ns))
-        self._desk.take()
-        self._desk.write_down(now_ns)
+        self._services.take()
+        self._services.write_down(now_ns)
         going = [due.server for due in self._due if isinstance(due, RemoveServer)]
-        for server in self._desk.done():
+        for server in self._services.done():
             if server not in going:  # it would take its last response with it
                 self._later(RemoveServer(now_ns + LINGER_NS, server))
         for student in self._students:
             if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
                 del self._starts_ns[student.name]
-                self._tape.add(Mark(now_ns, "process_starts", student.name))
+                self._recorder.add(Mark(now_ns, "process_starts", student.name))
                 student.tell({"now_ns": 0, "free_until_ns": 0})
             self._hear(student, now_ns)
         for taken in self._observer.take(MESSAGES_A_LOOK):
@@ -108,30 +108,30 @@ class WallRunner(Runner):
         reports = [] if student.ended else student.reports()
         for report in reports:
             if report is None:
-                self._tape.add(*student.output(now_ns, final=True), student.death(now_ns))
+                self._recorder.add(*student.output(now_ns, final=True), student.death(now_ns))
                 student.ended = True
             elif report.get("kind") == "note":
                 student.note(report)
             elif report.get("kind") == "fault":
                 self._report_fault(student, report, now_ns)
             elif report.get("kind") == "exited":
-                self._tape.add(*student.output(now_ns, final=True))
+                self._recorder.add(*student.output(now_ns, final=True))
                 stopped, places = student.stop_signalled, student.places
-                self._tape.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
+                self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
-        self._tape.add(*student.output(now_ns))
+        self._recorder.add(*student.output(now_ns))
 
     def _look_at_graph(self, now_ns: int) -> None:
-        changed = self._tape.look(self._observer.graph(now_ns, services=True), self._observer.participants())
+        changed = self._recorder.look(self._observer.graph(now_ns, services=True), self._observer.participants())
         self._end_if_full(now_ns)
         if not changed:
             return
-        self._observer.watch(self._tape.graph)
+        self._observer.watch(self._recorder.graph)
         self._topics.follow_types()
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
         """Tell nobody: on the real clock processes take what comes when it comes."""
 
     def _is_served(self, calls: PlannedCalls) -> bool:
-        service = self._desk.meet(calls)
+        service = self._services.meet(calls)
         return service is not None and self._observer.services.met(service)

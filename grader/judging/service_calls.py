@@ -151,7 +151,7 @@ def _list(value: Mapping[str, Any], name: str) -> list[Any]:
 _COMPLAINTS = ("WARN", "ERROR", "FATAL")
 
 
-class Kind(str, Enum):
+class CallKind(str, Enum):
     """What a response said."""
 
     GOOD = "good"  # a number above the limit
@@ -196,7 +196,7 @@ class Episode:
     """
 
     place: int
-    kind: Kind
+    kind: CallKind
     number: float | None
     text: str
     asked_ns: int
@@ -240,16 +240,16 @@ def complaints(outputs: Sequence[Output]) -> list[LogRecord]:
     return [o for o in outputs if isinstance(o, LogRecord) and o.severity in _COMPLAINTS]
 
 
-def _read(response: Response | None, reading: ResponseReader) -> tuple[Kind, float | None, str]:
+def _read(response: Response | None, reading: ResponseReader) -> tuple[CallKind, float | None, str]:
     if response is None:
-        return Kind.UNANSWERED, None, ""
+        return CallKind.UNANSWERED, None, ""
     text = text_at(response.value, reading.field)
     number = number_in(text, reading.pattern) if text is not None else number_at(response.value, reading.field)
     if reading.success and not value_at(response.value, reading.success):
-        return Kind.FAILED, number, text or ""
+        return CallKind.FAILED, number, text or ""
     if number is None or not math.isfinite(number):
-        return Kind.UNREADABLE, None, text or ""
-    return (Kind.GOOD if number > reading.threshold else Kind.LOW), number, text or ""
+        return CallKind.UNREADABLE, None, text or ""
+    return (CallKind.GOOD if number > reading.threshold else CallKind.LOW), number, text or ""
 
 
 def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:

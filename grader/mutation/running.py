@@ -51,7 +51,7 @@ class Candidate:
 class TrialRunner:
     """What the programs of one rubric are tried with."""
 
-    studio: RecordingSession
+    session: RecordingSession
     workers: int
     request: GradeRequest
     exercise: Exercise
@@ -74,7 +74,7 @@ class TrialRunner:
 
     def _recorded(self, submission: Submission) -> tuple[ResultRank, dict[str, Trace]]:
         jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
-        recorded = self.studio.record(jobs, self.request.clock, self.progress)
+        recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         sources = read_sources(submission)
@@ -85,14 +85,14 @@ class TrialRunner:
         done, waiting = 0, iter(candidates)
         at_once = _AT_ONCE * self.workers
         while chunk := list(islice(waiting, at_once)):
-            folder = self.studio.folder / "mutants"
+            folder = self.session.folder / "mutants"
             submissions = {c.id: self._staged(c, folder / str(n)) for n, c in enumerate(chunk)}
             jobs = {
                 (c.id, key[1]): replace(job, title=f"{label}, {done + n + 1} of {len(candidates)}: {c.id}")
                 for n, c in enumerate(chunk)
                 for key, job in self._jobs(c, submissions[c.id]).items()
             }
-            recorded = self.studio.record(jobs, self.request.clock, self.progress)
+            recorded = self.session.record(jobs, self.request.clock, self.progress)
             self.recordings += len(recorded)
             for candidate in chunk:
                 own = {scenario: trace for (id_, scenario), trace in recorded.items() if id_ == candidate.id}
@@ -158,9 +158,9 @@ def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progre
     """
     prepared = [_prepared(path, options) for path in rubrics]
     workers = options.jobs or len(os.sched_getaffinity(0))
-    with open_session(options.isolation, workers) as studio:
+    with open_session(options.isolation, workers) as session:
         for path, exercise, explained in prepared:
-            bench = _bench(path, exercise, explained, studio, replace(options, jobs=workers), progress)
+            bench = _bench(path, exercise, explained, session, replace(options, jobs=workers), progress)
             yield _tested(path, bench, explained, options)
 
 
@@ -178,16 +178,16 @@ def _bench(  # noqa: PLR0913  each comes from another stage
     path: Path,
     exercise: Exercise,
     explained: Explained,
-    studio: RecordingSession,
+    session: RecordingSession,
     options: SelftestOptions,
     progress: Progress,
 ) -> TrialRunner:
     request = GradeRequest(
         "", rubrics=(path,), clock=options.clock, isolation=options.isolation, workers=options.jobs, seed=options.seed
     )
-    reference = _staged(explained.reference, exercise, studio, "reference")
+    reference = _staged(explained.reference, exercise, session, "reference")
     return TrialRunner(
-        studio=studio,
+        session=session,
         request=request,
         exercise=exercise,
         odometry=read_recording(request, [exercise]),
@@ -199,8 +199,8 @@ def _bench(  # noqa: PLR0913  each comes from another stage
     )
 
 
-def _staged(folder: Path | None, exercise: Exercise, studio: RecordingSession, name: str) -> Submission:
-    root = studio.folder / exercise.id / name
+def _staged(folder: Path | None, exercise: Exercise, session: RecordingSession, name: str) -> Submission:
+    root = session.folder / exercise.id / name
     root.mkdir(parents=True)
     return stage_submission(str(folder), exercise.files, root)
 
@@ -226,7 +226,7 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
     reference = bench.measure_reference()
     template = None
     if explained.template is not None:
-        template = bench.standing(_staged(explained.template, exercise, bench.studio, "template"))
+        template = bench.standing(_staged(explained.template, exercise, bench.session, "template"))
     # Without a right program nothing can be said about wrong ones.
     tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
     correct = tuple(_variants(bench, explained, options)) if reference.full else ()

@@ -39,7 +39,7 @@ class Scheduler:
     def __init__(self, now_ns: Callable[[], int], ask_for_time: Callable[[int | None], None]) -> None:
         self._now_ns = now_ns
         self._ask_for_time = ask_for_time
-        self._strands: dict[int, GreenThread] = {}
+        self._green_threads: dict[int, GreenThread] = {}
         self._parked: list[GreenThread] = []
         self._runnable: deque[GreenThread] = deque()
         self._round = 0
@@ -47,18 +47,20 @@ class Scheduler:
 
     def _adopt(self) -> GreenThread:
         """Make the calling thread a strand that holds the baton."""
-        strand = GreenThread()
-        strand.native = originals.get_native_id()
-        self._strands[originals.get_ident()] = strand
-        return strand
+        green_thread = GreenThread()
+        green_thread.native = originals.get_native_id()
+        self._green_threads[originals.get_ident()] = green_thread
+        return green_thread
 
     def mine(self) -> GreenThread | None:
         """Return the calling thread's strand, or None for a thread that is not the student's."""
-        return self._strands.get(originals.get_ident())
+        return self._green_threads.get(originals.get_ident())
 
     def running_thread(self) -> int | None:
         """Return the identifier of the thread that holds the baton."""
-        return next((ident for ident, strand in self._strands.items() if strand is self.current), None)
+        return next(
+            (ident for ident, green_thread in self._green_threads.items() if green_thread is self.current), None
+        )
 
     def running_native_thread(self) -> int:
         """Return the system's number of the thread that holds the baton."""
@@ -66,7 +68,7 @@ class Scheduler:
 
     def has_others(self) -> bool:
         """Return whether the program has more than one thread."""
-        return len(self._strands) > 1
+        return len(self._green_threads) > 1
 
     def progress(self) -> None:
         """Note that something happened which may have made a wait set ready."""
@@ -79,64 +81,69 @@ class Scheduler:
             deadline_ns: Virtual time at which to go on at the latest.
             polls: Whether to go on after anything happened, to look again.
         """
-        strand = self.mine()
-        if strand is None:
+        green_thread = self.mine()
+        if green_thread is None:
             originals.sleep(0.001)
             return
-        strand.deadline_ns, strand.polls, strand.polled_in, strand.parked = deadline_ns, polls, self._round, True
-        self._parked.append(strand)
+        green_thread.deadline_ns, green_thread.polls, green_thread.polled_in, green_thread.parked = (
+            deadline_ns,
+            polls,
+            self._round,
+            True,
+        )
+        self._parked.append(green_thread)
         try:
-            self._hand_on(strand)
+            self._hand_on(green_thread)
         except BaseException:
-            if strand.parked:  # a signal handler raised while this strand looked for what runs next: it goes on
-                self._parked.remove(strand)
-                strand.parked = False
+            if green_thread.parked:  # a signal handler raised while this strand looked for what runs next: it goes on
+                self._parked.remove(green_thread)
+                green_thread.parked = False
             raise
 
-    def wake(self, strand: GreenThread) -> None:
+    def wake(self, green_thread: GreenThread) -> None:
         """Make a parked strand runnable."""
-        if strand.parked:
-            self._parked.remove(strand)
-            strand.parked = False
-            self._runnable.append(strand)
+        if green_thread.parked:
+            self._parked.remove(green_thread)
+            green_thread.parked = False
+            self._runnable.append(green_thread)
             self._round += 1
 
     def start(self, body: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[[], None]:
         """Register a new strand at once, and return the function that its thread must run."""
-        strand = GreenThread()
-        self._runnable.append(strand)
+        green_thread = GreenThread()
+        self._runnable.append(green_thread)
         self._round += 1
 
         def run() -> None:
-            strand.gate.acquire()
-            self._strands[originals.get_ident()] = strand
-            strand.native = originals.get_native_id()
+            green_thread.gate.acquire()
+            self._green_threads[originals.get_ident()] = green_thread
+            green_thread.native = originals.get_native_id()
             try:
                 body(*args, **kwargs)
             finally:
-                self._end(strand)
+                self._end(green_thread)
 
         return run
 
-    def _end(self, strand: GreenThread) -> None:
-        self._strands.pop(originals.get_ident(), None)
+    def _end(self, green_thread: GreenThread) -> None:
+        self._green_threads.pop(originals.get_ident(), None)
         self._round += 1
         following = self._choose()
         self.current = following
         following.gate.release()
 
-    def _hand_on(self, strand: GreenThread) -> None:
+    def _hand_on(self, green_thread: GreenThread) -> None:
         following = self._choose()
-        if following is strand:
+        if following is green_thread:
             return
         self.current = following
         following.gate.release()
         try:
-            strand.gate.acquire()
+            green_thread.gate.acquire()
         except BaseException:
             # A signal handler raised in the main thread while it was parked: it may go on only with the baton.
-            self.wake(strand)
-            strand.gate.acquire()
+            self.wake(green_thread)
+            green_thread.gate.acquire()
             raise
 
     def _choose(self) -> GreenThread:
@@ -145,13 +152,13 @@ class Scheduler:
             if self._runnable:
                 self._round += 1
                 return self._runnable.popleft()
-            strand = self._poller()
-            if strand is None and (strand := self._due()) is not None:
+            green_thread = self._poller()
+            if green_thread is None and (green_thread := self._due()) is not None:
                 self._round += 1
-            if strand is not None:
-                self._parked.remove(strand)
-                strand.parked = False
-                return strand
+            if green_thread is not None:
+                self._parked.remove(green_thread)
+                green_thread.parked = False
+                return green_thread
             self._ask_for_time(min((s.deadline_ns for s in self._parked if s.deadline_ns is not None), default=None))
             self._round += 1
 

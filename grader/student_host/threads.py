@@ -66,25 +66,25 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             return self._wait(timeouts.deadline_ns(timeout))
 
         def _wait(self, deadline_ns: int | None) -> bool:
-            strand = scheduler.mine()
-            if strand is None:
+            green_thread = scheduler.mine()
+            if green_thread is None:
                 return self._wait_from_outside()
-            self._waiters.append(strand)
+            self._waiters.append(green_thread)
             try:
-                while strand in self._waiters and not timeouts.over(deadline_ns):
+                while green_thread in self._waiters and not timeouts.over(deadline_ns):
                     scheduler.pause(deadline_ns)
             except BaseException:
-                self._leave(strand)
+                self._leave(green_thread)
                 raise
-            if strand in self._waiters:
-                self._waiters.remove(strand)
+            if green_thread in self._waiters:
+                self._waiters.remove(green_thread)
                 return False
             return True
 
-        def _leave(self, strand: GreenThread) -> None:
+        def _leave(self, green_thread: GreenThread) -> None:
             """Stop waiting; a lock that was handed over in the same moment is passed on."""
-            if strand in self._waiters:
-                self._waiters.remove(strand)
+            if green_thread in self._waiters:
+                self._waiters.remove(green_thread)
             else:
                 self.release()
 
@@ -173,23 +173,23 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
             run_thread(self)
         finally:
             self._grader_finished = True  # type: ignore[attr-defined]
-            for strand in getattr(self, "_grader_joiners", ()):
-                scheduler.wake(strand)
+            for green_thread in getattr(self, "_grader_joiners", ()):
+                scheduler.wake(green_thread)
 
     def join(self: threading.Thread, timeout: float | None = None) -> None:
         if self is threading.current_thread() or not self._started.is_set():  # type: ignore[attr-defined]
             join_thread(self, timeout)  # raises as the original does
-        strand = scheduler.mine()
+        green_thread = scheduler.mine()
         deadline_ns = timeouts.deadline_ns(None if timeout is None else max(timeout, 0))
-        while strand is not None and not getattr(self, "_grader_finished", False):
+        while green_thread is not None and not getattr(self, "_grader_finished", False):
             if timeouts.over(deadline_ns):
                 return
             joiners: list[GreenThread] = self.__dict__.setdefault("_grader_joiners", [])
-            joiners.append(strand)
+            joiners.append(green_thread)
             try:
                 scheduler.pause(deadline_ns)
             finally:
-                joiners.remove(strand)
+                joiners.remove(green_thread)
         join_thread(self)
 
     threading.Thread._bootstrap_inner = bootstrap_inner  # type: ignore[attr-defined]

@@ -139,7 +139,7 @@ class ScriptedStudent:
         self.missing: Any = []
         self._written: list[str] = []
         self._answer: dict[str, Any] | None = None
-        self._matching = False
+        self._discovery = False
         self._program = program(self, world)
         self._begun = False
         self.cost_ns = 0
@@ -163,15 +163,15 @@ class ScriptedStudent:
 
     def tell(self, answer: dict[str, Any]) -> None:
         """Take an answer of the conductor."""
-        self._matching = "match" in answer
-        if not self._matching:
+        self._discovery = "match" in answer
+        if not self._discovery:
             self._answer = answer
         self.heard.append(answer)
 
     def report(self) -> dict[str, Any] | None:
         """Return the next report."""
-        if self._matching:
-            self._matching = False
+        if self._discovery:
+            self._discovery = False
             return {"kind": "matched", "missing": self.missing}
         answer, self._answer = self._answer, None
         try:

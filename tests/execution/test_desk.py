@@ -12,10 +12,10 @@ from std_srvs.srv import Trigger
 from grader.core.limits import Limits
 from grader.core.trace import Mark, Request, Response
 from grader.execution.ending import is_free_exit, is_normal_stop
-from grader.execution.exchanges import Call, PlannedCalls, PlannedServer
+from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
 from grader.execution.service_ends import Arrived
 from grader.execution.service_peers import ServicePeers
-from grader.execution.stimuli import Answer, Ask
+from grader.execution.stimuli import Ask, Respond
 from grader.execution.trace_recorder import TraceRecorder
 
 #: ROS loads a type's support when it is first used, and imports what Python would rather see gone.
@@ -63,15 +63,15 @@ class Run:
     def __init__(self, *, nodes=("/node",), limits=None, **planned):
         self.ends = Ends()
         self.due = []
-        self.tape = TraceRecorder(limits or Limits())
+        self.recorder = TraceRecorder(limits or Limits())
         made = plan(limits=limits or Limits(), **planned)
-        self.desk = ServicePeers(made, self.ends, self.tape, nodes=lambda: nodes, later=self.due.append)
+        self.services = ServicePeers(made, self.ends, self.recorder, nodes=lambda: nodes, later=self.due.append)
 
     def ask(self, *headers, at_ns=0):
         """Let requests come that were sent in the order of their headers' numbers."""
         self.ends.requests = [Arrived(NAME, header, Trigger.Request(), header=header) for header in headers]
-        came = self.desk.take()
-        self.desk.write_down(at_ns)
+        came = self.services.take()
+        self.services.write_down(at_ns)
         return came
 
 
@@ -89,12 +89,12 @@ def test_requests_are_answered_in_the_order_in_which_they_were_sent():
     """Whatever order they arrive in, and each in its time."""
     run = Run()
     asked = server("a", "b", delay_ns=5)
-    run.desk.serve(0, asked)
+    run.services.serve(0, asked)
     assert run.ask(3, 2, at_ns=10) == {f"request {NAME}": 2}
-    assert run.due == [Answer(15, asked, 1), Answer(15, asked, 2)]
-    assert all(run.desk.answer(15, due.server, due.number) for due in run.due)
+    assert run.due == [Respond(15, asked, 1), Respond(15, asked, 2)]
+    assert all(run.services.answer(15, due.server, due.number) for due in run.due)
     assert run.ends.done[1:] == ["answer 2 a", "answer 3 b"]
-    kinds = [(type(o), o.t_ns, o.number) for o in run.tape.observations[1:]]
+    kinds = [(type(o), o.t_ns, o.number) for o in run.recorder.observations[1:]]
     assert kinds == [(Request, 10, 1), (Request, 10, 2), (Response, 15, 1), (Response, 15, 2)]
 
 
@@ -102,26 +102,26 @@ def test_a_server_that_has_given_its_answers_takes_nothing_more():
     """The request that comes too late is none that it has seen."""
     run = Run()
     asked = server("a", answers=1)
-    run.desk.serve(0, asked)
+    run.services.serve(0, asked)
     run.ask(1, 2)
     assert len(run.due) == 1
-    assert run.desk.done() == []
-    run.desk.answer(0, run.due[0].server, run.due[0].number)
-    assert run.desk.done() == [asked]
-    run.desk.dismiss(7, asked)
-    assert run.tape.observations[-1] == Mark(7, "server_stops", NAME)
-    assert not run.desk.serves(NAME, KIND)
+    assert run.services.done() == []
+    run.services.answer(0, run.due[0].server, run.due[0].number)
+    assert run.services.done() == [asked]
+    run.services.dismiss(7, asked)
+    assert run.recorder.observations[-1] == Mark(7, "server_stops", NAME)
+    assert not run.services.serves(NAME, KIND)
 
 
 def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered():
     """A second dismissal does nothing."""
     run = Run()
     asked = server("a", delay_ns=5)
-    run.desk.serve(0, asked)
+    run.services.serve(0, asked)
     run.ask(1)
-    run.desk.dismiss(3, asked)
-    run.desk.dismiss(4, asked)
-    assert not run.desk.answer(5, run.due[0].server, run.due[0].number)
+    run.services.dismiss(3, asked)
+    run.services.dismiss(4, asked)
+    assert not run.services.answer(5, run.due[0].server, run.due[0].number)
     assert run.ends.done == [f"serve {NAME} {KIND}", f"dismiss {NAME}"]
 
 
@@ -130,14 +130,16 @@ def test_calls_go_from_client_to_client_and_are_paired_with_their_answers():
     run = Run()
     several = calls(clients=2, requests=({},) * 4)
     for index in range(4):
-        run.desk.call(index, Call(several, index))
+        run.services.call(index, PlannedCall(several, index))
     assert run.ends.done == [f"meet {NAME} 1", f"meet {NAME} 2", *(f"ask {NAME} {n}" for n in (1, 2, 1, 2))]
-    assert run.desk.expected({f"response {NAME}": 9, "response /other": 1, "topic /a": 1}) == {f"response {NAME}": 4}
+    assert run.services.expected({f"response {NAME}": 9, "response /other": 1, "topic /a": 1}) == {
+        f"response {NAME}": 4
+    }
     answers = [(6, 2, "last"), (3, 1, "first"), (3, 1, "twice")]
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message=text), None, n, s) for s, n, text in answers]
-    run.desk.take()
-    run.desk.write_down(9)
-    found = [(r.number, r.client, r.value["message"]) for r in run.tape.observations if isinstance(r, Response)]
+    run.services.take()
+    run.services.write_down(9)
+    found = [(r.number, r.client, r.value["message"]) for r in run.recorder.observations if isinstance(r, Response)]
     assert found == [(4, 2, "last"), (1, 1, "first")]
 
 
@@ -145,50 +147,50 @@ def test_calls_go_from_client_to_client_and_are_paired_with_their_answers():
 def test_a_service_of_the_only_node_has_a_name_when_there_is_one(nodes, asked):
     """Calls wait until then."""
     run = Run(nodes=nodes)
-    assert run.desk.resolved("~/get_state") == asked
-    assert run.desk.meet(calls("~/get_state")) == asked
+    assert run.services.resolved("~/get_state") == asked
+    assert run.services.meet(calls("~/get_state")) == asked
 
 
 def test_calls_wait_for_their_server():
     """All that are due meanwhile follow in their order."""
     run = Run()
     waiting = calls(requests=({}, {}))
-    due = [Ask(at, Call(waiting, at)) for at in (0, 1)]
+    due = [Ask(at, PlannedCall(waiting, at)) for at in (0, 1)]
     for one in due:
-        run.desk.wait(one)
-    assert run.desk.ready(lambda _: False) == []
-    assert run.desk.ready(lambda _: True) == due
-    assert run.desk.ready(lambda _: True) == []
+        run.services.wait(one)
+    assert run.services.ready(lambda _: False) == []
+    assert run.services.ready(lambda _: True) == due
+    assert run.services.ready(lambda _: True) == []
 
 
 def test_what_follows_an_accepted_request_is_sent_in_its_time():
     """And nothing follows a refused one."""
     run = Run()
-    following = Call(calls("/second"), 0)
+    following = PlannedCall(calls("/second"), 0)
     for accepted in (False, True):
-        run.desk.call(0, Call(calls(), 0, ((5, following),)))
+        run.services.call(0, PlannedCall(calls(), 0, ((5, following),)))
         answer = Trigger.Response()
-        run.desk._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)
+        run.services._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)
         run.ends.responses = [Arrived(NAME, 0, answer, None, 1 + accepted, len(run.ends.done))]
-        run.desk.take()
-        run.desk.write_down(10)
+        run.services.take()
+        run.services.write_down(10)
     assert run.due == [Ask(15, following)]
 
 
 def test_more_requests_than_the_limit_end_the_recording():
     """They count like messages on a topic; the content of a large one is not looked at."""
     run = Run(limits=Limits(messages=3, message_bytes=64))
-    run.desk.serve(0, server())
+    run.services.serve(0, server())
     run.ask(*range(1, 6))
-    assert [type(o) for o in run.tape.observations] == [Mark, Request, Request, Request, Mark]
-    assert run.tape.full == f"more than 3 requests and responses of {NAME}: the rest was not looked at"
+    assert [type(o) for o in run.recorder.observations] == [Mark, Request, Request, Request, Mark]
+    assert run.recorder.full == f"more than 3 requests and responses of {NAME}: the rest was not looked at"
     run = Run(limits=Limits(message_bytes=64))
-    run.desk.call(0, Call(calls(), 0))
+    run.services.call(0, PlannedCall(calls(), 0))
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message="x" * 99), None, 1, 2)]
-    run.desk.take()
-    run.desk.write_down(0)
-    assert run.tape.observations[-1].value == {}
-    assert "larger than the limit" in run.tape.notes(())[0]
+    run.services.take()
+    run.services.write_down(0)
+    assert run.recorder.observations[-1].value == {}
+    assert "larger than the limit" in run.recorder.notes(())[0]
 
 
 @pytest.mark.parametrize(

@@ -36,9 +36,9 @@ def job(scenario):
 def recorded(recorder, clock, *scenarios):
     """Return what was heard, in order, and the traces at the end."""
     heard = []
-    studio = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
+    session = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), recorder, Path("nowhere"))
     jobs = {name: job(name) for name in scenarios}
-    traces = studio.record(jobs, clock, lambda step: None, lambda key, trace: heard.append((key, trace)))
+    traces = session.record(jobs, clock, lambda step: None, lambda key, trace: heard.append((key, trace)))
     return heard, traces
 
 
@@ -90,9 +90,9 @@ def test_all_recordings_of_a_submission_share_one_budget():
             budgets.extend(job.budget for job in jobs)
             yield from super().each(jobs, progress)
 
-    studio = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), Listening("a"), Path("nowhere"))
+    session = RecordingSession(*(None,) * (len(RecordingSession.__slots__) - 2), Listening("a"), Path("nowhere"))
     for budget_s in (20, 30):
-        studio.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
+        session.record({name: job(name) for name in "ab"}, AUTO, lambda step: None, budget_s=budget_s)
     first, second = budgets[:3], budgets[3:]
     assert [len(set(map(id, part))) for part in (first, second)] == [1, 1]
     assert [part[0].words.partition("more than ")[2] for part in (first, second)] == [

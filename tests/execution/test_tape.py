@@ -31,89 +31,89 @@ def graph(t_ns: int, nodes: int = 1, ends: int = 1) -> GraphSnapshot:
     )
 
 
-def marks(tape: TraceRecorder) -> list[tuple[int, str]]:
-    return [(o.t_ns, o.detail) for o in tape.observations if isinstance(o, Mark)]
+def marks(recorder: TraceRecorder) -> list[tuple[int, str]]:
+    return [(o.t_ns, o.detail) for o in recorder.observations if isinstance(o, Mark)]
 
 
 def test_messages_are_counted_on_each_topic():
     """Two topics below the limit together exceed nothing."""
-    tape = TraceRecorder(Limits(messages=3))
+    recorder = TraceRecorder(Limits(messages=3))
     for n in range(3):
-        tape.message(n, taken("/a"))
-        tape.message(n, taken("/b"))
-    assert not tape.full
-    tape.message(7, taken("/b"))
-    assert marks(tape) == [(7, f"more than 3 messages on /b: {REST}")]
-    assert len([o for o in tape.observations if isinstance(o, Message)]) == 6
+        recorder.message(n, taken("/a"))
+        recorder.message(n, taken("/b"))
+    assert not recorder.full
+    recorder.message(7, taken("/b"))
+    assert marks(recorder) == [(7, f"more than 3 messages on /b: {REST}")]
+    assert len([o for o in recorder.observations if isinstance(o, Message)]) == 6
 
 
 def test_the_size_of_all_messages_is_bounded():
     """Few large messages fill a trace as well."""
-    tape = TraceRecorder(Limits(traffic_bytes=2 * MIB))
+    recorder = TraceRecorder(Limits(traffic_bytes=2 * MIB))
     for n in range(3):
-        tape.message(n, taken(f"/t{n}", MIB))
-    assert marks(tape) == [(2, f"more than 2 MiB of messages: {REST}")]
+        recorder.message(n, taken(f"/t{n}", MIB))
+    assert marks(recorder) == [(2, f"more than 2 MiB of messages: {REST}")]
 
 
 def test_nothing_follows_the_first_limit():
     """One mark, and no message after it."""
-    tape = TraceRecorder(Limits(messages=1))
+    recorder = TraceRecorder(Limits(messages=1))
     for n in range(10):
-        tape.message(n, taken())
-    tape.stop(11, "another limit")
-    assert len(tape.observations) == 2
-    assert len(marks(tape)) == 1
+        recorder.message(n, taken())
+    recorder.stop(11, "another limit")
+    assert len(recorder.observations) == 2
+    assert len(marks(recorder)) == 1
 
 
 def test_participants_are_bounded():
     """Each costs the grader's own node as much as a process."""
-    tape = TraceRecorder(Limits(participants=2))
-    assert tape.look(graph(1), participants=2)
-    assert not tape.look(graph(2, nodes=2), participants=3)
-    assert marks(tape) == [(2, f"more than 2 DDS participants: {REST}")]
+    recorder = TraceRecorder(Limits(participants=2))
+    assert recorder.look(graph(1), participants=2)
+    assert not recorder.look(graph(2, nodes=2), participants=3)
+    assert marks(recorder) == [(2, f"more than 2 DDS participants: {REST}")]
 
 
 @pytest.mark.parametrize("size", [{"nodes": module.ENDPOINTS + 1}, {"ends": module.ENDPOINTS + 1}])
 def test_a_graph_beyond_all_measure_ends_the_recording(size):
     """It is not even kept."""
-    tape = TraceRecorder(Limits())
-    assert not tape.look(graph(5, **size), participants=1)
-    assert "at once" in tape.full
-    assert tape.graph == GraphSnapshot(0, (), ())
+    recorder = TraceRecorder(Limits())
+    assert not recorder.look(graph(5, **size), participants=1)
+    assert "at once" in recorder.full
+    assert recorder.graph == GraphSnapshot(0, (), ())
 
 
 def test_a_graph_that_never_rests_ends_the_recording(monkeypatch):
     """Snapshots add up."""
     monkeypatch.setattr(module, "GRAPH_PARTS", 20)
-    tape = TraceRecorder(Limits())
+    recorder = TraceRecorder(Limits())
     for n in range(30):
-        tape.look(graph(n, nodes=1 + n % 2), participants=1)
-    assert "too often" in tape.full
-    assert len([o for o in tape.observations if isinstance(o, GraphSnapshot)]) < 10
+        recorder.look(graph(n, nodes=1 + n % 2), participants=1)
+    assert "too often" in recorder.full
+    assert len([o for o in recorder.observations if isinstance(o, GraphSnapshot)]) < 10
 
 
 def test_a_graph_that_stays_the_same_is_taken_down_once():
     """Only changes are evidence."""
-    tape = TraceRecorder(Limits())
-    assert [tape.look(graph(n), participants=1) for n in range(3)] == [True, False, False]
+    recorder = TraceRecorder(Limits())
+    assert [recorder.look(graph(n), participants=1) for n in range(3)] == [True, False, False]
 
 
 def test_of_faults_and_offers_only_the_first_are_kept():
     """A thread that raises for ever fills no trace."""
-    tape = TraceRecorder(Limits())
+    recorder = TraceRecorder(Limits())
     for n in range(5000):
-        tape.add(Fault(n, "a.py", FaultKind.EXCEPTION, "x"), Offer(n, "a.py", "service", f"/s{n}", "x"))
-    kinds = [type(o) for o in tape.observations]
+        recorder.add(Fault(n, "a.py", FaultKind.EXCEPTION, "x"), Offer(n, "a.py", "service", f"/s{n}", "x"))
+    kinds = [type(o) for o in recorder.observations]
     assert (kinds.count(Fault), kinds.count(Offer)) == (module.FAULTS, module.OFFERS)
 
 
 @given(st.lists(st.text(max_size=2000), max_size=300), st.lists(st.text(max_size=2000), max_size=100))
 def test_notes_are_few_short_and_told_once(own, others):
     """The limit that ended the recording comes first."""
-    tape = TraceRecorder(Limits())
-    tape.note(*own)
-    tape.stop(0, "enough")
-    notes = tape.notes(others)
+    recorder = TraceRecorder(Limits())
+    recorder.note(*own)
+    recorder.stop(0, "enough")
+    notes = recorder.notes(others)
     assert notes[0] == f"enough: {REST}"
     assert len(notes) == len(set(notes)) <= module.NOTES
     assert all(len(note) <= module.NOTE_CHARACTERS for note in notes)
@@ -122,8 +122,8 @@ def test_notes_are_few_short_and_told_once(own, others):
 @pytest.mark.parametrize(("count", "at_ns", "floods"), [(101, 0, True), (100, 0, False), (1100, 10**9, False)])
 def test_a_flood_is_told_by_the_time_it_is(count, at_ns, floods):
     """A burst is none, and neither is a thousand a second; topics are counted each for itself."""
-    tape = TraceRecorder(Limits())
+    recorder = TraceRecorder(Limits())
     for _ in range(count):
-        tape.message(at_ns, taken("/a"))
-        tape.message(at_ns, taken("/b"))
-    assert tape.floods(at_ns) is floods
+        recorder.message(at_ns, taken("/a"))
+        recorder.message(at_ns, taken("/b"))
+    assert recorder.floods(at_ns) is floods

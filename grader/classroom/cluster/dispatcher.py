@@ -57,7 +57,7 @@ class Dispatcher:
 
     Args:
         client: Speaks to the cluster.
-        fleet: Its workers.
+        worker_pool: Its workers.
         jobs: Submissions at a time; None for as many as the workers have threads.
         terms: What the class is graded with.
         hear: Hears which step of which submission begins.
@@ -65,10 +65,10 @@ class Dispatcher:
     """
 
     def __init__(  # noqa: PLR0913  each is needed for as long as the batch runs
-        self, client: Client, fleet: WorkerPool, jobs: int | None, terms: Terms, hear: Hear, topic: str
+        self, client: Client, worker_pool: WorkerPool, jobs: int | None, terms: Terms, hear: Hear, topic: str
     ) -> None:
         self._client = client
-        self._fleet = fleet
+        self._worker_pool = worker_pool
         self._jobs = jobs
         self._terms = pack(terms)
         self._hear = hear
@@ -125,25 +125,25 @@ class Dispatcher:
 
     def _send_due(self, wanted: Sequence[str]) -> Generator[Attempt, None, None]:
         """Send what the workers have room for; yield what comes at once of submissions that cannot be sent."""
-        fit = self._fleet.look()
+        fit = self._worker_pool.look()
         self._call_back_stranded(fit.keys())
         most = self._jobs or max(1, sum(fit.values()))
         while self._waiting and len(self._under_way) < most:
             sending = self._waiting.popleft()
-            errand = errand_of(sending.task, wanted)
-            if isinstance(errand, Attempt):
-                yield errand
+            job = errand_of(sending.task, wanted)
+            if isinstance(job, Attempt):
+                yield job
             else:
-                self._send(sending, pack(errand), self._fleet.only(fit), near=bool(fit))
+                self._send(sending, pack(job), self._worker_pool.only(fit), near=bool(fit))
 
-    def _send(self, sending: _Sending, errand: bytes, only: tuple[str, ...], *, near: bool) -> None:
+    def _send(self, sending: _Sending, job: bytes, only: tuple[str, ...], *, near: bool) -> None:
         self._count += 1
         key = f"{self._topic}-{self._count}"  # never used twice: nothing is taken for a result of something else
         sending.tries += 1
         sending.only = only
         with self._lock:
             self._names.add(sending.task.name)
-        sending.parcels = [self._parcel(data, near=near) for data in (self._terms, errand)]
+        sending.parcels = [self._parcel(data, near=near) for data in (self._terms, job)]
         sending.future = self._client.submit(
             remote.grade,
             grader.__version__,
@@ -198,18 +198,18 @@ class Dispatcher:
         answer = answer_in(data, _CLUSTER)
         if not answer.unfit:
             return taken_in(sending.task, answer)
-        self._fleet.rule_out(answer.machine, answer.unfit, answer.hint)
+        self._worker_pool.rule_out(answer.machine, answer.unfit, answer.hint)
         return self._once_more(sending, f"{answer.machine}: {answer.unfit}", answer.hint)
 
     def _erred(self, sending: _Sending, error: BaseException | None) -> Attempt | None:
         if isinstance(error, KilledWorker):
             problem = f"{error.allowed_failures + 1} workers of the cluster ended while they graded it"
             return failed(sending.task, problem, "look at what ended them, such as a limit of memory")
-        self._fleet.forget(self._fleet.look())  # one of them may have become unable to grade
+        self._worker_pool.forget(self._worker_pool.look())  # one of them may have become unable to grade
         return self._once_more(sending, f"{_CLUSTER}: {type(error).__name__}")
 
     def _once_more(self, sending: _Sending, problem: str, hint: str = "") -> Attempt | None:
-        if sending.tries < TRIES and self._fleet.look():
+        if sending.tries < TRIES and self._worker_pool.look():
             return None
         return failed(sending.task, problem, *filter(None, [hint]))
 
@@ -236,23 +236,23 @@ class ClusterScheduler:
     def __init__(self, client: Client, jobs: int | None, warn: Callable[[str], None]) -> None:
         self._client = client
         self._jobs = jobs
-        self._fleet = WorkerPool(client, grader.__version__, warn)
+        self._worker_pool = WorkerPool(client, grader.__version__, warn)
 
     def prepare(self, isolation: str) -> Sequence[str]:
         """Ask every worker whether it can grade; see `Scheduler`."""
-        return self._fleet.inspect(isolation)
+        return self._worker_pool.inspect(isolation)
 
     def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
         """Yield what comes of each task; see `Scheduler`."""
         if not tasks:
             return
-        desk = Dispatcher(
-            self._client, self._fleet, self._jobs, terms_of(tasks[0]), hear, f"grade-{secrets.token_hex(8)}"
+        dispatcher = Dispatcher(
+            self._client, self._worker_pool, self._jobs, terms_of(tasks[0]), hear, f"grade-{secrets.token_hex(8)}"
         )
         try:
-            yield from desk.serve(tasks)
+            yield from dispatcher.serve(tasks)
         finally:
-            desk.close()
+            dispatcher.close()
 
 
 #: Longest wait for a scheduler to answer, and for it to say goodbye.

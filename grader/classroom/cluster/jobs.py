@@ -56,12 +56,12 @@ def fitness(isolation: str, machine: str) -> Fitness:
     return Fitness(machine, remarks=tuple(remarks))
 
 
-def fulfil(terms: Terms, errand: GradingJob, machine: str, hear: Callable[[str], None]) -> JobResult:
+def fulfil(terms: Terms, job: GradingJob, machine: str, hear: Callable[[str], None]) -> JobResult:
     """Grade a submission, in a process of its own and by this machine's own choice of sandbox.
 
     Args:
         terms: What the class is graded with.
-        errand: The submission.
+        job: The submission.
         machine: What to call this machine.
         hear: Hears which step begins; whatever it raises ends the grading.
     """
@@ -71,15 +71,15 @@ def fulfil(terms: Terms, errand: GradingJob, machine: str, hear: Callable[[str],
         return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:
         with _alone() if _one_at_a_time(choice) else nullcontext(), scratch_folder() as scratch:
-            return _graded(terms, errand, scratch, machine, hear)
+            return _graded(terms, job, scratch, machine, hear)
     except GraderError as error:
         return failure(machine, error.message, error.hint)
     except OSError as error:
         return failure(machine, f"the submission cannot be laid out or read back: {error.strerror}")
 
 
-def _graded(terms: Terms, errand: GradingJob, scratch: Path, machine: str, hear: Callable[[str], None]) -> JobResult:
-    task = lay_out(terms, errand, scratch)
+def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, hear: Callable[[str], None]) -> JobResult:
+    task = lay_out(terms, job, scratch)
     here = LocalScheduler(1, folder=_start(terms, scratch))
     with closing(here.run([task], lambda _, step: hear(step))) as attempts:
         attempt = next(attempts)
@@ -102,7 +102,7 @@ def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
     return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
 
-def lay_out(terms: Terms, errand: GradingJob, scratch: Path) -> Task:
+def lay_out(terms: Terms, job: GradingJob, scratch: Path) -> Task:
     """Write what was sent into an empty folder, and return the task to grade it.
 
     Files get the relative paths that they have where the class is graded, so that reports call them the same.
@@ -118,16 +118,16 @@ def lay_out(terms: Terms, errand: GradingJob, scratch: Path) -> Task:
     for name, content in terms.recording:
         _write(start, str(PurePosixPath(bag, os.fsdecode(name))), content, scratch)
     collected = scratch / "collected"
-    collected.write_bytes(errand.collected)
+    collected.write_bytes(job.collected)
     return Task(
-        name=errand.name,
-        label=os.fsdecode(errand.label),
-        submission=Path(os.fsdecode(errand.path)),
+        name=job.name,
+        label=os.fsdecode(job.label),
+        submission=Path(os.fsdecode(job.path)),
         into=scratch / "result",
         exercises=terms.exercises,
         rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
         odom_bag=Path(bag) if bag else None,
-        conditions=replace(terms.conditions, variants=errand.variants, seed=errand.seed),
+        conditions=replace(terms.conditions, variants=job.variants, seed=job.seed),
         # A cluster is kept busy by submissions, one a thread.
         workers=1,
         standalone=terms.standalone,
@@ -187,13 +187,13 @@ async def inspect(isolation: str, dask_worker: Worker) -> bytes:
     return pack(await asyncio.to_thread(_fitness, isolation, _machine(dask_worker)))
 
 
-def grade(version: str, terms: bytes, errand: bytes, topic: str) -> bytes:
+def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
     """Grade a submission.
 
     Args:
         version: Version of the grader that asks.
         terms: What the class is graded with.
-        errand: The submission.
+        job: The submission.
         topic: Where steps are told.
     """
     worker = get_worker()
@@ -209,7 +209,7 @@ def grade(version: str, terms: bytes, errand: bytes, topic: str) -> bytes:
         worker.log_event(topic, {NAME: what.name, STEP: step})
 
     try:
-        what = unpack(errand, GradingJob)
+        what = unpack(job, GradingJob)
         return pack(fulfil(unpack(terms, Terms), what, machine, hear))
     except _UnwantedError:
         return b""

@@ -28,8 +28,8 @@ from grader.judging.output import Output, printed_lines, shape_of, student_recor
 from grader.judging.service_calls import (
     LATENESS_NS,
     Call,
+    CallKind,
     Episode,
-    Kind,
     ResponseReader,
     calls_of,
     complaints,
@@ -206,9 +206,9 @@ class WaitsForService:
 #: A client that has not asked again for so long does not ask again.
 _ASKS_AGAIN_NS = 5 * NS_PER_S
 _SAID = {
-    Kind.FAILED: "a response without success",
-    Kind.UNREADABLE: "an answer without a number",
-    Kind.UNANSWERED: "a request that got no response",
+    CallKind.FAILED: "a response without success",
+    CallKind.UNREADABLE: "an answer without a number",
+    CallKind.UNANSWERED: "a request that got no response",
 }
 
 
@@ -252,7 +252,9 @@ class ReactsToResponses:
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)
-        sides = {"above": (Kind.GOOD,), "at_or_below": (Kind.LOW,), "both": (Kind.GOOD, Kind.LOW)}[self.side]
+        sides = {"above": (CallKind.GOOD,), "at_or_below": (CallKind.LOW,), "both": (CallKind.GOOD, CallKind.LOW)}[
+            self.side
+        ]
         mine = [e for e in episodes if e.kind in sides]
         if not {e.kind for e in mine} >= set(sides):
             return _not_reached(trace, self.process, self.service, episodes)
@@ -260,7 +262,7 @@ class ReactsToResponses:
         wrong = [(e, said) for e in mine if (said := self._wrong(e, episodes))]
         if not wrong:
             return self._right(trace, mine, evidence)
-        if not student_records(trace, self.process) or all(e.kind is Kind.LOW for e, _ in wrong):
+        if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
             printed = self._by_printing(mine, episodes)
             if printed:
                 return partly(f"{self.process}: {printed}", evidence, hint=LOGGER_HINT)
@@ -268,10 +270,10 @@ class ReactsToResponses:
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
         """Return what is wrong with the reaction to a response; empty if nothing is."""
-        if episode.kind is Kind.LOW:
+        if episode.kind is CallKind.LOW:
             return "" if complaints(episode.outputs) else "no record of severity WARN"
         before = episodes[episode.place - 2] if episode.place > 1 else None
-        late = before is not None and before.kind is not Kind.GOOD
+        late = before is not None and before.kind is not CallKind.GOOD
         # a client that looks at an answer when it asks again warns then about the one before
         early = () if late else episode.awaiting
         warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
@@ -288,8 +290,8 @@ class ReactsToResponses:
 
     def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
         """Return that warnings are printed: lines that come after low numbers only; empty if they are not."""
-        good = {s for e in episodes if e.kind is Kind.GOOD for s in e.shapes}
-        low = [e for e in mine if e.kind is Kind.LOW]
+        good = {s for e in episodes if e.kind is CallKind.GOOD for s in e.shapes}
+        low = [e for e in mine if e.kind is CallKind.LOW]
         told = [_lines(e.outputs, good) for e in low]
         if not low or not all(told):
             return ""
@@ -304,8 +306,8 @@ class ReactsToResponses:
 
     def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, Any]) -> Finding:
         episode, said = wrong[0]
-        rule = "goes on" if episode.kind is Kind.GOOD else "warns"
-        side = "above" if episode.kind is Kind.GOOD else "at or below"
+        rule = "goes on" if episode.kind is CallKind.GOOD else "warns"
+        side = "above" if episode.kind is CallKind.GOOD else "at or below"
         reason = (
             f"{moment(episode.start_ns)}, {self.process}: {said} after {number(episode.number or 0.0)}, expected that "
         )
@@ -317,11 +319,11 @@ class ReactsToResponses:
 
     def _hint(self, wrong: Sequence[tuple[Episode, str]]) -> str:
         kinds = {e.kind for e, _ in wrong}
-        if kinds == {Kind.LOW} and all(e.number == self.threshold for e, _ in wrong):
+        if kinds == {CallKind.LOW} and all(e.number == self.threshold for e, _ in wrong):
             return (
                 f"{number(self.threshold)} itself is not above {number(self.threshold)}: compare with > and not with >="
             )
-        if kinds == {Kind.LOW}:
+        if kinds == {CallKind.LOW}:
             return f"at or below {number(self.threshold)}, write self.get_logger().warn(...) and do not go on"
         return ""
 
@@ -364,7 +366,7 @@ class NoGoWithoutAnswer:
         if not episodes:
             return _not_asked(trace, self.process, self.service)
         useless = [e for e in episodes if e.kind in _SAID]
-        if not useless or not any(e.kind is Kind.GOOD for e in episodes):
+        if not useless or not any(e.kind is CallKind.GOOD for e in episodes):
             return _not_reached(trace, self.process, self.service, episodes)
         going = self._going(trace, episodes)
         evidence = {"useless": [e.kind.value for e in useless], "goes_on_with": sorted(going)[:5]}
@@ -381,8 +383,8 @@ class NoGoWithoutAnswer:
 
     def _going(self, trace: Trace, episodes: Sequence[Episode]) -> frozenset[str]:
         """Return the shapes of what is written only when the client goes on."""
-        good = [e for e in episodes if e.kind is Kind.GOOD]
-        low = [e for e in episodes if e.kind is Kind.LOW]
+        good = [e for e in episodes if e.kind is CallKind.GOOD]
+        low = [e for e in episodes if e.kind is CallKind.LOW]
         shapes = frozenset.intersection(*(e.shapes for e in good))
         shapes -= shapes_before(trace, self.process, self.service, cautious=not low)
         if low:
@@ -393,7 +395,7 @@ class NoGoWithoutAnswer:
     def _due(self, episode: Episode, episodes: Sequence[Episode], found: Output, going: frozenset[str]) -> bool:
         """Return whether what is written at the instant of asking still belongs to the good answer before."""
         before = episodes[episode.place - 2] if episode.place > 1 else None
-        if before is None or before.kind is not Kind.GOOD or found.t_ns > episode.asked_ns:
+        if before is None or before.kind is not CallKind.GOOD or found.t_ns > episode.asked_ns:
             return False
         return not any(shape_of(o.text) in going for o in before.sure)
 
@@ -440,8 +442,8 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
         return faulted(fault, f"{asked} and did not get to the answer in question")
     ended = trace.marks("exited", process)
     stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
-    if ended or stopped or last.kind is Kind.UNANSWERED:
-        why = "waits for a response that never comes" if last.kind is Kind.UNANSWERED else "then asked no more"
+    if ended or stopped or last.kind is CallKind.UNANSWERED:
+        why = "waits for a response that never comes" if last.kind is CallKind.UNANSWERED else "then asked no more"
         why = f"ended at {moment(ended[0].t_ns)}" if ended else why
         return not_met(f"{asked} and {why}; the answer in question never came", blocked_by="service_calls")
     raise HarnessError(f"{service}: no answer of the kind in question was sent")
