@@ -20,7 +20,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 
 SUBMISSIONS = Path(__file__).resolve().parent.parent / "tests" / "submissions"
@@ -51,7 +52,7 @@ def print_nothing(step: str) -> None:
     """Hear which step begins, and say nothing."""
 
 
-def judged(folder: str, exercises: tuple[str, ...], how: Request) -> dict[str, Any]:
+def judged(folder: str, exercises: tuple[str, ...], how: GradeRequest) -> dict[str, Any]:
     """Return what one folder was given: outcomes other than `met`, and why it went to the wall clock."""
     try:
         report = grade(replace(how, submission=str(SUBMISSIONS / folder), exercises=exercises), print_nothing)
@@ -66,7 +67,14 @@ def judged(folder: str, exercises: tuple[str, ...], how: Request) -> dict[str, A
 
 
 def run(  # noqa: PLR0913  one parameter a choice
-    mode: str, how: Request, expected: Mapping[str, Any], results: Results, path: Path, *, jobs: int, load: bool = False
+    mode: str,
+    how: GradeRequest,
+    expected: Mapping[str, Any],
+    results: Results,
+    path: Path,
+    *,
+    jobs: int,
+    load: bool = False,
 ) -> None:
     """Grade every folder that has no result under a mode, and write each result when it is there."""
     left = [folder for folder in expected if folder not in results.setdefault(mode, {})]
@@ -118,7 +126,7 @@ def main() -> None:
     chosen = {folder: entry for folder, entry in expected.items() if arguments.only in folder}
     for mode in arguments.modes:
         clock, _, load = mode.partition("-")
-        how = Request("", clock=clock)
+        how = GradeRequest("", clock=clock)
         run(mode, how, chosen, results, arguments.results, jobs=arguments.jobs, load=bool(load))
     table(expected, results)
 

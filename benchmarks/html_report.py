@@ -10,7 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.reporting.html.assets import bundle, shared_assets
 from grader.reporting.html.render import render_html
 
@@ -22,7 +23,7 @@ def main() -> None:
     """Print one line a submission."""
     submissions = sys.argv[1:] or [str(ROOT / "reference_solutions")]
     for submission in submissions:
-        report = grade(Request(submission), lambda _: None)
+        report = grade(GradeRequest(submission), lambda _: None)
         started = time.perf_counter()
         render_html(report)
         first_ms = 1000 * (time.perf_counter() - started)

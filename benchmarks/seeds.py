@@ -13,7 +13,7 @@ from pathlib import Path
 
 from agreement import run, table, what_is_known
 
-from grader.app.grade import Request
+from grader.app.request import GradeRequest
 
 
 def seeds_in(text: str) -> range:
@@ -39,7 +39,7 @@ def main() -> None:
         and (not arguments.exercise or set(entry["graded"]) & set(arguments.exercise))
     }
     for seed in (seed for seeds in arguments.seeds for seed in seeds):
-        run(f"seed-{seed}", Request("", seed=seed), chosen, results, arguments.results, jobs=arguments.jobs)
+        run(f"seed-{seed}", GradeRequest("", seed=seed), chosen, results, arguments.results, jobs=arguments.jobs)
     table(expected, results)
 
 

@@ -27,7 +27,8 @@ from arena import Arena
 from attack_rubric import publisher_rubric
 from attack_runs import HERE, REFERENCE, Attack, read_attacks
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 
 NODE = "velocity_publisher"
@@ -113,7 +114,7 @@ def run(arena: Arena, hostile: list[Attack], runs: int) -> tuple[list[Held], Cou
 def score_of(folder: Path, rubric: Path) -> str:
     """Grade once and return what it came to, in a word."""
     try:
-        report = grade(Request(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
+        report = grade(GradeRequest(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
     except GraderError as error:
         print(error.message, file=sys.stderr, flush=True)
         return "refused"

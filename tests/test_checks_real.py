@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
 from grader.rubrics.loader import read_rubric
@@ -35,7 +36,7 @@ def test_every_check_has_golden_traces_and_a_real_run(name):
 
 def outcomes(folder, rubric):
     """Grade a folder and return the outcome of each criterion by its check's name, with its reason."""
-    report = grade(Request(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
+    report = grade(GradeRequest(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
     verdicts = report.exercises[0].verdicts
     told = {v.id: v.reason for v in verdicts}
     return [(name, v.outcome.value) for name, v in zip(asked_in(REAL / rubric), verdicts, strict=True)], told

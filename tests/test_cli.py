@@ -51,7 +51,7 @@ def test_the_everyday_form_prints_the_text_report(run_session):
     assert result.exit_code == 0
     assert result.stdout.startswith("ada: 10 of 10 points\n")
     assert result.stderr == ""
-    assert run_session.requests == [session.Request(submission="ada")]
+    assert run_session.requests == [session.GradeRequest(submission="ada")]
 
 
 def test_every_option_reaches_the_session(run_session):
@@ -62,7 +62,7 @@ def test_every_option_reaches_the_session(run_session):
     result = grade(*options, "ada")
     assert result.exit_code == 0, result.output
     assert run_session.requests == [
-        session.Request(
+        session.GradeRequest(
             submission="ada",
             exercises=("b", "a"),
             rubrics=(Path("r1.yaml"), Path("r2.yaml")),

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import EarlyReports, Request, read_exercises
+from grader.app.grade import EarlyReports, read_exercises
+from grader.app.request import GradeRequest
 from grader.core.exercise import Outcome
 from grader.core.report import Environment
 from grader.core.submission import Run, StudentFile, Submission
 from grader.core.trace import ClockKind, Trace
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference_solutions"
-EXERCISES = read_exercises(Request("x"))
+EXERCISES = read_exercises(GradeRequest("x"))
 SCENARIOS = [(exercise.id, scenario.id) for exercise in EXERCISES for scenario in exercise.scenarios]
 
 

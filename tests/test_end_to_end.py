@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 
 ROOT = Path(__file__).resolve().parent.parent
 #: What these are told depends on where a loop stood when it was stopped.
@@ -52,7 +53,7 @@ def live():
 def test_a_submission_gets_what_it_is_worth(folder):
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = expected()[folder]
-    report = grade(Request(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
+    report = grade(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
     assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.
@@ -63,21 +64,21 @@ def test_a_submission_gets_what_it_is_worth(folder):
 
 def test_the_reference_solutions_score_full_on_the_virtual_clock():
     """All that the exercises ask can be done, and needs no wall clock."""
-    report = grade(Request(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
+    report = grade(GradeRequest(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
     assert outcomes(report) == {}
     assert (report.score, report.max_score, report.final) == (100, 100, True)
 
 
 def test_the_template_runs_and_earns_nothing_yet():
     """The baseline of the skeletons: no crash, no point, nothing undecided."""
-    report = grade(Request(str(ROOT / "student_template")), say_nothing)
+    report = grade(GradeRequest(str(ROOT / "student_template")), say_nothing)
     assert (report.score, report.final) == (0, True)
     assert [fault for exercise in report.exercises for fault in exercise.faults] == []
 
 
 def test_the_wall_clock_gives_the_same_verdict():
     """A correct publisher is correct on either clock; the report says which one it was."""
-    request = Request(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
+    request = GradeRequest(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
     report = grade(request, say_nothing)
     assert report.exercises[0].clock.value == "wall"
     lost = {i: o for i, o in outcomes(report).items() if o != "undecided"}  # a busy machine decides nothing

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE, SeedKey
 
 PROGRAM = str(Path(__file__).resolve().parent / "foreknowledge")
@@ -14,7 +15,7 @@ pytestmark = pytest.mark.ros
 
 def logged(key):
     """Return what the program gets for logging values that it never read."""
-    request = Request(PROGRAM, exercises=("two_node_communication",), seed_key=key)
+    request = GradeRequest(PROGRAM, exercises=("two_node_communication",), seed_key=key)
     report = grade(request, lambda step: None)
     return next(v.outcome.value for v in report.exercises[0].verdicts if v.id == "logs_fan_speed")
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from grader.app import grade
-from grader.app.grade import Request, read_exercises
+from grader.app.grade import read_exercises
 from grader.app.reproducing import command_words, recording_digest, reproduction
+from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core.scenario import TimedMessage
 from grader.execution.bag import Odometry
@@ -15,12 +16,12 @@ from grader.execution.bag import Odometry
 
 def test_the_seed_is_named_even_if_nobody_asked_for_one():
     """Without it a changed file would be tried with other values."""
-    assert command_words(Request("./ada"), 7) == ("grade", "./ada", "--seed", "7")
+    assert command_words(GradeRequest("./ada"), 7) == ("grade", "./ada", "--seed", "7")
 
 
 def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
     """The command, given to the command line, asks for the same."""
-    asked = Request(
+    asked = GradeRequest(
         submission="./ada lovelace",
         exercises=("b", "a"),
         rubrics=(Path("r 1.yaml"), Path("r2.yaml")),
@@ -43,16 +44,16 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
 
 def test_a_path_is_taken_for_nothing_else():
     """Neither for an option nor for the name of a command."""
-    assert command_words(Request("-x"), 1)[1] == "./-x"
-    assert command_words(Request("observe"), 1)[1] == "./observe"
-    assert command_words(Request("."), 1)[1] == "."
-    assert command_words(Request("/a/b"), 1)[1] == "/a/b"
+    assert command_words(GradeRequest("-x"), 1)[1] == "./-x"
+    assert command_words(GradeRequest("observe"), 1)[1] == "./observe"
+    assert command_words(GradeRequest("."), 1)[1] == "."
+    assert command_words(GradeRequest("/a/b"), 1)[1] == "/a/b"
 
 
 def test_every_rubric_has_its_digest():
     """A changed rubric gives another report, and one sees which it was."""
-    exercises = read_exercises(Request("x"))
-    found = reproduction(Request("x"), exercises, None, 7)
+    exercises = read_exercises(GradeRequest("x"))
+    found = reproduction(GradeRequest("x"), exercises, None, 7)
     assert found.rubrics == tuple((e.id, e.digest) for e in exercises)
     assert found.recording == ""
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import Request, read_exercises
+from grader.app.grade import read_exercises
+from grader.app.request import GradeRequest
 from grader.app.seeds import PRACTICE, PRACTICE_NOTE, SeedKey, kept_key, seed_key
 from grader.core.errors import KeyFileError
 from grader.execution.evidence.store import open_evidence, run_of
@@ -134,7 +135,7 @@ def test_nothing_of_the_key_leaves_the_grader(tmp_path, given):
     done = grade(*words, *(["--seed-key", tmp_path / "key"] if given == "file" else []), **how)
     assert done.returncode == 1, done.stderr
     evidence = open_evidence(tmp_path / "out" / "evidence")
-    recorded = repr(run_of(evidence, read_exercises(Request("", exercises=("velocity_publisher",)))))
+    recorded = repr(run_of(evidence, read_exercises(GradeRequest("", exercises=("velocity_publisher",)))))
     assert "RMW_IMPLEMENTATION" in recorded  # the spy did look
     kept = [path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()]
     for text in (done.stdout.encode(), done.stderr.encode(), recorded.encode(), *kept):

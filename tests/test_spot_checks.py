@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
 from grader.core.report import Report
 from grader.core.trace import ClockKind, Trace
@@ -152,7 +153,7 @@ def graded(tmp_path: Path, file: Path, hear=lambda step: None, **options: object
     rubric = tmp_path / "rubric.yaml"
     text = (HERE.parents[1] / "rubrics" / "exercise_1.yaml").read_text(encoding="utf-8")
     rubric.write_text(text.replace("10 s", "3 s").replace("60 s", "3 s"), encoding="utf-8")
-    return grade(Request(str(folder), rubrics=(rubric,), **options), hear, pictures=False)
+    return grade(GradeRequest(str(folder), rubrics=(rubric,), **options), hear, pictures=False)
 
 
 @pytest.mark.ros

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from grader.app.grade import Request, grade
+from grader.app.grade import grade
+from grader.app.request import GradeRequest
 from grader.app.seeds import SeedKey
 from grader.classroom.intake import take_in
 from grader.core.errors import SubmissionError
@@ -49,7 +50,7 @@ def test_every_program_is_listed():
 def test_a_program_gets_what_it_is_worth(program):
     """What a process says about itself is no evidence, and nothing that it did is lost."""
     clock = program.get("decided", "auto")
-    request = Request(str(HERE / program["folder"]), exercises=(program["exercise"],), seed_key=KEY, clock=clock)
+    request = GradeRequest(str(HERE / program["folder"]), exercises=(program["exercise"],), seed_key=KEY, clock=clock)
     report = grade(request, lambda _step: None, pictures=False)
     verdicts = [v for exercise in report.exercises for v in exercise.verdicts]
     found = {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}

@@ -17,12 +17,12 @@ from grader.core.quantities import Unit, duration
 from grader.core.scenario import (
     ActionGoal,
     AnyOrder,
-    CallStream,
     Count,
     CountBetween,
     MessageStream,
     NumberStream,
     Scenario,
+    ServiceCalls,
     ServiceServer,
     SomeOf,
     Stimulus,
@@ -188,7 +188,7 @@ def _stimulus(stimulus: Stimulus) -> str:
     if isinstance(stimulus, ServiceServer):
         answers = f" with {_cases(stimulus.responses, 'responses')}" if _is_open(stimulus.responses) else ""
         return f"the grader offers the service {stimulus.service}{answers} from {_time(stimulus.start_ns)} on"
-    if isinstance(stimulus, CallStream):
+    if isinstance(stimulus, ServiceCalls):
         who = "a client" if stimulus.clients == 1 else f"{stimulus.clients} clients"
         times = "once" if stimulus.calls == 1 else f"{_count(stimulus.calls)} times"
         pace = f"{times} from {_time(stimulus.start_ns)} on, every {duration(stimulus.period_ns)}"

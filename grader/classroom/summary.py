@@ -13,7 +13,7 @@ from grader.reporting.class_page.contents import PageLink
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
 
-SCHEMA = "grader/classroom/v1"
+SCHEMA = "grader/batch/v1"
 _MOST = 10
 #: Endings of files that people open.
 _OPENED = (".csv", ".html")

@@ -259,7 +259,7 @@ class ServiceServer:
 
 
 @dataclass(frozen=True, slots=True)
-class CallStream:
+class ServiceCalls:
     """A stimulus: clients that call the student's server; a call waits for the server to be there.
 
     Attributes:
@@ -304,7 +304,7 @@ class ActionGoal:
     cancel_after_ns: TimeOrNever = 0
 
 
-Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | CallStream | ActionGoal
+Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
 
 
 def longest_course_ns(stimulus: Stimulus) -> int:
@@ -314,7 +314,7 @@ def longest_course_ns(stimulus: Stimulus) -> int:
         return start_ns + cases(stimulus.values)[1] * longest(stimulus.hold_ns)
     if isinstance(stimulus, MessageStream):
         return start_ns + cases(stimulus.values)[1] * most(stimulus.repeats) * stimulus.period_ns
-    if isinstance(stimulus, CallStream):
+    if isinstance(stimulus, ServiceCalls):
         return start_ns + most(stimulus.calls) * stimulus.period_ns
     return start_ns + longest(stimulus.duration_ns) if isinstance(stimulus, OdometryStream) else start_ns
 

@@ -14,13 +14,13 @@ from grader.core.scenario import (
     ActionGoal,
     AnyOrder,
     Between,
-    CallStream,
     Choose,
     Count,
     CountBetween,
     FieldSpec,
     InOrder,
     MessageStream,
+    ServiceCalls,
     ServiceServer,
     SomeOf,
     Time,
@@ -101,7 +101,7 @@ class PlannedServer:
 
 @dataclass(frozen=True, slots=True)
 class PlannedCalls:
-    """Calls with every request drawn, `clients` of them for each call in turn; see `CallStream`."""
+    """Calls with every request drawn, `clients` of them for each call in turn; see `ServiceCalls`."""
 
     service: str
     type: str
@@ -181,7 +181,7 @@ def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
     )
 
 
-def plan_calls(calls: CallStream, draw: random.Random) -> PlannedCalls:
+def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
     """Return calls with every request drawn, for each call and client anew."""
     start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
     requests = in_drawn_order(calls.requests, draw)

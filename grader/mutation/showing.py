@@ -16,7 +16,7 @@ from grader.core.exercise import Outcome
 from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial
 from grader.reporting.escape import shown, valid_unicode
 
-SCHEMA = "grader/mutation/v1"
+SCHEMA = "grader/selftest/v1"
 _NARROWEST = 80
 _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 

@@ -12,10 +12,10 @@ from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
 from grader.core.scenario import (
     ActionGoal,
-    CallStream,
     MessageStream,
     NumberStream,
     OdometryStream,
+    ServiceCalls,
     ServiceServer,
     Span,
 )
@@ -38,7 +38,7 @@ _STIMULI: Mapping[str, type[Shape]] = {
     "odometry": part_model(OdometryStream, "OdometryShape", start=0),
     "messages": part_model(MessageStream, "MessagesShape", period=NS_PER_S, stop=None),
     "server": part_model(ServiceServer, "ServerShape", stop=None, answers=None),
-    "calls": part_model(CallStream, "CallsShape", requests=({},)),
+    "calls": part_model(ServiceCalls, "CallsShape", requests=({},)),
     "parameter": ParameterShape,
     "transition": TransitionShape,
     "state": StateShape,

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from grader.core.scenario import Between, CallStream, FieldSpec, JustAbove, JustBelow
+from grader.core.scenario import Between, FieldSpec, JustAbove, JustBelow, ServiceCalls
 from grader.rubrics.drawing import (
     DrawnCountShape,
     Fields,
@@ -89,7 +89,7 @@ class ParameterShape(Shape):
     set: FieldValue | None = None
     start: SomeTime = 0
 
-    def built(self) -> CallStream:
+    def built(self) -> ServiceCalls:
         """Return the call of the service behind it."""
         if self.set is None:
             return _call(self, "get_parameters", "rcl_interfaces/srv/GetParameters", {"names": (self.name,)})
@@ -104,7 +104,7 @@ class TransitionShape(Shape):
     to: Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
     start: SomeTime = 0
 
-    def built(self) -> CallStream:
+    def built(self) -> ServiceCalls:
         """Return the call of the service behind it."""
         # without a number the label counts; the numbers of shutdown differ from state to state
         asked: Mapping[str, FieldSpec] = {"transition": {"id": 0, "label": self.to}}
@@ -117,15 +117,15 @@ class StateShape(Shape):
     node: Topic | None = None
     start: SomeTime = 0
 
-    def built(self) -> CallStream:
+    def built(self) -> ServiceCalls:
         """Return the call of the service behind it."""
         return _call(self, "get_state", "lifecycle_msgs/srv/GetState", {})
 
 
 def _call(
     shape: ParameterShape | TransitionShape | StateShape, service: str, kind: str, request: Mapping[str, FieldSpec]
-) -> CallStream:
-    return CallStream(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=build(shape.start))
+) -> ServiceCalls:
+    return ServiceCalls(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=build(shape.start))
 
 
 #: What a parameter's value is called, and its number, in rcl_interfaces/msg/ParameterValue; of a list, by its first.

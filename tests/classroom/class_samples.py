@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from grader.app.grade import Request
+from grader.app.request import GradeRequest
 from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
 from grader.classroom.request import ClassRequest
@@ -19,7 +19,7 @@ from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
 from grader.submissions.submission import stage_submission
 
-GRADING = Request("", exercises=("velocity_publisher",))
+GRADING = GradeRequest("", exercises=("velocity_publisher",))
 
 
 def report(score: int, *, final: bool = True, reason: str = "as expected") -> dict[str, Any]:

@@ -15,10 +15,10 @@ from grader.core.errors import HarnessError
 from grader.core.scenario import (
     ActionGoal,
     Between,
-    CallStream,
     Choose,
     MessageStream,
     Scenario,
+    ServiceCalls,
     ServiceServer,
     Span,
     Written,
@@ -71,7 +71,7 @@ def test_a_drawn_fraction_has_as_many_decimals_as_its_range_needs(low, high, dec
 
 def test_calls_are_drawn_for_each_client():
     """Requests begin again after the last one, and no two drawn ones need be alike."""
-    calls = plan_calls(CallStream("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2), draw())
+    calls = plan_calls(ServiceCalls("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2), draw())
     assert [r["a"] == 7 for r in calls.requests] == [False, False, True, True, False, False]
     assert len({r["a"] for r in calls.requests}) == 5
 
@@ -97,7 +97,7 @@ def test_a_plan_crosses_the_line():
     exchanges = plan(
         messages=(plan_messages(MessageStream("/a", SCAN, ({"ranges": (1, Between(1, 2))},), 5), draw()),),
         servers=(plan_server(ServiceServer("/s", TRIGGER, (TOLD,)), draw()),),
-        calls=(plan_calls(CallStream("/s", TRIGGER, ({},), calls=2), draw()),),
+        calls=(plan_calls(ServiceCalls("/s", TRIGGER, ({},), calls=2), draw()),),
         goals=(plan_goal(ActionGoal("/g", "test_msgs/action/Fibonacci", {"order": 5}), draw()),),
         starts_ns=(("a.py", 5),),
         may_exit=("a.py",),
@@ -145,7 +145,7 @@ def test_a_field_that_the_type_lacks_is_named(interface, fields, message):
             "scenario alone, server of /s: expected a field of std_srvs/Trigger_Response (success, message)",
         ),
         (
-            {"calls": (plan_calls(CallStream("/s", TRIGGER, ({"data": 1},)), draw()),)},
+            {"calls": (plan_calls(ServiceCalls("/s", TRIGGER, ({"data": 1},)), draw()),)},
             "scenario alone, calls of /s: expected a field of std_srvs/Trigger_Request (no fields)",
         ),
         (

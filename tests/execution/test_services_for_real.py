@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.scenario import ActionGoal, CallStream, MessageStream, Scenario, ServiceServer, Span
+from grader.core.scenario import ActionGoal, MessageStream, Scenario, ServiceCalls, ServiceServer, Span
 from grader.core.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
 from grader.execution.codec import trace_to_json
 from grader.execution.plan import plan_scenario
@@ -59,7 +59,7 @@ def short(trace) -> list[str]:
 
 def test_a_server_is_called_by_several_clients(run):
     """Calls of one instant come one after the other, always in the same order; the graph shows the server."""
-    trace = run(("server.py",), CallStream(BATTERY, TRIGGER, ({},), calls=2, clients=2), times=2)
+    trace = run(("server.py",), ServiceCalls(BATTERY, TRIGGER, ({},), calls=2, clients=2), times=2)
     percentages = ["85.0", "84.5", "84.0", "83.5"]
     expected = []
     for index, percentage in enumerate(percentages):
@@ -115,7 +115,7 @@ def test_every_way_to_ask_is_served(run, file, asked_ms):
 def test_a_server_asks_another_one_while_it_answers(run):
     """Two callbacks of one node wait for each other, in threads."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=100 * NS_PER_MS)
-    trace = run(("relay.py",), server, CallStream(RELAY, TRIGGER, ({},), start_ns=NS_PER_S))
+    trace = run(("relay.py",), server, ServiceCalls(RELAY, TRIGGER, ({},), start_ns=NS_PER_S))
     assert [line for line in short(trace) if "server_starts" not in line] == [
         f"1000 grader asks {RELAY} 1",
         f"1000 student asks {BATTERY} 1",
@@ -139,7 +139,7 @@ def test_two_processes_meet_when_one_starts_late_and_one_ends(run):
 def test_parameters_and_messages_of_fixed_types_reach_a_node(run):
     """The parameter takes effect at its instant; the messages come as often as they are repeated."""
     asked = {"parameters": [{"name": "word", "value": {"type": 4, "string_value": "bye"}}]}
-    changed = CallStream("~/set_parameters", "rcl_interfaces/srv/SetParameters", (asked,), start_ns=1200 * NS_PER_MS)
+    changed = ServiceCalls("~/set_parameters", "rcl_interfaces/srv/SetParameters", (asked,), start_ns=1200 * NS_PER_MS)
     heard = MessageStream("/heard", TEXT, ({"data": "a"}, {"data": "b"}), 500 * NS_PER_MS, NS_PER_S, repeats=2)
     trace = run(("parrot.py",), changed, heard, times=2)
     (response,) = trace.responses("/parrot/set_parameters", "student")
@@ -152,8 +152,8 @@ def test_a_lifecycle_node_is_led_through_its_states(run):
     """It publishes while it is active; what its state machine tells has its instant too."""
     asked = [({"transition": {"id": 0, "label": to}}, at) for to, at in (("configure", 600), ("activate", 1200))]
     kind = "lifecycle_msgs/srv/ChangeState"
-    calls = [CallStream("~/change_state", kind, (value,), start_ns=at * NS_PER_MS) for value, at in asked]
-    state = CallStream("/living/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=1300 * NS_PER_MS)
+    calls = [ServiceCalls("~/change_state", kind, (value,), start_ns=at * NS_PER_MS) for value, at in asked]
+    state = ServiceCalls("/living/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=1300 * NS_PER_MS)
     trace = run(("lifecycle.py",), *calls, state, seconds=2, times=2)
     assert [r.value["success"] for r in trace.responses("/living/change_state", "student")] == [True, True]
     assert trace.responses("/living/get_state", "student")[0].value["current_state"]["label"] == "active"

@@ -15,10 +15,10 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Check
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Request
-from grader.judging.checks.clients import NoGoWithoutAnswer, ReactsToResponses, ServiceCalls, WaitsForService
+from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.findings import FAULT_KEY
 
-CALLS = ServiceCalls(BATTERY, 5, period=NS_PER_S, tolerance=300 * NS_PER_MS)
+CALLS = CallsOfClient(BATTERY, 5, period=NS_PER_S, tolerance=300 * NS_PER_MS)
 WAITS = WaitsForService(CLIENT, BATTERY)
 REACTS = ReactsToResponses(CLIENT, BATTERY, 20.0)
 ABOVE = ReactsToResponses(CLIENT, BATTERY, 20.0, "above")
@@ -234,7 +234,7 @@ def test_number_and_gaps_of_the_requests(rec: Recording, credit: int, said: str)
 def test_more_requests_may_be_allowed_and_too_short_a_recording_is_ours() -> None:
     """`at_most` lets a client ask again."""
     six = asking(chapter, [battery(84.5)] * 6)
-    assert ServiceCalls(BATTERY, 5, at_most=6).judge(six.trace()).credit == 1
+    assert CallsOfClient(BATTERY, 5, at_most=6).judge(six.trace()).credit == 1
     short = asking(chapter, [battery(84.5)] * 3)
     short.stop_s = 6.0
     with pytest.raises(HarnessError):

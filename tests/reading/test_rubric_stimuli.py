@@ -13,10 +13,10 @@ from grader.core.errors import RubricError
 from grader.core.scenario import (
     ActionGoal,
     Between,
-    CallStream,
     Choose,
     MessageStream,
     Scenario,
+    ServiceCalls,
     ServiceServer,
     Written,
 )
@@ -82,8 +82,8 @@ stimuli:
   - calls: {service: /a, type: std_srvs/srv/Trigger}
   - calls: {service: /b, type: std_srvs/srv/SetBool, requests: [{data: true}], calls: 5, clients: 3, period: 2 s}
 """).stimuli
-    assert found[0] == CallStream("/a", "std_srvs/srv/Trigger", ({},))
-    assert found[1] == CallStream("/b", "std_srvs/srv/SetBool", ({"data": True},), 5, 3, 2 * S)
+    assert found[0] == ServiceCalls("/a", "std_srvs/srv/Trigger", ({},))
+    assert found[1] == ServiceCalls("/b", "std_srvs/srv/SetBool", ({"data": True},), 5, 3, 2 * S)
 
 
 def test_messages_are_written_with_their_fields(scenario: Callable[..., Any]) -> None:

@@ -1,7 +1,7 @@
 """The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
-from grader.judging.checks.clients import NoGoWithoutAnswer, ReactsToResponses, ServiceCalls, WaitsForService
+from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
 from grader.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
@@ -44,7 +44,7 @@ CHECKS: dict[str, type] = {
     "service_answers_all": ServiceAnswersAll,
     "service_response": ServiceResponse,
     "service_sequence": ServiceSequence,
-    "service_calls": ServiceCalls,
+    "service_calls": CallsOfClient,
     "waits_for_service": WaitsForService,
     "reacts_to_responses": ReactsToResponses,
     "no_go_without_answer": NoGoWithoutAnswer,

@@ -42,7 +42,7 @@ _WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceCalls:
+class CallsOfClient:
     """A student's client asks the grader's server so many times, with a period where one is given.
 
     A gap may be longer by the time that its own response took. After a call without a response it may have any length.

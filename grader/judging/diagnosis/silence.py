@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from grader.core.exercise import Location, Outcome
 from grader.core.quantities import seconds
-from grader.judging.checks.clients import ReactsToResponses, ServiceCalls
+from grader.judging.checks.clients import CallsOfClient, ReactsToResponses
 from grader.judging.checks.fan import ThresholdResponse
 from grader.judging.checks.graph import BidirectionalGraph
 from grader.judging.checks.logs import UsesLogger
@@ -427,7 +427,7 @@ def _from(source: Source, store: ast.AST, item: Made) -> bool:
     return store in set(reached(source, roots(source, item.callback)))
 
 
-@rule(ServiceCalls, ReactsToResponses)
+@rule(CallsOfClient, ReactsToResponses)
 def _shared_callback_group(case: Case) -> Clue | None:
     """A callback awaits the answer of a client that is of the same group, whose callbacks run one at a time."""
     source = case.source

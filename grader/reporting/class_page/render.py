@@ -166,7 +166,10 @@ def _template() -> Template:
     templates.filters |= {"points": _points, "percent": _percent}
     templates.globals |= {
         "embedded": Markup,
-        "bundle": bundle,
+        "own_style": own_style,
+        "own_script": own_script,
+        "own_name": own_name,
+        "scripts_policy": scripts_policy,
         "exercise_name": exercise_name,
         "result_link": result_link,
         "page_link": page_link,
