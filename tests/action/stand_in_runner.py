@@ -3,14 +3,18 @@
 import os
 import re
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from ruamel.yaml import YAML
 
 EXPRESSION = re.compile(r"\$\{\{(.*?)\}\}", re.DOTALL)
 TOKEN = re.compile(r"\s*(?:(?P<string>'(?:[^']|'')*')|(?P<sign>==|!=|&&|\|\||[()!])|(?P<name>[a-z_][\w.-]*(?:\(\))?))")
 SIGNS = {"&&": " and ", "||": " or ", "!": " not ", "==": "==", "!=": "!=", "(": "(", ")": ")"}
+#: Kind, properties, message.
+Command = tuple[str, dict[str, str], str]
 
 
 @dataclass
@@ -28,15 +32,15 @@ class Job:
     """
 
     log: str = ""
-    commands: list = field(default_factory=list)
-    outputs: dict = field(default_factory=dict)
-    summaries: dict = field(default_factory=dict)
-    uploads: dict = field(default_factory=dict)
+    commands: list[Command] = field(default_factory=list)
+    outputs: dict[str, str] = field(default_factory=dict)
+    summaries: dict[str, str] = field(default_factory=dict)
+    uploads: dict[str, dict[str, str]] = field(default_factory=dict)
     changed: str = ""
     failed: str = ""
 
 
-def run_action(action, workspace, folder, environment, **inputs):
+def run_action(action: Path, workspace: Path, folder: Path, environment: Mapping[str, str], **inputs: str) -> Job:
     """Run an action as a runner does: its steps in order, until one fails.
 
     Args:
@@ -53,13 +57,16 @@ def run_action(action, workspace, folder, environment, **inputs):
         given[name.replace("_", "-")] = value
     temporary = folder / "temp"
     temporary.mkdir(parents=True)
-    job, steps = Job(), {}
+    job = Job()
+    steps: dict[str, Any] = {}
     names = {"GITHUB_ACTION_PATH": action, "GITHUB_WORKSPACE": workspace, "RUNNER_TEMP": temporary}
     environment = {**environment, **{name: str(value) for name, value in names.items()}, "GITHUB_ACTIONS": "true"}
     contexts = {"inputs": given, "steps": steps}
     for number, step in enumerate(described["runs"]["steps"]):
         condition = step.get("if", "${{ true }}")
-        if evaluated(EXPRESSION.fullmatch(condition)[1], contexts):
+        expression = EXPRESSION.fullmatch(condition)
+        assert expression, condition
+        if evaluated(expression[1], contexts):
             run_step(step, folder / str(number), workspace, environment, contexts, job)
         if job.failed:
             break
@@ -68,7 +75,14 @@ def run_action(action, workspace, folder, environment, **inputs):
     return job
 
 
-def run_step(step, folder, workspace, environment, contexts, job):
+def run_step(
+    step: Mapping[str, Any],
+    folder: Path,
+    workspace: Path,
+    environment: Mapping[str, str],
+    contexts: Mapping[str, Any],
+    job: Job,
+) -> None:
     """Run one step in the checkout, and take what it left in the environment files."""
     if "uses" in step:
         given = {name: filled(str(value), contexts) for name, value in step["with"].items()}
@@ -102,9 +116,10 @@ def run_step(step, folder, workspace, environment, contexts, job):
         job.failed = step["name"]
 
 
-def obeyed(text):
+def obeyed(text: str) -> list[Command]:
     """Return the commands in the log of a step: none between `stop-commands` and its token."""
-    found, token = [], None
+    found: list[Command] = []
+    token: str | None = None
     for line in re.split(r"\r\n|\r|\n", text):
         trimmed = line.lstrip()
         if token is not None:
@@ -121,9 +136,10 @@ def obeyed(text):
     return found
 
 
-def pairs(text):
+def pairs(text: str) -> dict[str, str]:
     """Return what an environment file says, in both of its forms."""
-    values, lines = {}, iter(text.splitlines())
+    values: dict[str, str] = {}
+    lines = iter(text.splitlines())
     for line in lines:
         name, heredoc, end = line.partition("<<")
         if heredoc and "=" not in name:
@@ -135,14 +151,15 @@ def pairs(text):
     return values
 
 
-def filled(text, contexts):
+def filled(text: str, contexts: Mapping[str, Any]) -> str:
     """Return a text with its expressions replaced by their values."""
     return EXPRESSION.sub(lambda match: str(evaluated(match[1], contexts)), text)
 
 
-def evaluated(expression, contexts):
+def evaluated(expression: str, contexts: Mapping[str, Any]) -> Any:
     """Return the value of an expression: contexts, strings, comparisons, and the two words for truth."""
-    pieces, place, expression = [], 0, expression.strip()
+    pieces: list[str] = []
+    place, expression = 0, expression.strip()
     while place < len(expression):
         match = TOKEN.match(expression, place)
         assert match, f"the stand-in does not know {expression[place:]!r}"
@@ -154,17 +171,17 @@ def evaluated(expression, contexts):
     return eval("".join(pieces), {"__builtins__": {}})
 
 
-def named(name, contexts):
+def named(name: str, contexts: Mapping[str, Any]) -> Any:
     """Return what a name in an expression stands for; what is unknown is empty, as it is to a runner."""
     if name in ("true", "false"):
         return name == "true"
-    value = contexts
+    value: Any = contexts
     for part in name.split("."):
         value = value.get(part, "") if isinstance(value, dict) else ""
     return value
 
 
-def job_environment(**more):
+def job_environment(**more: str) -> dict[str, str]:
     """Return the environment of a job with tokens in it, none of which a student may learn."""
     kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG", "XDG_CACHE_HOME") if name in os.environ}
     tokens = ("ACTIONS_RUNTIME_TOKEN", "ACTIONS_ID_TOKEN_REQUEST_TOKEN", "GITHUB_TOKEN", "GH_TOKEN")

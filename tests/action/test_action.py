@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from stand_in_runner import CANARY, ROOT, evaluated, job_environment, obeyed, pairs, run_action
+from stand_in_runner import CANARY, ROOT, Job, evaluated, job_environment, obeyed, pairs, run_action
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,7 @@ STEPS = ("Set up the grader and its sandbox", "Grade", "Say whether it passed")
 
 
 @pytest.fixture
-def checkout(tmp_path):
+def checkout(tmp_path: Path) -> Path:
     """Return a student's checkout and a folder with a grader that is only heard, not believed."""
     (tmp_path / "bin").mkdir()
     program = tmp_path / "bin" / "grade"
@@ -46,14 +46,14 @@ def checkout(tmp_path):
     return tmp_path / "checkout"
 
 
-def run(checkout, code, **inputs):
+def run(checkout: Path, code: int, **inputs: str) -> Job:
     # The grader sees few names; HOME, of all that it sees, is the one that it has no use for here.
     path = f"{checkout.parent / 'bin'}{os.pathsep}{os.environ['PATH']}"
     environment = job_environment(PATH=path, HOME=str(code))
     return run_action(ROOT, checkout, checkout.parent / "runner", environment, setup="false", **inputs)
 
 
-def test_a_passed_job_says_so_in_every_place(checkout):
+def test_a_passed_job_says_so_in_every_place(checkout: Path) -> None:
     """Outputs, summary, annotations, artifact."""
     job = run(checkout, 0)
     assert job.failed == ""
@@ -69,7 +69,7 @@ def test_a_passed_job_says_so_in_every_place(checkout):
 
 
 @pytest.mark.parametrize(("code", "said"), [(1, "Not passed"), (2, "Nothing was graded"), (3, "Undecided")])
-def test_what_did_not_pass_fails_the_last_step(checkout, code, said):
+def test_what_did_not_pass_fails_the_last_step(checkout: Path, code: int, said: str) -> None:
     """Files are uploaded first, and the job is red."""
     job = run(checkout, code)
     assert job.failed == STEPS[2]
@@ -78,7 +78,7 @@ def test_what_did_not_pass_fails_the_last_step(checkout, code, said):
     assert said in job.log
 
 
-def test_nothing_graded_is_an_error_with_its_reason(checkout):
+def test_nothing_graded_is_an_error_with_its_reason(checkout: Path) -> None:
     """The message of the grader is the message of the annotation, and no number stands anywhere."""
     job = run(checkout, 2)
     assert job.commands == [
@@ -89,7 +89,7 @@ def test_nothing_graded_is_an_error_with_its_reason(checkout):
 
 
 @pytest.mark.parametrize("code", [0, 1, 2, 3])
-def test_the_runner_obeys_no_line_of_the_grader_s_output(checkout, code):
+def test_the_runner_obeys_no_line_of_the_grader_s_output(checkout: Path, code: int) -> None:
     """What is printed stays in the log, but sets no output, no path, and cannot make the runner deaf."""
     job = run(checkout, code)
     assert "::set-output name=score::100" in job.log
@@ -98,7 +98,7 @@ def test_the_runner_obeys_no_line_of_the_grader_s_output(checkout, code):
     assert job.outputs["score"] in ("", "87.5")
 
 
-def test_the_grader_gets_none_of_the_job_s_environment(checkout):
+def test_the_grader_gets_none_of_the_job_s_environment(checkout: Path) -> None:
     """Tokens, in particular, end at this step."""
     run(checkout, 0)
     _, environment = json.loads((checkout / "called.json").read_text())
@@ -115,7 +115,7 @@ def test_the_grader_gets_none_of_the_job_s_environment(checkout):
     }
 
 
-def test_the_seed_key_reaches_the_grader_and_nothing_else(checkout):
+def test_the_seed_key_reaches_the_grader_and_nothing_else(checkout: Path) -> None:
     """It is in its environment, and in no argument, output or summary."""
     job = run(checkout, 0, seed_key="a seed key of enough bytes")
     words, environment = json.loads((checkout / "called.json").read_text())
@@ -123,7 +123,7 @@ def test_the_seed_key_reaches_the_grader_and_nothing_else(checkout):
     assert "a seed key" not in json.dumps([words, job.outputs, job.summaries, job.log])
 
 
-def test_inputs_become_words_of_a_command(checkout):
+def test_inputs_become_words_of_a_command(checkout: Path) -> None:
     """Several in one input, and none of them can be an option or a piece of shell."""
     inputs = {
         "path": "--isolation=none",
@@ -141,7 +141,7 @@ def test_inputs_become_words_of_a_command(checkout):
     assert not (checkout / "x").exists()
 
 
-def test_reports_go_where_no_student_can_put_a_link(checkout):
+def test_reports_go_where_no_student_can_put_a_link(checkout: Path) -> None:
     """To a folder that the runner made for this step, not to the checkout."""
     run(checkout, 0)
     words, _ = json.loads((checkout / "called.json").read_text())
@@ -150,12 +150,12 @@ def test_reports_go_where_no_student_can_put_a_link(checkout):
     assert all(place == "-" or place.startswith(temporary) for place in places)
 
 
-def test_without_an_artifact_name_nothing_is_uploaded(checkout):
+def test_without_an_artifact_name_nothing_is_uploaded(checkout: Path) -> None:
     """Some repositories are public."""
     assert run(checkout, 0, artifact="").uploads == {}
 
 
-def test_a_machine_without_the_command_says_what_to_do(checkout):
+def test_a_machine_without_the_command_says_what_to_do(checkout: Path) -> None:
     """Whoever switched the set-up off reads why nothing is graded."""
     (checkout.parent / "bin" / "grade").unlink()
     environment = job_environment(PATH="/usr/bin:/bin")
@@ -164,7 +164,7 @@ def test_a_machine_without_the_command_says_what_to_do(checkout):
     assert "grade: expected the command on the PATH, found none" in job.log
 
 
-def test_the_stand_in_reads_what_a_runner_reads():
+def test_the_stand_in_reads_what_a_runner_reads() -> None:
     """Expressions, environment files, and commands that were stopped."""
     contexts = {"inputs": {"a-b": "x"}, "steps": {"s": {"outputs": {"o": "1"}}}}
     assert evaluated("inputs.a-b == 'x' && steps.s.outputs.o != '2'", contexts)

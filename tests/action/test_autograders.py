@@ -5,6 +5,8 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 from stand_in_runner import ROOT, job_environment, obeyed
@@ -31,7 +33,7 @@ sys.exit(code)
 
 
 @pytest.fixture
-def programs(tmp_path):
+def programs(tmp_path: Path) -> Path:
     """Return a folder with a grader that ends as it is told."""
     folder = tmp_path / "bin"
     folder.mkdir()
@@ -40,13 +42,15 @@ def programs(tmp_path):
     return folder
 
 
-def run(words, programs, *, code, doctor=0, cwd=None, **more):
+def run(
+    words: list[str | Path], programs: Path, *, code: int, doctor: int = 0, cwd: Path | None = None, **more: str
+) -> subprocess.CompletedProcess[str]:
     path = f"{programs}{os.pathsep}{os.environ['PATH']}"
     environment = job_environment(PATH=path, HOME=str(code), LANG=str(doctor), **more)
     return subprocess.run(words, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
 
 
-def gradescope(tmp_path, programs, **how):
+def gradescope(tmp_path: Path, programs: Path, **how: Any) -> tuple[int, Any]:
     root = tmp_path / "autograder"
     (root / "source").mkdir(parents=True)
     (root / "submission").mkdir()
@@ -58,12 +62,12 @@ def gradescope(tmp_path, programs, **how):
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
-def test_gradescope_gets_whatever_was_judged(tmp_path, programs, code):
+def test_gradescope_gets_whatever_was_judged(tmp_path: Path, programs: Path, code: int) -> None:
     """An undecided report says of itself that it is not final."""
     assert gradescope(tmp_path, programs, code=code) == (0, {})
 
 
-def test_gradescope_tells_a_student_why_nothing_could_be_graded(tmp_path, programs):
+def test_gradescope_tells_a_student_why_nothing_could_be_graded(tmp_path: Path, programs: Path) -> None:
     """The machine can grade, so the submission is at fault, and the reason is the output."""
     code, result = gradescope(tmp_path, programs, code=2)
     assert code == 0
@@ -72,12 +76,12 @@ def test_gradescope_tells_a_student_why_nothing_could_be_graded(tmp_path, progra
     assert result["output_format"] == "text"
 
 
-def test_a_machine_that_cannot_grade_gives_no_mark_on_gradescope(tmp_path, programs):
+def test_a_machine_that_cannot_grade_gives_no_mark_on_gradescope(tmp_path: Path, programs: Path) -> None:
     """Without a result, the platform says that the autograder failed."""
     assert gradescope(tmp_path, programs, code=2, doctor=2) == (1, None)
 
 
-def classroom50(tmp_path, programs, code):
+def classroom50(tmp_path: Path, programs: Path, code: int) -> tuple[int, list[str]]:
     checkout, temporary = tmp_path / "checkout", tmp_path / "temporary"
     checkout.mkdir()
     temporary.mkdir()
@@ -90,28 +94,30 @@ def classroom50(tmp_path, programs, code):
 
 
 @pytest.mark.parametrize("code", [0, 1])
-def test_classroom50_gets_all_that_was_written(tmp_path, programs, code):
+def test_classroom50_gets_all_that_was_written(tmp_path: Path, programs: Path, code: int) -> None:
     """What lay there under these names was the student's, and is gone."""
     left = ["grading-evidence.zip", "grading-report.html", "release-body.md", "result.json"]
     assert classroom50(tmp_path, programs, code) == (0, left)
 
 
-def test_what_is_undecided_is_no_result_for_classroom50(tmp_path, programs):
+def test_what_is_undecided_is_no_result_for_classroom50(tmp_path: Path, programs: Path) -> None:
     """It records an error then and no mark; the report is there to read."""
     code, left = classroom50(tmp_path, programs, 3)
     assert code == 1
     assert left == ["grading-evidence.zip", "grading-report.html", "release-body.md"]
 
 
-def test_a_result_that_a_student_handed_in_is_never_taken(tmp_path, programs):
+def test_a_result_that_a_student_handed_in_is_never_taken(tmp_path: Path, programs: Path) -> None:
     """Also where the grader wrote none."""
     assert classroom50(tmp_path, programs, 2) == (1, [])
 
 
-def test_the_time_of_a_commit_comes_from_git(tmp_path):
+def test_the_time_of_a_commit_comes_from_git(tmp_path: Path) -> None:
     """Grading again has no push that would say when it was."""
     path = ROOT / "integrations" / "classroom50" / "autograder.py"
     spec = importlib.util.spec_from_file_location("autograder50", path)
+    assert spec is not None
+    assert spec.loader is not None
     autograder = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(autograder)
     when = "2026-06-01T16:32:01+02:00"

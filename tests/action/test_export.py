@@ -1,10 +1,12 @@
 """Bundles for platforms: complete, small enough, the same every time, and refused where they could not work."""
 
 import csv
+import importlib.metadata
 import io
 import json
 import re
 import zipfile
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -18,11 +20,11 @@ from grader.packaging import CLASSROOM50_BYTES, Chosen, classroom50, gradescope,
 pytestmark = pytest.mark.slow
 
 
-def opened(content):
+def opened(content: bytes) -> zipfile.ZipFile:
     return zipfile.ZipFile(io.BytesIO(content))
 
 
-def test_gradescope_s_zip_has_what_the_platform_runs():
+def test_gradescope_s_zip_has_what_the_platform_runs() -> None:
     """Two programs at the top that can be run, and everything that they name."""
     archive = opened(gradescope(Chosen()))
     modes = {info.filename: info.external_attr >> 16 & 0o777 for info in archive.infolist()}
@@ -31,19 +33,19 @@ def test_gradescope_s_zip_has_what_the_platform_runs():
     assert archive.testzip() is None
 
 
-def test_the_same_choice_gives_the_same_bytes():
+def test_the_same_choice_gives_the_same_bytes() -> None:
     """So that a course can tell whether anything changed."""
     assert gradescope(Chosen()) == gradescope(Chosen())
 
 
-def test_classroom50_s_bundle_fits():
+def test_classroom50_s_bundle_fits() -> None:
     """The platform fetches no more than ten megabytes."""
     files = classroom50(Chosen())
     assert "autograder.py" in files
     assert sum(map(len, files.values())) < CLASSROOM50_BYTES / 4
 
 
-def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path):
+def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path: Path) -> None:
     """No student sees the zip; without a key it holds none, and one that could be guessed is refused now."""
     (tmp_path / "key").write_text("a seed key of enough bytes\r\n")
     archive = opened(gradescope(Chosen(), tmp_path / "key"))
@@ -55,7 +57,7 @@ def test_a_seed_key_goes_into_the_zip_for_its_owner_alone(tmp_path):
         gradescope(Chosen(), tmp_path / "key")
 
 
-def test_rubrics_travel_under_names_of_ours():
+def test_rubrics_travel_under_names_of_ours() -> None:
     """The settings say where; a name of the course's own could be anything."""
     archive = opened(gradescope(Chosen(exercises=("odom_subscriber",), rubrics=(ROOT / "rubrics/exercise_2.yaml",))))
     chosen = json.loads(archive.read("settings.json"))
@@ -63,13 +65,13 @@ def test_rubrics_travel_under_names_of_ours():
     assert archive.read("rubrics/1/rubric.yaml") == (ROOT / "rubrics/exercise_2.yaml").read_bytes()
 
 
-def test_an_exercise_that_no_rubric_has_is_refused_at_once():
+def test_an_exercise_that_no_rubric_has_is_refused_at_once() -> None:
     """Not by the first student."""
     with pytest.raises(RubricError, match="--exercise odometry: expected one of velocity_publisher"):
         gradescope(Chosen(exercises=("odometry",)))
 
 
-def test_the_wheel_holds_what_an_installation_needs_and_no_solution():
+def test_the_wheel_holds_what_an_installation_needs_and_no_solution() -> None:
     """Code, rubrics, scripts, and a record in which every file is right."""
     name, content = wheel()
     archive = opened(content)
@@ -90,7 +92,7 @@ def test_the_wheel_holds_what_an_installation_needs_and_no_solution():
     assert "grade = grader.cli.main:main" in archive.read(scripts).decode()
 
 
-def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers():
+def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers() -> None:
     """Down to what is needed by what is needed; the ROS wheels above all."""
     names = [line.split("==")[0] for line in pins().splitlines()]
     assert names == sorted(set(names))
@@ -98,27 +100,27 @@ def test_pins_hold_what_the_package_needs_and_nothing_of_its_developers():
     assert not {"pytest", "mypy", "rclpy-grader", "pip", "setuptools"} & set(names)
 
 
-def test_the_pins_of_the_action_name_all_that_is_needed_now():
+def test_the_pins_of_the_action_name_all_that_is_needed_now() -> None:
     """A requirement that is new has to be pinned as well: grade export constraints > integrations/constraints.txt."""
     kept = (ROOT / "integrations" / "constraints.txt").read_text().splitlines()
     assert {line.split("==")[0] for line in kept} == {line.split("==")[0] for line in pins().splitlines()}
 
 
-def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypatch):
+def test_an_installation_that_does_not_know_its_requirements_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A checkout whose requirements grew since it was installed would make a wheel that cannot run."""
     monkeypatch.setattr(packaging, "_needed", lambda requirements, extras: [(r, ()) for r in [*requirements][:1]])
     with pytest.raises(EnvironmentFault, match="expected an installation that knows its requirements"):
-        packaging._refuse_stale(packaging.importlib.metadata.distribution("click"))
+        packaging._refuse_stale(importlib.metadata.distribution("click"))
 
 
-def test_the_command_warns_of_an_autograder_without_walls(tmp_path):
+def test_the_command_warns_of_an_autograder_without_walls(tmp_path: Path) -> None:
     """Whoever wants that learns what it means."""
     done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "a.zip"), "--isolation", "none"])
     assert "can write its own result" in done.output
     assert (tmp_path / "a.zip").exists()
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path):
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     """In one line."""
     (tmp_path / "file").write_text("")
     done = CliRunner().invoke(app, ["export", "gradescope", str(tmp_path / "file" / "a.zip")])

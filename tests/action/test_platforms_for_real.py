@@ -41,7 +41,7 @@ raise RuntimeError("\\n".join(COMMANDS) + f"\\ncanaries: {{found}}")
 
 
 @pytest.fixture
-def checkout(tmp_path):
+def checkout(tmp_path: Path) -> Path:
     """Return a checkout whose git configuration holds a token, as some workflows leave it."""
     folder = tmp_path / "checkout"
     (folder / ".git").mkdir(parents=True)
@@ -49,21 +49,21 @@ def checkout(tmp_path):
     return folder
 
 
-def with_grader():
+def with_grader() -> str:
     return f"{BIN}{os.pathsep}{os.environ['PATH']}"
 
 
-def pry(checkout, *places):
+def pry(checkout: Path, *places: Path) -> None:
     source = PRYING.format(places=[str(checkout / ".git" / "config"), *map(str, places)])
     (checkout / "velocity_publisher.py").write_text(source)
 
 
-def solve(checkout):
+def solve(checkout: Path) -> None:
     shutil.copy(ROOT / "reference_solutions" / "velocity_publisher.py", checkout)
 
 
 @pytest.mark.ros
-def test_the_action_grades_and_a_prying_student_finds_nothing(checkout, tmp_path):
+def test_the_action_grades_and_a_prying_student_finds_nothing(checkout: Path, tmp_path: Path) -> None:
     """No token in the environment, in /proc, in the checkout or the runner's folder; no command in the log."""
     secret = tmp_path / "runner" / "secret"
     pry(checkout, secret, tmp_path / "runner" / "1" / "OUTPUT")
@@ -88,7 +88,7 @@ def test_the_action_grades_and_a_prying_student_finds_nothing(checkout, tmp_path
 
 
 @pytest.mark.ros
-def test_without_a_sandbox_the_prying_student_finds_something(checkout, tmp_path):
+def test_without_a_sandbox_the_prying_student_finds_something(checkout: Path, tmp_path: Path) -> None:
     """The test above can fail."""
     pry(checkout)
     environment = job_environment(PATH=with_grader())
@@ -106,7 +106,7 @@ def test_without_a_sandbox_the_prying_student_finds_something(checkout, tmp_path
 
 
 @pytest.fixture
-def autograder(tmp_path):
+def autograder(tmp_path: Path) -> Path:
     """Return a folder as Gradescope lays it out, with the exported autograder in it."""
     root = tmp_path / "autograder"
     (root / "submission").mkdir(parents=True)
@@ -119,13 +119,13 @@ def autograder(tmp_path):
     return root
 
 
-def run_autograder(root):
+def run_autograder(root: Path) -> subprocess.CompletedProcess[str]:
     environment = job_environment(PATH=with_grader(), AUTOGRADER_ROOT=str(root))
     return subprocess.run([root / "run_autograder"], env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.ros
-def test_gradescope_s_zip_leaves_results(autograder):
+def test_gradescope_s_zip_leaves_results(autograder: Path) -> None:
     """Unpacked and run as the platform does; the exercise is the one that was chosen."""
     solve(autograder / "submission")
     done = run_autograder(autograder)
@@ -137,7 +137,7 @@ def test_gradescope_s_zip_leaves_results(autograder):
 
 
 @pytest.mark.ros
-def test_classroom50_gets_its_files(checkout, tmp_path):
+def test_classroom50_gets_its_files(checkout: Path, tmp_path: Path) -> None:
     """The result follows the platform's schema, a student's file of that name is replaced, no command is obeyed."""
     pry(checkout)
     elsewhere = tmp_path / "elsewhere"
@@ -158,7 +158,7 @@ def test_classroom50_gets_its_files(checkout, tmp_path):
         jsonschema.validate(result, json.loads(SCHEMA.read_text(encoding="utf-8")))
 
 
-def bundle(tmp_path):
+def bundle(tmp_path: Path) -> Path:
     """Return the exported folder; without its wheel, the autograder uses the grader of this machine."""
     folder = tmp_path / "bundle"
     done = CliRunner().invoke(app, ["export", "classroom50", str(folder), "--exercise", "velocity_publisher"])
@@ -167,17 +167,17 @@ def bundle(tmp_path):
     return folder
 
 
-def run_classroom50(checkout, folder, **more):
+def run_classroom50(checkout: Path, folder: Path, **more: str) -> subprocess.CompletedProcess[str]:
     names = {"CLASSROOM": "ros", "ASSIGNMENT": "one", "ASSIGNMENT_TYPE": "individual", "OWNER": "ada"}
     names |= {"USERNAME": "ada", "SUBMISSION_TAG": "submit/2026-06-01T14-32-05Z-a1b2c3d"}
     names |= dict.fromkeys(("COMMIT_URL", "RELEASE_URL", "REVIEW_URL"), "https://github.com/school/one/x")
     environment = job_environment(PATH=with_grader(), RUNNER_TEMP=str(folder.parent), **names, **more)
-    words = [sys.executable, folder / "autograder.py"]
+    words: list[str | Path] = [sys.executable, folder / "autograder.py"]
     return subprocess.run(words, cwd=checkout, env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.ros
-def test_the_action_sets_itself_up_from_nothing(checkout, tmp_path):
+def test_the_action_sets_itself_up_from_nothing(checkout: Path, tmp_path: Path) -> None:
     """With the system's Python, the pinned versions, and a submission that passes."""
     solve(checkout)
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("VIRTUAL_ENV", "PYTHON"))}
@@ -188,7 +188,7 @@ def test_the_action_sets_itself_up_from_nothing(checkout, tmp_path):
     assert "Passed." in job.log
     # What was installed can be packed in its turn.
     own = tmp_path / "runner" / "temp" / "rclpy-grader" / "bin" / "grade"
-    words = [own, "export", "classroom50", tmp_path / "bundle"]
+    words: list[str | Path] = [own, "export", "classroom50", tmp_path / "bundle"]
     subprocess.run(words, env={**environment, "PATH": path}, cwd=tmp_path, check=True)
     names = {file.name for file in (tmp_path / "bundle").iterdir()}
     assert {"autograder.py", "prepare", "constraints.txt", "settings.json"} < names

@@ -2,6 +2,8 @@
 
 import shutil
 import subprocess
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from stand_in_runner import ROOT
@@ -10,22 +12,25 @@ pytestmark = pytest.mark.slow
 
 RESTRICTION = "sys/kernel/apparmor_restrict_unprivileged_userns"
 SYSCTL = "sysctl --quiet --write kernel.apparmor_restrict_unprivileged_userns=0"
+Prepare = Callable[..., tuple[list[str], str]]
 
 
 @pytest.fixture
-def machine(tmp_path):
+def machine(tmp_path: Path) -> Prepare:
     """Return a function that prepares a machine and tells what was run on it."""
     programs, calls = tmp_path / "bin", tmp_path / "calls"
     (tmp_path / "venv" / "bin").mkdir(parents=True)
     programs.mkdir()
     for name in ("bash", "cat", "env"):
-        (programs / name).symlink_to(shutil.which(name))
+        (programs / name).symlink_to(shutil.which(name) or name)
 
-    def stand_in(path, ends=0, does=""):
+    def stand_in(path: Path, ends: int = 0, does: str = "") -> None:
         path.write_text(f'#!/bin/sh\necho "{path.name} $*" >> {calls}\n{does}\nexit {ends}\n')
         path.chmod(0o755)
 
-    def prepare(*, user=0, restricted="1", bwrap=True, sysctl=0, **environment):
+    def prepare(
+        *, user: int = 0, restricted: str | None = "1", bwrap: bool = True, sysctl: int = 0, **environment: str
+    ) -> tuple[list[str], str]:
         stand_in(tmp_path / "venv" / "bin" / "python")
         stand_in(programs / "id", does=f"echo {user}")
         stand_in(programs / "apt-get")
@@ -36,7 +41,13 @@ def machine(tmp_path):
         if restricted is not None:
             (tmp_path / RESTRICTION).parent.mkdir(parents=True)
             (tmp_path / RESTRICTION).write_text(f"{restricted}\n")
-        words = [programs / "bash", ROOT / "integrations" / "prepare", tmp_path / "venv", "a wheel.whl", "pins.txt"]
+        words: list[str | Path] = [
+            programs / "bash",
+            ROOT / "integrations" / "prepare",
+            tmp_path / "venv",
+            "a wheel.whl",
+            "pins.txt",
+        ]
         surroundings = {"PATH": str(programs), "PROC": str(tmp_path), **environment}
         done = subprocess.run(words, env=surroundings, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
@@ -48,32 +59,32 @@ def machine(tmp_path):
 PIP = "python -I -m pip install --quiet --disable-pip-version-check --constraint pins.txt a wheel.whl"
 
 
-def test_on_github_s_machines_namespaces_are_allowed(machine):
+def test_on_github_s_machines_namespaces_are_allowed(machine: Prepare) -> None:
     """Their user is not root, but may become it."""
     calls, _ = machine(user=1001, RUNNER_ENVIRONMENT="github-hosted")
     assert calls == [f"sudo -n {SYSCTL}", SYSCTL, PIP]
 
 
 @pytest.mark.parametrize("environment", [{"RUNNER_ENVIRONMENT": "self-hosted"}, {}])
-def test_nobody_else_s_machine_is_changed(machine, environment):
+def test_nobody_else_s_machine_is_changed(machine: Prepare, environment: dict[str, str]) -> None:
     """It may live for years."""
     assert machine(user=1001, **environment)[0] == [PIP]
 
 
 @pytest.mark.parametrize("restricted", ["0", None])
-def test_what_is_not_restricted_is_left_alone(machine, restricted):
+def test_what_is_not_restricted_is_left_alone(machine: Prepare, restricted: str | None) -> None:
     """Other systems do not even have the setting."""
     assert machine(restricted=restricted, RUNNER_ENVIRONMENT="github-hosted")[0] == [PIP]
 
 
-def test_a_setting_that_cannot_be_changed_is_not_the_end(machine):
+def test_a_setting_that_cannot_be_changed_is_not_the_end(machine: Prepare) -> None:
     """In a container it is read-only; which sandbox holds is found out later."""
     calls, said = machine(sysctl=1, RUNNER_ENVIRONMENT="github-hosted")
     assert calls == [SYSCTL, PIP]
     assert "another sandbox will be tried" in said
 
 
-def test_bubblewrap_is_installed_where_it_is_missing(machine):
+def test_bubblewrap_is_installed_where_it_is_missing(machine: Prepare) -> None:
     """From the distribution."""
     calls, _ = machine(bwrap=False)
     assert calls[0] == "apt-get update -qq"
