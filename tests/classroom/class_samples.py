@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -36,8 +36,8 @@ class FakeScheduler:
     """Gives each submission the score in its `score.py`, or the state that this is the name of."""
 
     def __init__(self, jobs: int = 1, stop_after: int | None = None) -> None:
-        self.graded = []
-        self.tasks = {}
+        self.graded: list[str] = []
+        self.tasks: dict[str, Task] = {}
         self.stop_after = stop_after
 
     def __call__(self, jobs: int) -> FakeScheduler:
@@ -46,7 +46,7 @@ class FakeScheduler:
     def prepare(self, isolation: str) -> list[Any]:
         return ["no walls"] if isolation == "none" else []
 
-    def run(self, tasks: Sequence[Task], hear: Callable[..., Any]) -> Iterator[Attempt]:
+    def run(self, tasks: Sequence[Task], hear: Callable[..., Any]) -> Generator[Attempt, None, None]:
         for task in tasks:
             if len(self.graded) == self.stop_after:
                 raise KeyboardInterrupt
@@ -96,7 +96,7 @@ def course(source: Path, results: Path, **changes: Any) -> ClassRequest:
     return replace(ClassRequest((source,), results, grading=GRADING), **changes)
 
 
-def grade(wanted: ClassRequest, scheduler: FakeScheduler | None = None, watcher: None = None) -> Graded | None:
+def grade(wanted: ClassRequest, scheduler: FakeScheduler | None = None, watcher: Watcher | None = None) -> Graded:
     """Grade a class with the fake scheduler, or another one."""
     from grader.classroom.class_run import grade_class
 

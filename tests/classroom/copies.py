@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import random
 from collections.abc import Mapping
+from typing import Any
 
 from grader.similarity.finding import programs_of
 from grader.similarity.library import Handed
@@ -15,14 +16,16 @@ FILE = "odom_subscriber.py"
 # Names that stay: what ROS and Python call things.
 _KEPT = {"main", "self", "__init__", "__name__", "args"}
 
+Named = ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
 
 class _Names(ast.NodeVisitor):
     """Collects what a program names itself."""
 
     def __init__(self) -> None:
-        self.names = set()
+        self.names: set[str] = set()
 
-    def visit_FunctionDef(self, node: ast.ClassDef | ast.FunctionDef) -> None:
+    def visit_FunctionDef(self, node: Named) -> None:
         self.names.add(node.name)
         self.generic_visit(node)
 
@@ -47,7 +50,7 @@ class _Rename(ast.NodeTransformer):
     def __init__(self, names: Mapping[str, str]) -> None:
         self.names = names
 
-    def visit_FunctionDef(self, node: ast.ClassDef | ast.FunctionDef) -> ast.ClassDef | ast.FunctionDef:
+    def visit_FunctionDef(self, node: Named) -> Named:
         node.name = self.names.get(node.name, node.name)
         self.generic_visit(node)
         return node
@@ -120,7 +123,7 @@ def logged(text: str, seed: int = 0) -> str:
 DISGUISES = {"comments": commented, "order": reordered, "names": renamed, "all and lines added": logged}
 
 
-def handed(name: str, *texts: bytes | str, **more: tuple[str]) -> Handed:
+def handed(name: str, *texts: bytes | str, **more: Any) -> Handed:
     """Return a submission of these texts, or byte strings."""
     contents = [text if isinstance(text, bytes) else text.encode() for text in texts]
     files = [(FILE if k == 0 else f"file_{k}.py", content) for k, content in enumerate(contents)]

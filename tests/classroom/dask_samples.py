@@ -9,8 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from distributed.scheduler import KilledWorker
-
 from grader.classroom import store as kept
 from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
@@ -21,12 +19,12 @@ CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "a
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
 
 
-def task(folder: Path, name: str = "ada", **changes: Path | str | tuple[Path]) -> Task:
+def task(folder: Path, name: str = "ada", **changes: Any) -> Task:
     """Return a task for a submission that lies in `folder/name` and holds one program."""
     place = folder / name
     place.mkdir(exist_ok=True)
     (place / "velocity_publisher.py").write_text("pass\n", encoding="utf-8")
-    fields = {
+    fields: dict[str, Any] = {
         "name": name,
         "label": name,
         "submission": place,
@@ -54,7 +52,7 @@ def graded(
 class FakeFuture:
     """An answer that is there at once, unless nobody would take the submission."""
 
-    def __init__(self, key: str, status: str, value: ImportError | KilledWorker | bytes | None) -> None:
+    def __init__(self, key: str, status: str, value: Exception | bytes | None) -> None:
         self.key, self.status, self._value = key, status, value
 
     def add_done_callback(self, call: Callable[..., Any]) -> None:
@@ -62,9 +60,11 @@ class FakeFuture:
             call(self)
 
     def result(self) -> bytes:
+        assert isinstance(self._value, bytes)
         return self._value
 
-    def exception(self) -> ImportError | KilledWorker:
+    def exception(self) -> Exception:
+        assert isinstance(self._value, Exception)
         return self._value
 
     def release(self) -> None:
@@ -77,7 +77,7 @@ class FakeClient:
     def __init__(
         self,
         answers: Callable[..., Any] | None = None,
-        threads: Mapping[str, int] | None = None,
+        threads: dict[str, int] | None = None,
         versions: Mapping[str, Any] | None = None,
         fitness: Mapping[str, Any] | None = None,
         scheduler: PackageNotFoundError | str = "0.1.0",
@@ -88,8 +88,10 @@ class FakeClient:
         self.fitness = fitness or {}
         self.scheduler = scheduler
         self.status = "running"
-        self.sent, self.cancelled, self.keys = [], [], []
-        self.handler = None
+        self.sent: list[str] = []
+        self.cancelled: list[FakeFuture] = []
+        self.keys: list[str] = []
+        self.handler: Callable[..., Any] | None = None
 
     def nthreads(self) -> dict[str, int] | None:
         if self.status != "running":

@@ -18,7 +18,7 @@ CLASS = {"ada": "correct/velocity_class", "bob": "wrong/velocity_10_hz", "cleo":
 
 
 @pytest.fixture
-def class_(tmp_path):
+def class_(tmp_path: Path) -> Path:
     """Return a folder of three submissions and one that is none."""
     for name, source in CLASS.items():
         shutil.copytree(SUBMISSIONS / source, tmp_path / "class" / name)
@@ -26,23 +26,24 @@ def class_(tmp_path):
     return tmp_path / "class"
 
 
-def run(*arguments):
+def run(*arguments: Path | str) -> subprocess.CompletedProcess[str]:
     """Run the command, and return it with what it printed."""
     return subprocess.run([*GRADE, "batch", *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
-def points(results):
+def points(results: Path) -> dict[str, str]:
     """Return name -> score of a gradebook."""
     rows = csv.DictReader(io.StringIO((results / "gradebook.csv").read_text(encoding="utf-8"), newline=""))
     return {row["submission"]: row["score"] for row in rows}
 
 
-def test_a_killed_class_is_finished_by_the_same_command(class_, tmp_path):
+def test_a_killed_class_is_finished_by_the_same_command(class_: Path, tmp_path: Path) -> None:
     """What was done is not run again, the scores are those of an undisturbed run, and no process is left."""
     results = tmp_path / "out"
     first = subprocess.Popen(
         [*GRADE, "batch", class_, "-o", results, *ONE], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
+    assert first.stderr is not None
     assert first.stderr.readline() == "to grade: 4\n"
     assert first.stderr.readline().startswith("[1/4] ada: 30/30")
     first.kill()
@@ -60,7 +61,7 @@ def test_a_killed_class_is_finished_by_the_same_command(class_, tmp_path):
     assert "to grade: 0, done before: 4" in run(class_, "-o", results, *ONE).stderr
 
 
-def test_results_are_whole(class_, tmp_path):
+def test_results_are_whole(class_: Path, tmp_path: Path) -> None:
     """Report, page, evidence and what Gradescope takes; the page shares its scripts with the class."""
     results = tmp_path / "out"
     shutil.rmtree(class_ / "dan")
@@ -79,12 +80,12 @@ def test_results_are_whole(class_, tmp_path):
     assert "judged: 3" in again.stdout, again.stderr
 
 
-def test_a_download_is_graded_where_a_student_hides_modules(class_, tmp_path):
+def test_a_download_is_graded_where_a_student_hides_modules(class_: Path, tmp_path: Path) -> None:
     """The command is given in a folder with a `json.py`: it is not imported."""
     (tmp_path / "json.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
     (tmp_path / "grader.py").write_text("raise SystemExit('imported')\n", encoding="utf-8")
     archive = shutil.make_archive(str(tmp_path / "hw"), "zip", class_)
-    command = [Path(sys.executable).with_name("grade"), "batch", "hw.zip", "-o", "out", *ONE]
+    command: list[Path | str] = [Path(sys.executable).with_name("grade"), "batch", "hw.zip", "-o", "out", *ONE]
     assert archive.endswith("hw.zip")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr

@@ -43,7 +43,7 @@ def class_(tmp_path: Path) -> Callable[..., Any]:
 
     def run(
         canvas: str = "", *, gradebook: bool = False, moodle: bool = False, gradescope: bool = False, **changes: Path
-    ) -> tuple[Graded, Path] | None:
+    ) -> tuple[Graded, Path]:
         files = [tmp_path / "gradebook.csv" if gradebook else None, tmp_path / "moodle.csv" if moodle else None]
         wanted = platforms(canvas, *files, gradescope=gradescope)
         here = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / "roster.csv", platforms=wanted, **changes)

@@ -23,7 +23,10 @@ def page_of(folder: Path) -> str:
 
 def data_of(folder: Path) -> dict[str, Any]:
     """Return the data in the page."""
-    return json.loads(re.search(r'<script type="application/json" id="class">(.*?)</script>', page_of(folder))[1])
+    found = re.search(r'<script type="application/json" id="class">(.*?)</script>', page_of(folder))
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
 
 
 def standing(folder: Path) -> dict[str, str]:

@@ -26,7 +26,13 @@ def commit(store: Store, new: ResultStatus, name: str = "ada", text: str = "repo
     return store.commit(name, fresh, new)
 
 
-def leftovers(store: Store) -> list[Any]:
+def result_of(store: Store) -> ResultStatus:
+    result = store.kept("ada").result
+    assert result is not None
+    return result
+
+
+def leftovers(store: Store) -> list[str]:
     return [path.name for path in (store.folder / "students").iterdir() if path.name.startswith(".")]
 
 
@@ -35,7 +41,7 @@ def test_a_new_result_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     with open_store(tmp_path) as store:
         assert commit(store, standing(score=1.0), text="old")
         assert commit(store, standing(score=2.0), text="new")
-        assert store.kept("ada").result.score == 2.0
+        assert result_of(store).score == 2.0
         assert (store.place("ada") / "report.json").read_text(encoding="utf-8") == "new"
         assert leftovers(store) == []
 
@@ -50,7 +56,7 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(
         calls = [0]
 
         def stopping(function: Callable[..., Any]) -> Callable[..., Any]:
-            def wrapped(*arguments: Path | int | str, **named: int | None) -> None:
+            def wrapped(*arguments: Path | int | str, **named: int | None) -> object:
                 calls[0] += 1
                 if calls[0] == step:
                     raise KeyboardInterrupt
@@ -64,7 +70,7 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(
             with contextlib.suppress(KeyboardInterrupt):
                 commit(store, standing(score=2.0), text="new")
     with open_store(tmp_path) as store:
-        found = (store.kept("ada").result.score, (store.place("ada") / "report.json").read_text(encoding="utf-8"))
+        found = (result_of(store).score, (store.place("ada") / "report.json").read_text(encoding="utf-8"))
         assert found in [(1.0, "old"), (2.0, "new")]
         assert leftovers(store) == []
 
@@ -99,6 +105,9 @@ def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path: Path) ->
         commit(store, standing(score=5.0))
         assert not commit(store, standing(State.FAILED))
         kept = store.kept("ada")
+        assert kept.result is not None
+        assert kept.attempt is not None
+        assert kept.last is not None
         assert (kept.result.score, kept.attempt.state, kept.last.state) == (5.0, State.FAILED, State.FAILED)
         assert commit(store, standing(score=6.0))
         assert store.kept("ada").attempt is None
@@ -117,7 +126,7 @@ def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monk
             with pytest.raises(HarnessError, match="No space left on device") as error:
                 commit(store, standing(score=6.0), text="new")
         assert "the same command goes on" in error.value.hint
-        assert store.kept("ada").result.score == 5.0
+        assert result_of(store).score == 5.0
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b'{"schema": "grader/batch-result/v1"}', b"\xff", b"[" * 5000])
@@ -129,7 +138,9 @@ def test_a_damaged_standing_is_none(data: bytes) -> None:
 def test_a_standing_survives_names_that_are_no_text() -> None:
     """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
     odd = ResultStatus(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
-    assert load(dump(odd)).state is State.REFUSED
+    read = load(dump(odd))
+    assert read is not None
+    assert read.state is State.REFUSED
 
 
 def test_a_standing_of_another_version_is_none() -> None:

@@ -21,6 +21,7 @@ from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
+from grader.rubrics.variants import Recorded
 
 ROSTER = (
     "name,username,email,id number\nAda,ada,ada@x.edu,17\nBob,bob,bob@x.edu,\nEve,eve,eve@x.edu,18\nEve 2,eve,,19\n"
@@ -37,7 +38,7 @@ def class_(tmp_path: Path) -> Callable[..., Any]:
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {between: [5 Hz, 500 Hz], step: 1 Hz}\nscenarios:", 1)
     (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
 
-    def run(*, key: str = "course.key", roster: str = "roster.csv") -> tuple[Graded, FakeScheduler] | None:
+    def run(*, key: str = "course.key", roster: str = "roster.csv") -> tuple[Graded, FakeScheduler]:
         scheduler = FakeScheduler()
         grading = replace(GRADING, rubrics=(tmp_path / "r.yaml",), variant_key=tmp_path / key if key else None)
         wanted = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / roster if roster else None)
@@ -52,6 +53,7 @@ def test_everybody_is_graded_by_their_own_values(class_: Callable[..., Any], tmp
     found = {name: task.conditions for name, task in scheduler.tasks.items()}
     assert {name: conditions.variants.student for name, conditions in found.items()} == {"ada": "17", "bob": "bob"}
     sheet = read_rubric(tmp_path / "r.yaml", draw=by_key(tmp_path / "course.key", "17"))
+    assert sheet.variant is not None
     assert found["ada"].variants == Drawn("17", {"velocity_publisher": dict(sheet.variant.values)})
     assert found["ada"].rubrics == (("velocity_publisher", sheet.digest),)
     assert found["ada"].rubrics != found["bob"].rubrics
@@ -97,5 +99,6 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
     standing = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
     (request,) = heard
+    assert isinstance(request.draw, Recorded)
     assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)
     assert standing.state is State.FAILED

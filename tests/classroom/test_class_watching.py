@@ -27,7 +27,8 @@ def standing(state: State = State.GRADED, problem: str = "") -> ResultStatus:
 
 def test_each_one_is_a_line_with_rate_and_time_left() -> None:
     """The rate is that of this run, what was done before does not count."""
-    clock, lines = Clock(), []
+    clock = Clock()
+    lines: list[str] = []
     watcher = Watcher(lines.append, clock)
     watcher.begin(60, 7)
     for name in ("ada", "bob", "cleo"):
@@ -44,14 +45,15 @@ def test_each_one_is_a_line_with_rate_and_time_left() -> None:
 
 def test_many_that_run_are_counted() -> None:
     """A line stays a line on a machine with many processors."""
-    watcher = Watcher([].append, Clock())
+    lines: list[str] = []
+    watcher = Watcher(lines.append, Clock())
     watcher.begin(9, 0)
     for name in "abcdefg":
         watcher.step(name, "grading")
     assert watcher.pace() == "0.0/min, ? left; running: a, b, c, d and 3 more"
 
 
-def test_a_terminal_shows_a_bar_under_the_lines():
+def test_a_terminal_shows_a_bar_under_the_lines() -> None:
     """What was done before is said once, and lines leave the count to the bar."""
     out = io.StringIO()
     words = TextColumn("{task.fields[words]}", markup=False)

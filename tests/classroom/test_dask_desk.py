@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from dask_samples import ONE, TWO, FakeClient, graded, task
-from distributed import KilledWorker
+from distributed import Client, KilledWorker
+from distributed.scheduler import WorkerState
 
 from grader.classroom.cluster.dispatcher import ClusterScheduler
 from grader.classroom.messages import JobResult
@@ -36,7 +37,7 @@ def run(
     hear: Callable[..., Any] = lambda name, step: None,
 ) -> dict[str, ResultStatus]:
     """Grade on a cluster, and return name -> standing; each name comes once."""
-    here = ClusterScheduler(client, jobs, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), jobs, lambda line: None)
     here.prepare("auto")
     attempts = list(here.run([task(tmp_path, name) for name in names], hear))
     assert Counter(a.task.name for a in attempts) == Counter(names)
@@ -56,10 +57,11 @@ def test_everybody_has_a_result_once(tmp_path: Path) -> None:
 def test_no_more_are_under_way_than_asked(tmp_path: Path, jobs: int | None, most: int) -> None:
     """By default as many as the workers have threads."""
     client = FakeClient(answers=lambda name, only: "pending", threads={ONE: 2, TWO: 1})
-    here = ClusterScheduler(client, jobs, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), jobs, lambda line: None)
     with closing(here.run([task(tmp_path, name) for name in NAMES], lambda name, step: None)) as attempts:
-        client.subscribe_topic = lambda topic, handler: None
-        nthreads, looks = client.nthreads, []
+        client.subscribe_topic = lambda topic, handler: None  # type: ignore[method-assign]
+        nthreads = client.nthreads
+        looks: list[int] = []
 
         def look() -> dict[str, int] | None:
             looks.append(1)
@@ -67,7 +69,7 @@ def test_no_more_are_under_way_than_asked(tmp_path: Path, jobs: int | None, most
                 raise OSError("enough")
             return nthreads()
 
-        client.nthreads = look
+        client.nthreads = look  # type: ignore[method-assign]
         with pytest.raises(HarnessError):
             next(attempts)
     assert len(client.sent) == most
@@ -76,7 +78,7 @@ def test_no_more_are_under_way_than_asked(tmp_path: Path, jobs: int | None, most
 
 def test_whoever_ends_workers_fails_alone(tmp_path: Path) -> None:
     """The others have their results; a failure is no mark."""
-    killed = KilledWorker("grade-1", SimpleNamespace(address=TWO), 3)
+    killed = KilledWorker("grade-1", cast("WorkerState", SimpleNamespace(address=TWO)), 3)
     found = run(tmp_path, FakeClient(answers=lambda name, only: killed if name == "bob" else graded(name)))
     assert found["bob"].problem == "4 workers of the cluster ended while they graded it"
     assert Counter(s.state for s in found.values()) == {State.GRADED: 3, State.FAILED: 1}
@@ -108,7 +110,7 @@ def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path: Path) -
 @pytest.mark.parametrize("trouble", ["cancelled", "lost", ImportError("no module")])
 def test_what_the_cluster_loses_is_sent_again(tmp_path: Path, trouble: ImportError | str) -> None:
     """A few times; then it is a failure, and the others go on."""
-    count = Counter()
+    count: Counter[str] = Counter()
 
     def answers(name: str, only: None) -> JobResult | ImportError | str:
         count[name] += 1
@@ -146,9 +148,9 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path: Path) -> None:
         return graded(name)
 
     client.answers = answers
-    here = ClusterScheduler(client, 1, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), 1, lambda line: None)
     here.prepare("auto")
-    done = []
+    done: list[str] = []
     with pytest.raises(HarnessError, match="found it gone"):
         done.extend(a.task.name for a in here.run([task(tmp_path, n) for n in NAMES], lambda name, step: None))
     assert done == ["ada", "bob"]
@@ -158,12 +160,17 @@ def test_a_scheduler_that_is_lost_ends_the_run(tmp_path: Path) -> None:
 def test_large_parcels_are_laid_down_first(tmp_path: Path) -> None:
     """And do not travel with what is to be done."""
     client = FakeClient()
-    scattered = []
+    scattered: list[int] = []
     scatter = client.scatter
-    client.scatter = lambda data, **options: scattered.append(len(data)) or scatter(data, **options)
+
+    def counted(data: bytes, **options: bool) -> SimpleNamespace:
+        scattered.append(len(data))
+        return scatter(data, **options)
+
+    client.scatter = counted  # type: ignore[method-assign]
     one = task(tmp_path, "ada")
     (one.submission / "data.bin").write_bytes(bytes(2 << 20))
-    here = ClusterScheduler(client, None, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), None, lambda line: None)
     assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
     assert [size >> 20 for size in scattered] == [2]
 
@@ -172,23 +179,25 @@ def test_large_parcels_are_laid_down_first(tmp_path: Path) -> None:
 def test_where_nothing_can_be_laid_down_it_travels(tmp_path: Path, trouble: OSError | TimeoutError) -> None:
     """The worker that was to hold it may end at that very moment."""
 
-    def scatter(data: bytes, **options: bool) -> None:
+    def scatter(data: bytes, **options: bool) -> SimpleNamespace:
         raise trouble
 
     client = FakeClient()
-    client.scatter = scatter
+    client.scatter = scatter  # type: ignore[method-assign]
     one = task(tmp_path, "ada")
     (one.submission / "data.bin").write_bytes(bytes(2 << 20))
-    here = ClusterScheduler(client, None, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), None, lambda line: None)
     assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
 
 
 def test_steps_are_heard_while_a_submission_is_under_way(tmp_path: Path) -> None:
     """And neither late nor from strangers."""
-    client, heard = FakeClient(), []
+    client = FakeClient()
+    heard: list[tuple[str, str]] = []
 
     def answers(name: str, only: None) -> JobResult:
         for said in ({"name": name, "step": "alone"}, {"name": "nobody", "step": "x"}, "nonsense"):
+            assert client.handler is not None
             client.handler((0.0, said))
         return graded(name)
 
@@ -203,7 +212,7 @@ def test_what_cannot_be_used_is_not_sent(tmp_path: Path) -> None:
     client = FakeClient()
     tasks = [task(tmp_path, name) for name in ("ada", "bob")]
     (tasks[0].submission / "velocity_publisher.py").unlink()
-    here = ClusterScheduler(client, None, lambda line: None)
+    here = ClusterScheduler(cast("Client", client), None, lambda line: None)
     found = {a.task.name: a.standing.state for a in here.run(tasks, lambda name, step: None)}
     assert found == {"ada": State.REFUSED, "bob": State.GRADED}
     assert client.sent == ["bob"]

@@ -6,7 +6,9 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,7 +28,7 @@ TAKEN = re.compile(rb'"(?:duration_s|execution_time|processor_s|peak_bytes)": [\
 
 
 @pytest.fixture
-def class_(tmp_path):
+def class_(tmp_path: Path) -> Path:
     """Return a class of eight: folders, an archive, a large file, a link, no such file, nothing at all."""
     folder = tmp_path / "class"
     for name, source in CLASS.items():
@@ -41,13 +43,14 @@ def class_(tmp_path):
 
 
 @pytest.fixture
-def cluster(tmp_path):
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """Start a scheduler and two workers, and return its address and the workers."""
-    place = {"cwd": tmp_path, "stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "text": True}
-    running = []
+    place: dict[str, Any] = {"cwd": tmp_path, "stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "text": True}
+    running: list[subprocess.Popen[str]] = []
     try:
         command = [*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
         running.append(subprocess.Popen(command, stderr=subprocess.PIPE, **place))
+        assert running[0].stderr is not None
         log = iter(running[0].stderr.readline, "")
         address = next(found[1] for line in log if (found := re.search(r"Scheduler at:\s+(tcp://\S+)", line)))
         for name in ("one", "two"):
@@ -61,7 +64,7 @@ def cluster(tmp_path):
             process.communicate()
 
 
-def results(folder):
+def results(folder: Path) -> dict[str, bytes]:
     """Return name and file -> content of all results, without how long they took."""
     students = folder / "students"
     paths = [path for path in sorted(students.rglob("*")) if path.is_file()]
@@ -71,7 +74,9 @@ def results(folder):
 
 
 @pytest.mark.nightly
-def test_a_class_survives_the_loss_of_a_worker(class_, cluster, tmp_path):
+def test_a_class_survives_the_loss_of_a_worker(
+    class_: Path, cluster: tuple[str, list[subprocess.Popen[str]]], tmp_path: Path
+) -> None:
     """Every result arrives once, and is what this machine makes of the submission."""
     address, workers = cluster
     (tmp_path / "seed.key").write_text("one key for both, so that both draw the same values", encoding="ascii")
@@ -82,6 +87,7 @@ def test_a_class_survives_the_loss_of_a_worker(class_, cluster, tmp_path):
     command = [*GRADE, "-o", "there", *options, "--scheduler", address]
     said = []
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as there:
+        assert there.stderr is not None
         for line in there.stderr:
             said.append(line)
             if line.startswith("[3/8]"):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from importlib.metadata import PackageNotFoundError
-from typing import Any
+from typing import cast
 
 import pytest
 from dask_samples import ONE, TWO, FakeClient
+from distributed import Client
 
 from grader.classroom.cluster.worker_pool import WorkerPool
 from grader.classroom.messages import Fitness
@@ -15,10 +16,10 @@ from grader.core.errors import EnvironmentFault, HarnessError
 WALLS = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 
 
-def fleet(client: FakeClient) -> tuple[WorkerPool, list[Any]]:
+def fleet(client: FakeClient) -> tuple[WorkerPool, list[str]]:
     """Return the workers, and what is said of those that join later."""
-    said = []
-    return WorkerPool(client, "0.1.0", said.append), said
+    said: list[str] = []
+    return WorkerPool(cast("Client", client), "0.1.0", said.append), said
 
 
 @pytest.mark.parametrize(
