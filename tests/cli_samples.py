@@ -7,7 +7,7 @@ from grader.core.report import Environment, ExerciseReport, Report, Verdict
 from grader.core.trace import ClockKind
 
 
-def a_report(*outcomes, score=None):
+def a_report(*outcomes: Outcome, score: None = None) -> Report:
     """Return a report of one exercise with a criterion of 10 points for each outcome."""
     earned = {Outcome.MET: 10, Outcome.PARTLY: 5}
     verdicts = tuple(

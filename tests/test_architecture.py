@@ -5,6 +5,7 @@ import functools
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,11 +30,11 @@ HOST_MAY_IMPORT = {"rclpy", "time_machine", "geometry_msgs", "nav_msgs", "sensor
 
 
 @functools.cache
-def tree_of(path):
+def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def imports_of(path):
+def imports_of(path: Path) -> Iterator[str]:
     """Yield the absolute module names that a file imports, wherever in it; relative ones begin with a dot."""
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
@@ -59,7 +60,7 @@ READS_TEXT = {
 }
 
 
-def is_for_people(node):
+def is_for_people(node: ast.AST) -> bool:
     """Return whether an expression is a reason, a hint, a note, or the text of a fault, by its name or its key."""
     if isinstance(node, ast.Call):
         called = node.func
@@ -79,7 +80,7 @@ def is_for_people(node):
     return name in FOR_PEOPLE
 
 
-def reads_text(node):
+def reads_text(node: ast.AST) -> bool:
     """Return whether an expression decides or takes something by what a text for people says."""
     if isinstance(node, ast.Compare):
         pairs = zip(node.ops, node.comparators, strict=True)
@@ -90,17 +91,17 @@ def reads_text(node):
     return own or (node.func.attr in PATTERN_METHODS and any(map(is_for_people, node.args)))
 
 
-def text_readers(package):
+def text_readers(package: Path) -> list[str]:
     """Return the places that read texts for people, as `module:line`."""
     return [
         f"{path.relative_to(package).as_posix()}:{node.lineno}"
         for path in sorted(package.rglob("*.py"))
         for node in ast.walk(tree_of(path))
-        if reads_text(node)
+        if isinstance(node, ast.expr) and reads_text(node)
     ]
 
 
-def test_nothing_is_read_out_of_texts_for_people():
+def test_nothing_is_read_out_of_texts_for_people() -> None:
     """What a program has to know is a field of its own, so that sentences can be worded anew."""
     found = text_readers(PACKAGE)
     assert [place for place in found if place.partition(":")[0] not in READS_TEXT] == []
@@ -124,14 +125,14 @@ def test_nothing_is_read_out_of_texts_for_people():
         "'x' in str(verdict.hint)[:9]",
     ],
 )
-def test_a_planted_reader_of_texts_is_found(line, tmp_path):
+def test_a_planted_reader_of_texts_is_found(line: str, tmp_path: Path) -> None:
     """The rule can fail."""
     (tmp_path / "bad.py").write_text(f"def f(case, fault):\n    return {line}\n")
     assert text_readers(tmp_path) == ["bad.py:2"]
 
 
 @pytest.mark.parametrize("line", ["fault.said('x')", "'x' in record.text", "case.reason == other", "reason in known"])
-def test_what_is_no_reading_is_let_be(line, tmp_path):
+def test_what_is_no_reading_is_let_be(line: str, tmp_path: Path) -> None:
     """What a student's program wrote is no text of ours, and texts may be compared whole."""
     (tmp_path / "good.py").write_text(f"def f(case, fault):\n    return {line}\n")
     assert text_readers(tmp_path) == []
@@ -141,7 +142,7 @@ def test_what_is_no_reading_is_let_be(line, tmp_path):
 PURE = ("core", "judging", "reporting", "mutation/operators")
 
 
-def impurities(package):
+def impurities(package: Path) -> list[str]:
     """Return every import in a pure package of what touches the world, as sentences."""
     paths = sorted(path for pure in PURE for path in (package / pure).rglob("*.py"))
     found = []
@@ -152,12 +153,12 @@ def impurities(package):
     return found
 
 
-def test_judging_and_rendering_are_pure():
+def test_judging_and_rendering_are_pure() -> None:
     """They read neither files nor clocks, start nothing and roll no dice; delivery alone writes files."""
     assert impurities(PACKAGE) == []
 
 
-def test_a_planted_impurity_is_found(tmp_path):
+def test_a_planted_impurity_is_found(tmp_path: Path) -> None:
     """Also inside a function, and under another name."""
     planted = {
         "judging/checks/bad.py": "def f():\n    from time import sleep as rest\n",
@@ -176,7 +177,7 @@ def test_a_planted_impurity_is_found(tmp_path):
     ]
 
 
-def host_needs(package):
+def host_needs(package: Path) -> list[str]:
     """Return what the host imports beyond the standard library, ROS and itself, as sentences."""
     return [
         f"{path.name} imports {imported}"
@@ -187,12 +188,12 @@ def host_needs(package):
     ]
 
 
-def test_the_host_needs_little():
+def test_the_host_needs_little() -> None:
     """The host is the standard library, rclpy and its messages: it runs where nothing else is readable."""
     assert host_needs(PACKAGE) == []
 
 
-def test_a_planted_need_is_found(tmp_path):
+def test_a_planted_need_is_found(tmp_path: Path) -> None:
     """Other libraries, the rest of the grader, and what lies above the host's folder."""
     (tmp_path / "student_host").mkdir()
     source = "import os, numpy\nimport rclpy.node\nfrom . import fine\nfrom .fine import a\n"
@@ -200,7 +201,7 @@ def test_a_planted_need_is_found(tmp_path):
     assert host_needs(tmp_path) == ["bad.py imports numpy", "bad.py imports ..core", "bad.py imports grader"]
 
 
-def test_every_module_says_what_it_holds():
+def test_every_module_says_what_it_holds() -> None:
     """One sentence at the top of every file."""
     for path in sorted(PACKAGE.rglob("*.py")):
         assert ast.get_docstring(tree_of(path)), path
@@ -210,12 +211,12 @@ def test_every_module_says_what_it_holds():
 AT_HOME = re.compile(r"(?<![\w.}])(/home/(?!log\b)\w|/root/|/Users/\w|[A-Z]:\\\\)")
 
 
-def names_a_home(text):
+def names_a_home(text: str) -> bool:
     """Return whether a text names a place that only one machine has."""
     return AT_HOME.search(text) is not None
 
 
-def test_no_file_names_a_place_on_one_machine():
+def test_no_file_names_a_place_on_one_machine() -> None:
     """What is in the repository works anywhere, or it is not told where."""
     listed = subprocess.run(
         ["git", "ls-files", "*.py", "*.md", "*.toml", "*.yaml", "*.yml", "*.xml"],
@@ -232,7 +233,7 @@ def test_no_file_names_a_place_on_one_machine():
 
 
 @pytest.mark.parametrize("place", ["/home/ada/x", "see /root/x", "'/Users/ada'", r"C:\\x"])
-def test_a_place_on_one_machine_is_recognised(place):
+def test_a_place_on_one_machine_is_recognised(place: str) -> None:
     """The rule can fail."""
     assert names_a_home(place)
 
@@ -240,6 +241,6 @@ def test_a_place_on_one_machine_is_recognised(place):
 @pytest.mark.parametrize(
     "place", ["/tmp/home/log", "~/x", "https://a.b/home/x", "$HOME/x", "a/root/b", "/proc/{pid}/root/tmp"]
 )
-def test_places_that_every_machine_has_are_none(place):
+def test_places_that_every_machine_has_are_none(place: str) -> None:
     """Neither are paths inside a sandbox."""
     assert not names_a_home(place)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -20,20 +21,20 @@ pytestmark = pytest.mark.ros
 
 
 @pytest.fixture
-def scratch(tmp_path):
+def scratch(tmp_path: Path) -> Path:
     """A folder that the grader is told to use for what it needs; it is short, as sockets in it have short names."""
     folder = tmp_path / "scratch"
     folder.mkdir()
     return folder
 
 
-def start(scratch, *arguments):
+def start(scratch: Path, *arguments: Path | str) -> subprocess.Popen[str]:
     environment = {**os.environ, "TMPDIR": str(scratch)}
     command = [GRADE, *map(str, arguments)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def run(scratch, *arguments):
+def run(scratch: Path, *arguments: Path | str) -> tuple[int, str, str]:
     """Return exit code, standard output and standard error; afterwards nothing may be left behind."""
     before = shared_memory()
     process = start(scratch, *arguments)
@@ -42,19 +43,19 @@ def run(scratch, *arguments):
     return process.returncode, out, err
 
 
-def assert_nothing_left(scratch, shared_memory_before, files=()):
+def assert_nothing_left(scratch: Path, shared_memory_before: set[str], files: Sequence[str] = ()) -> None:
     """Check that no process, no file and no segment of shared memory is left."""
     wait_for(lambda: not processes_of(scratch))
     wait_for(lambda: sorted(path.name for path in scratch.iterdir()) == sorted(files))
     wait_for(lambda: shared_memory() <= shared_memory_before)  # other tests may have segments for a while
 
 
-def shared_memory():
+def shared_memory() -> set[str]:
     """Return the segments that DDS has on this machine."""
     return {path.name for path in Path("/dev/shm").glob("*fast*")}
 
 
-def processes_of(scratch):
+def processes_of(scratch: Path) -> list[int]:
     """Return the processes that were started with this scratch folder, or whose submission was staged in it."""
     found = []
     for entry in Path("/proc").iterdir():
@@ -66,7 +67,7 @@ def processes_of(scratch):
     return found
 
 
-def read(path):
+def read(path: Path) -> bytes:
     """Return a file of /proc; nothing if its process has gone."""
     try:
         return path.read_bytes()
@@ -74,7 +75,7 @@ def read(path):
         return b""
 
 
-def wait_for(condition, seconds=60):
+def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
     """Wait until a condition holds; fail if it never does."""
     deadline = time.monotonic() + seconds
     while not condition():
@@ -96,7 +97,9 @@ def wait_for(condition, seconds=60):
     ],
     ids=["nothing", "empty folder", "another file", "dangling link", "pipe"],
 )
-def test_what_is_no_submission_is_one_line(scratch, tmp_path, make, said):
+def test_what_is_no_submission_is_one_line(
+    scratch: Path, tmp_path: Path, make: Callable[[Path], object], said: str
+) -> None:
     """Exit code 2, where and what, and no traceback."""
     make(tmp_path / "ada")
     code, out, err = run(scratch, tmp_path / "ada")
@@ -106,7 +109,7 @@ def test_what_is_no_submission_is_one_line(scratch, tmp_path, make, said):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
-def test_a_file_that_may_not_be_read_is_named(scratch, tmp_path):
+def test_a_file_that_may_not_be_read_is_named(scratch: Path, tmp_path: Path) -> None:
     """It is not copied, and the report or the line says so."""
     file = tmp_path / "ada" / "velocity_publisher.py"
     file.parent.mkdir()
@@ -135,7 +138,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_code_ends_in_a_report(scratch, name):
+def test_bad_code_ends_in_a_report(scratch: Path, name: str) -> None:
     """What went wrong is in it; the command ends by itself and leaves nothing behind."""
     exercise = exercise_of(SUBMISSIONS / "broken" / name)
     code, out, err = run(scratch, SUBMISSIONS / "broken" / name, "--exercise", exercise, "--json")
@@ -148,7 +151,7 @@ def test_bad_code_ends_in_a_report(scratch, name):
     assert "Traceback" not in err
 
 
-def exercise_of(folder):
+def exercise_of(folder: Path) -> str:
     """Return the exercise that a folder answers."""
     names = {path.name for path in folder.rglob("*.py")}
     if "velocity_publisher.py" in names:
@@ -156,7 +159,7 @@ def exercise_of(folder):
     return "odom_subscriber" if "odom_subscriber.py" in names else "two_node_communication"
 
 
-def test_a_file_that_is_not_python_is_named_with_its_line(scratch, tmp_path):
+def test_a_file_that_is_not_python_is_named_with_its_line(scratch: Path, tmp_path: Path) -> None:
     """The first thing its author needs."""
     file = tmp_path / "ada" / "velocity_publisher.py"
     file.parent.mkdir()
@@ -171,14 +174,14 @@ def test_a_file_that_is_not_python_is_named_with_its_line(scratch, tmp_path):
 ENDLESS = "print('running', flush=True)\nwhile True: pass\n"
 
 
-def endless(tmp_path):
+def endless(tmp_path: Path) -> Path:
     submission = tmp_path / "endless"
     submission.mkdir()
     (submission / "velocity_publisher.py").write_text(ENDLESS)
     return submission
 
 
-def test_an_interrupt_in_the_middle_leaves_nothing(scratch, tmp_path):
+def test_an_interrupt_in_the_middle_leaves_nothing(scratch: Path, tmp_path: Path) -> None:
     """Ctrl-C: 130, one line, and no process, folder or shared memory; also when it is pressed twice."""
     before = shared_memory()
     process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
@@ -191,7 +194,7 @@ def test_an_interrupt_in_the_middle_leaves_nothing(scratch, tmp_path):
     assert_nothing_left(scratch, before)
 
 
-def test_a_kill_in_the_middle_ends_everything(scratch, tmp_path):
+def test_a_kill_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """SIGKILL gives no time to tidy up: folders stay, but no process and no shared memory."""
     before = shared_memory()
     process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
@@ -203,7 +206,7 @@ def test_a_kill_in_the_middle_ends_everything(scratch, tmp_path):
     assert all(re.match("grade-", path.name) for path in scratch.iterdir())
 
 
-def test_a_termination_in_the_middle_ends_everything(scratch, tmp_path):
+def test_a_termination_in_the_middle_ends_everything(scratch: Path, tmp_path: Path) -> None:
     """As a build server does it that has waited long enough."""
     before = shared_memory()
     process = start(scratch, endless(tmp_path), "--exercise", "velocity_publisher")
@@ -214,6 +217,6 @@ def test_a_termination_in_the_middle_ends_everything(scratch, tmp_path):
     assert shared_memory() <= before
 
 
-def students_of(scratch):
+def students_of(scratch: Path) -> list[int]:
     """Return the students' processes among those of a scratch folder."""
     return [pid for pid in processes_of(scratch) if b"launcher.py" in read(Path(f"/proc/{pid}/cmdline"))]

@@ -21,20 +21,20 @@ NOT_REAL = {"transform": "tf2_msgs comes with no package that pip installs, so n
 
 
 @lru_cache
-def asked_in(rubric):
+def asked_in(rubric: Path) -> list[str]:
     """Return the names of the checks that a rubric asks, in its order."""
     return [check_name(criterion) for criterion in read_rubric(rubric).criteria]
 
 
 @pytest.mark.parametrize("name", CHECKS)
-def test_every_check_has_golden_traces_and_a_real_run(name):
+def test_every_check_has_golden_traces_and_a_real_run(name: str) -> None:
     """A test of its own on traces, and a rubric that asks it of real nodes, or a reason why there is none."""
     tests = (p.read_text(encoding="utf-8") for p in (ROOT / "tests" / "judging").glob("test_*.py"))
     assert any(CHECKS[name].__name__ in text for text in tests)
     assert any(name in asked_in(rubric) for rubric in RUBRICS) != (name in NOT_REAL)
 
 
-def outcomes(folder, rubric):
+def outcomes(folder: Path, rubric: str) -> tuple[list[tuple[str, str]], dict[str, str]]:
     """Grade a folder and return the outcome of each criterion by its check's name, with its reason."""
     report = grade(GradeRequest(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
     verdicts = report.exercises[0].verdicts
@@ -46,7 +46,7 @@ def outcomes(folder, rubric):
 @pytest.mark.parametrize(
     ("folder", "rubric"), [(REAL / "right", "guide.yaml"), (NODES, "living.yaml"), (NODES, "counting.yaml")]
 )
-def test_a_real_node_that_does_it_right_meets_every_check(folder, rubric):
+def test_a_real_node_that_does_it_right_meets_every_check(folder: Path, rubric: str) -> None:
     """Topics, logs, reactions, parameters, policies, actions, lifecycles, ends: recorded and judged."""
     pytest.importorskip("test_msgs")
     found, told = outcomes(folder, rubric)
@@ -54,7 +54,7 @@ def test_a_real_node_that_does_it_right_meets_every_check(folder, rubric):
 
 
 @pytest.mark.ros
-def test_a_real_node_that_does_it_wrong_meets_none():
+def test_a_real_node_that_does_it_wrong_meets_none() -> None:
     """But that it lives; what it does after Ctrl-C is a question of its own."""
     found, told = outcomes(REAL / "astray", "guide.yaml")
     assert [name for name, outcome in found if outcome != "not_met"] == ["no_fault"], told

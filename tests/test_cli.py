@@ -4,28 +4,41 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
 from cli_samples import a_report
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 import grader
 from grader.app import grade as session
+from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core import errors
 from grader.core.exercise import Outcome
+from grader.core.report import Report
 
 
 class Session:
     """Stands in for the run: remembers the request, returns or raises what it was told to."""
 
-    def __init__(self):
-        self.requests = []
-        self.result = a_report()
+    def __init__(self) -> None:
+        self.requests: list[GradeRequest] = []
+        self.result: Report | BaseException = a_report()
+        self.pictures = True
 
-    def grade(self, request, progress, hear=None, early=None, *, pictures=True):
+    def grade(
+        self,
+        request: GradeRequest,
+        progress: Callable[[str], None],
+        hear: object = None,
+        early: object = None,
+        *,
+        pictures: bool = True,
+    ) -> Report:
         self.requests.append(request)
         self.pictures = pictures
         progress("exercise 1: alone")
@@ -35,26 +48,26 @@ class Session:
 
 
 @pytest.fixture
-def run_session(monkeypatch):
+def run_session(monkeypatch: pytest.MonkeyPatch) -> Session:
     stand_in = Session()
     monkeypatch.setattr(session, "grade", stand_in.grade)
     return stand_in
 
 
-def grade(*arguments, **kwargs):
+def grade(*arguments: str, **kwargs: Any) -> Result:
     return CliRunner().invoke(main.app, list(arguments), prog_name="grade", **kwargs)
 
 
-def test_the_everyday_form_prints_the_text_report(run_session):
+def test_the_everyday_form_prints_the_text_report(run_session: Session) -> None:
     """A path and nothing else is enough."""
     result = grade("ada")
     assert result.exit_code == 0
     assert result.stdout.startswith("ada: 10 of 10 points\n")
     assert result.stderr == ""
-    assert run_session.requests == [session.GradeRequest(submission="ada")]
+    assert run_session.requests == [GradeRequest(submission="ada")]
 
 
-def test_every_option_reaches_the_session(run_session):
+def test_every_option_reaches_the_session(run_session: Session) -> None:
     """What is asked for is what is graded; a repeated exercise is graded once."""
     options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--odom-bag", "bag"]
     options += ["--rubric", "r1.yaml", "--rubric", "r2.yaml", "--clock", "wall", "--isolation", "none", "--no-progress"]
@@ -62,7 +75,7 @@ def test_every_option_reaches_the_session(run_session):
     result = grade(*options, "ada")
     assert result.exit_code == 0, result.output
     assert run_session.requests == [
-        session.GradeRequest(
+        GradeRequest(
             submission="ada",
             exercises=("b", "a"),
             rubrics=(Path("r1.yaml"), Path("r2.yaml")),
@@ -75,7 +88,7 @@ def test_every_option_reaches_the_session(run_session):
     ]
 
 
-def test_options_may_follow_the_submission(run_session):
+def test_options_may_follow_the_submission(run_session: Session) -> None:
     """Order does not matter."""
     assert grade("ada", "--seed", "5").exit_code == 0
     assert run_session.requests[0].seed == 5
@@ -98,7 +111,9 @@ def test_options_may_follow_the_submission(run_session):
         ((Outcome.MET, Outcome.PARTLY, Outcome.MET), ("--min-score", "83.34"), 1),
     ],
 )
-def test_the_exit_code_says_how_it_went(run_session, outcomes, options, code):
+def test_the_exit_code_says_how_it_went(
+    run_session: Session, outcomes: tuple[Outcome, ...], options: tuple[str, ...], code: int
+) -> None:
     """0 all met or the share reached, 1 not, 3 undecided whatever the share."""
     run_session.result = a_report(*outcomes)
     result = grade("ada", *options)
@@ -106,14 +121,14 @@ def test_the_exit_code_says_how_it_went(run_session, outcomes, options, code):
     assert "points" in result.stdout
 
 
-def test_json_prints_the_report_and_nothing_else(run_session):
+def test_json_prints_the_report_and_nothing_else(run_session: Session) -> None:
     """Standard output can be piped into a parser."""
     result = grade("ada", "--json")
     assert json.loads(result.stdout)["schema"] == "grader/report/v1"
     assert result.stderr == ""
 
 
-def test_reports_go_to_files_as_well(run_session, tmp_path):
+def test_reports_go_to_files_as_well(run_session: Session, tmp_path: Path) -> None:
     """The text is still printed; files are plain and in UTF-8."""
     result = grade("ada", "-o", f"json={tmp_path / 'r.json'}", "--output", f"text={tmp_path / 'r.txt'}")
     assert result.exit_code == 0
@@ -123,7 +138,7 @@ def test_reports_go_to_files_as_well(run_session, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["r.json", "r.txt"]
 
 
-def test_a_dash_prints_that_format_instead(run_session, tmp_path):
+def test_a_dash_prints_that_format_instead(run_session: Session, tmp_path: Path) -> None:
     """One report on standard output, the chosen one."""
     result = grade("ada", "-o", "json=-", "-o", f"text={tmp_path / 'r.txt'}")
     assert json.loads(result.stdout)["score"] == 10
@@ -150,7 +165,9 @@ def test_a_dash_prints_that_format_instead(run_session, tmp_path):
         (("ada", "-o", "text=."), "the text report cannot be written: Is a directory", ""),
     ],
 )
-def test_a_wrong_command_is_one_line_and_nothing_is_graded(run_session, arguments, message, hint):
+def test_a_wrong_command_is_one_line_and_nothing_is_graded(
+    run_session: Session, arguments: tuple[str, ...], message: str, hint: str
+) -> None:
     """Exit code 2, what is wrong, what to do; before any work is done."""
     result = grade(*arguments)
     assert result.exit_code == 2
@@ -173,7 +190,7 @@ def test_a_wrong_command_is_one_line_and_nothing_is_graded(run_session, argument
         (errors.HarnessError("the worker ended twice", "grade again"), 3),
     ],
 )
-def test_a_grader_error_is_a_line_and_a_hint(run_session, error, code):
+def test_a_grader_error_is_a_line_and_a_hint(run_session: Session, error: errors.GraderError, code: int) -> None:
     """Whoever must act reads what is wrong and one thing to do."""
     run_session.result = error
     result = grade("ada", "--json")
@@ -182,13 +199,13 @@ def test_a_grader_error_is_a_line_and_a_hint(run_session, error, code):
     assert result.stderr == f"error: {error.message}\nhint: {error.hint}\n"
 
 
-def test_several_mistakes_are_several_lines(run_session):
+def test_several_mistakes_are_several_lines(run_session: Session) -> None:
     """A rubric's author sees all of them at once; without a hint there is no empty one."""
     run_session.result = errors.RubricError("r.yaml:1:1: one\nr.yaml:2:1: two")
     assert grade("ada").stderr == "error: r.yaml:1:1: one\nerror: r.yaml:2:1: two\n"
 
 
-def test_an_error_cannot_steer_the_terminal(run_session):
+def test_an_error_cannot_steer_the_terminal(run_session: Session) -> None:
     """File names of a student end up in messages."""
     run_session.result = errors.SubmissionError("a\x1b[2J\udcff: no", "b\x07")
     assert grade("ada").stderr == "error: a\\x1b[2J\\udcff: no\nhint: b\\x07\n"
@@ -196,7 +213,7 @@ def test_an_error_cannot_steer_the_terminal(run_session):
     assert grade("ada").stderr == "error: a\\nerror: forged\n"
 
 
-def test_a_mistake_of_ours_is_no_low_score(run_session, monkeypatch):
+def test_a_mistake_of_ours_is_no_low_score(run_session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit code 3 and one line; the traceback only for those who ask."""
     run_session.result = KeyError("secret")
     monkeypatch.delenv("GRADER_DEBUG", raising=False)
@@ -208,7 +225,7 @@ def test_a_mistake_of_ours_is_no_low_score(run_session, monkeypatch):
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), click.Abort()])
-def test_an_interrupt_is_one_line(run_session, error):
+def test_an_interrupt_is_one_line(run_session: Session, error: BaseException) -> None:
     """Ctrl-C ends in 130, without a traceback and without a report."""
     run_session.result = error
     result = grade("ada", "--json")
@@ -216,17 +233,19 @@ def test_an_interrupt_is_one_line(run_session, error):
     assert result.stderr == "interrupted: no report was made\n"
 
 
-def test_an_end_of_input_of_ours_is_no_interrupt(run_session):
+def test_an_end_of_input_of_ours_is_no_interrupt(run_session: Session) -> None:
     """Only Ctrl-C is called one."""
     run_session.result = EOFError("worker")
     assert grade("ada").exit_code == 3
 
 
-def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(run_session, tmp_path, monkeypatch):
+def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(
+    run_session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The disk filled up while grading: what can be delivered is."""
     path = tmp_path / "r.json"
 
-    def full(descriptor):
+    def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
@@ -237,12 +256,12 @@ def test_a_report_that_cannot_be_written_does_not_keep_the_others_back(run_sessi
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_is_said_while_grading_unless_stderr_is_a_terminal(run_session):
+def test_nothing_is_said_while_grading_unless_stderr_is_a_terminal(run_session: Session) -> None:
     """Logs of a build server stay clean."""
     assert grade("ada").stderr == ""
 
 
-def test_help_names_every_option_and_the_exit_codes(run_session):
+def test_help_names_every_option_and_the_exit_codes(run_session: Session) -> None:
     """Both spellings, before and after the submission, show the same."""
     text = grade("--help").stdout
     for word in ("--exercise ID", "--seed N", "--odom-bag", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
@@ -258,18 +277,18 @@ def test_help_names_every_option_and_the_exit_codes(run_session):
     assert grade("-h").stdout == grade("ada", "--help").stdout == text
 
 
-def test_the_version_is_the_package_s(run_session):
+def test_the_version_is_the_package_s(run_session: Session) -> None:
     """One number, in one place."""
     assert grade("--version").stdout == f"grade {grader.__version__}\n"
 
 
 @pytest.fixture
-def with_batch():
+def with_batch() -> main.CommandLine:
     """A group like ours with a subcommand beside the everyday one."""
 
     @click.command()
     @click.argument("folder")
-    def batch(folder):
+    def batch(folder: str) -> int:
         """Grade a class."""
         click.echo(f"batch {folder}")
         return 1
@@ -279,7 +298,7 @@ def with_batch():
     return app
 
 
-def test_a_subcommand_fits_beside_the_everyday_form(run_session, with_batch):
+def test_a_subcommand_fits_beside_the_everyday_form(run_session: Session, with_batch: main.CommandLine) -> None:
     """Its name as the first argument calls it; its return value is the exit code; help lists it."""
     result = CliRunner().invoke(with_batch, ["batch", "hw"])
     assert (result.stdout, result.exit_code) == ("batch hw\n", 1)
@@ -288,7 +307,9 @@ def test_a_subcommand_fits_beside_the_everyday_form(run_session, with_batch):
 
 
 @pytest.mark.parametrize("arguments", [["./batch"], ["--json", "batch"], ["--", "batch"]])
-def test_a_folder_named_like_a_subcommand_is_graded(run_session, with_batch, arguments):
+def test_a_folder_named_like_a_subcommand_is_graded(
+    run_session: Session, with_batch: main.CommandLine, arguments: list[str]
+) -> None:
     """Only the bare first word is a command."""
     assert CliRunner().invoke(with_batch, arguments).exit_code == 0
     assert Path(run_session.requests[0].submission) == Path("batch")
@@ -311,7 +332,7 @@ main.main()
 """
 
 
-def process(*arguments, **kwargs):
+def process(*arguments: str, **kwargs: Any) -> subprocess.Popen[bytes]:
     code = CHILD.format(folder=str(Path(__file__).parent))
     command = [sys.executable, "-c", code, *arguments]
     kwargs.setdefault("stdin", subprocess.DEVNULL)
@@ -320,9 +341,10 @@ def process(*arguments, **kwargs):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("option", ["--json", "--no-progress"])
-def test_a_reader_that_had_enough_is_no_problem(option):
+def test_a_reader_that_had_enough_is_no_problem(option: str) -> None:
     """`grade ada | head -1` ends quietly and with its own exit code."""
     child = process("ada", option, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert child.stdout is not None
     child.stdout.close()
     _, complaint = child.communicate(b"\n", timeout=60)
     assert complaint == b""
@@ -331,7 +353,7 @@ def test_a_reader_that_had_enough_is_no_problem(option):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
-def test_a_full_disk_behind_standard_output_is_said():
+def test_a_full_disk_behind_standard_output_is_said() -> None:
     """The report is lost, and nobody takes the exit code for a success."""
     with Path("/dev/full").open("wb") as full:
         child = process("ada", stdout=full)
@@ -341,7 +363,7 @@ def test_a_full_disk_behind_standard_output_is_said():
 
 
 @pytest.mark.slow
-def test_an_ascii_terminal_still_gets_the_numbers():
+def test_an_ascii_terminal_still_gets_the_numbers() -> None:
     """Signs that it cannot show give way to plain ones."""
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     out, complaint = process("ada", stdout=subprocess.PIPE, env=environment).communicate(timeout=60)
@@ -350,7 +372,7 @@ def test_an_ascii_terminal_still_gets_the_numbers():
 
 
 @pytest.mark.slow
-def test_a_terminal_sees_progress_and_colours():
+def test_a_terminal_sees_progress_and_colours() -> None:
     """On a terminal the step is named, escaped, and gone again; the report is coloured."""
     leader, follower = os.openpty()
     environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
@@ -371,7 +393,7 @@ def test_a_terminal_sees_progress_and_colours():
 
 
 @pytest.mark.slow
-def test_help_starts_light():
+def test_help_starts_light() -> None:
     """Neither rich nor pydantic nor ROS is imported before they are needed."""
     code = (
         "import sys\nfrom grader import cli\n"
@@ -383,7 +405,7 @@ def test_help_starts_light():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_pictures_are_drawn_where_a_report_shows_them(run_session, tmp_path):
+def test_pictures_are_drawn_where_a_report_shows_them(run_session: Session, tmp_path: Path) -> None:
     """Drawing takes about as long as judging, and text shows none."""
     grade("ada")
     assert run_session.pictures is False

@@ -1,6 +1,7 @@
 """What the documents name exists: every link, and every path of this repository in code."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,14 +25,14 @@ _PATH = re.compile(
 )
 
 
-def links(text):
+def links(text: str) -> Iterator[str]:
     """Yield the targets of links to files, without the place in them."""
     for target in _LINK.findall(text):
         if "://" not in target and not target.startswith(("#", "mailto:")):
             yield target.partition("#")[0]
 
 
-def paths(text):
+def paths(text: str) -> Iterator[str]:
     """Yield the paths in code that begin at the top of the repository."""
     for code in _CODE.findall(text):
         for path in _PATH.findall(code):
@@ -40,7 +41,7 @@ def paths(text):
             yield from (f"{before}{one}{after}" for one in inside.split(",")) if brace else [path]
 
 
-def missing(text, folder):
+def missing(text: str, folder: Path) -> list[str]:
     """Return what a document in a folder names and nobody finds."""
     dead = [target for target in links(text) if not (folder / target).exists()]
     named = [path for path in paths(text) if not _SCHEMA.search(path)]
@@ -48,13 +49,13 @@ def missing(text, folder):
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
-def test_what_a_document_names_exists(document):
+def test_what_a_document_names_exists(document: str) -> None:
     """Also after a file is moved."""
     path = ROOT / document
     assert missing(path.read_text(encoding="utf-8"), path.parent) == []
 
 
-def test_what_does_not_exist_is_found():
+def test_what_does_not_exist_is_found() -> None:
     """A link, a path, a path inside a command, one of several, and a pattern that fits nothing."""
     text = (
         "[a](docs/none.md#part) [b](README.md) [c](https://a.b/c) `grader/none.py` `python tests/none.py --all`"

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from grader.app.grade import EarlyReports, read_exercises
 from grader.app.request import GradeRequest
 from grader.core.exercise import Outcome
-from grader.core.report import Environment
+from grader.core.report import Environment, Report
 from grader.core.submission import Run, StudentFile, Submission
 from grader.core.trace import ClockKind, Trace
 
@@ -20,28 +21,28 @@ EXERCISES = read_exercises(GradeRequest("x"))
 SCENARIOS = [(exercise.id, scenario.id) for exercise in EXERCISES for scenario in exercise.scenarios]
 
 
-def a_run():
+def a_run() -> Run:
     files = {name: StudentFile(name, name) for exercise in EXERCISES for name in exercise.files}
     submission = Submission("ada", "./ada", Path("nowhere"), "sha256:" + "0" * 64, files)
     environment = Environment("0.1.0", "jazzy", "7.1.6", "rmw_fastrtps_cpp", "3.11.9", "none")
     return Run(submission, traces={}, sources={}, environment=environment, seed=7)
 
 
-def silent(scenario):
+def silent(scenario: str) -> Trace:
     return Trace(scenario, ClockKind.VIRTUAL, stop_ns=10**10, observations=())
 
 
 @pytest.fixture
-def heard():
+def heard() -> list[Report]:
     return []
 
 
-def take_all(reports, scenarios):
+def take_all(reports: EarlyReports, scenarios: Sequence[tuple[str, str]]) -> None:
     for exercise, scenario in scenarios:
         reports.take((exercise, scenario), silent(scenario))
 
 
-def test_every_exercise_but_the_last_makes_a_report(heard):
+def test_every_exercise_but_the_last_makes_a_report(heard: list[Report]) -> None:
     """After the last one the whole report follows at once."""
     take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS)
     assert [report.pending for report in heard] == [
@@ -50,7 +51,7 @@ def test_every_exercise_but_the_last_makes_a_report(heard):
     ]
 
 
-def test_the_order_of_the_recordings_does_not_matter(heard):
+def test_the_order_of_the_recordings_does_not_matter(heard: list[Report]) -> None:
     """An exercise on the wall clock may come last although it was asked for first."""
     take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS[::-1])
     assert [report.pending for report in heard] == [
@@ -59,7 +60,7 @@ def test_the_order_of_the_recordings_does_not_matter(heard):
     ]
 
 
-def test_what_is_to_come_is_undecided_and_counts_in_the_maximum(heard):
+def test_what_is_to_come_is_undecided_and_counts_in_the_maximum(heard: list[Report]) -> None:
     """A share of all points means the same in a partial report as in the whole one."""
     take_all(EarlyReports(EXERCISES, SCENARIOS, a_run(), heard.append), SCENARIOS)
     for report in heard:
@@ -70,14 +71,14 @@ def test_what_is_to_come_is_undecided_and_counts_in_the_maximum(heard):
             assert (outcomes == {Outcome.UNDECIDED}) == (part.id in report.pending)
 
 
-def test_an_exercise_whose_files_are_missing_is_judged_with_the_first(heard):
+def test_an_exercise_whose_files_are_missing_is_judged_with_the_first(heard: list[Report]) -> None:
     """Nothing of it is recorded, so nothing of it is awaited."""
     scenarios = [key for key in SCENARIOS if key[0] != "odom_subscriber"]
     take_all(EarlyReports(EXERCISES, scenarios, a_run(), heard.append), scenarios)
     assert [report.pending for report in heard] == [("two_node_communication",)]
 
 
-def test_one_exercise_makes_no_partial_report(heard):
+def test_one_exercise_makes_no_partial_report(heard: list[Report]) -> None:
     """There is nothing to wait for."""
     first = [key for key in SCENARIOS if key[0] == "velocity_publisher"]
     take_all(EarlyReports(EXERCISES[:1], first, a_run(), heard.append), first)
@@ -85,7 +86,7 @@ def test_one_exercise_makes_no_partial_report(heard):
 
 
 @pytest.mark.ros
-def test_a_platform_that_ends_the_run_finds_what_was_earned(tmp_path):
+def test_a_platform_that_ends_the_run_finds_what_was_earned(tmp_path: Path) -> None:
     """Each exercise that is done adds its points to the file; killed after the first, they are there."""
     pipe = tmp_path / "results.json"
     os.mkfifo(pipe)

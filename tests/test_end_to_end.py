@@ -7,13 +7,17 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from _pytest.mark import ParameterSet
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
 
 from grader.app.grade import grade
 from grader.app.request import GradeRequest
+from grader.core.report import Report
 
 ROOT = Path(__file__).resolve().parent.parent
 #: What these are told depends on where a loop stood when it was stopped.
@@ -23,16 +27,16 @@ GRADE = str(Path(sys.executable).with_name("grade"))
 pytestmark = pytest.mark.ros
 
 
-def say_nothing(step):
+def say_nothing(step: str) -> None:
     del step
 
 
-def reasons(report):
+def reasons(report: Report) -> dict[str, str]:
     """Return what a student reads about every criterion."""
     return {v.id: f"{v.reason} | hint: {v.hint}" for exercise in report.exercises for v in exercise.verdicts}
 
 
-def run(*arguments, **options):
+def run(*arguments: Path | int | str, **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run([GRADE, *map(str, arguments)], check=False, capture_output=True, text=True, **options)
 
 
@@ -40,9 +44,9 @@ def run(*arguments, **options):
 EACH = 24
 
 
-def live():
+def live() -> Iterator[ParameterSet]:
     """Yield every folder, marked where it is left to the nightly run; the recording of each is judged in any case."""
-    seen = Counter()
+    seen: Counter[tuple[str, ...]] = Counter()
     for folder, entry in expected().items():
         kind = (folder.partition("/")[0], *entry["graded"])
         yield pytest.param(folder, marks=[pytest.mark.nightly] if seen[kind] % EACH else [])
@@ -50,7 +54,7 @@ def live():
 
 
 @pytest.mark.parametrize("folder", list(live()))
-def test_a_submission_gets_what_it_is_worth(folder):
+def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = expected()[folder]
     report = grade(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
@@ -62,21 +66,21 @@ def test_a_submission_gets_what_it_is_worth(folder):
         assert told(report) == golden().get(folder, {})
 
 
-def test_the_reference_solutions_score_full_on_the_virtual_clock():
+def test_the_reference_solutions_score_full_on_the_virtual_clock() -> None:
     """All that the exercises ask can be done, and needs no wall clock."""
     report = grade(GradeRequest(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
     assert outcomes(report) == {}
     assert (report.score, report.max_score, report.final) == (100, 100, True)
 
 
-def test_the_template_runs_and_earns_nothing_yet():
+def test_the_template_runs_and_earns_nothing_yet() -> None:
     """The baseline of the skeletons: no crash, no point, nothing undecided."""
     report = grade(GradeRequest(str(ROOT / "student_template")), say_nothing)
     assert (report.score, report.final) == (0, True)
     assert [fault for exercise in report.exercises for fault in exercise.faults] == []
 
 
-def test_the_wall_clock_gives_the_same_verdict():
+def test_the_wall_clock_gives_the_same_verdict() -> None:
     """A correct publisher is correct on either clock; the report says which one it was."""
     request = GradeRequest(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
     report = grade(request, say_nothing)
@@ -85,7 +89,7 @@ def test_the_wall_clock_gives_the_same_verdict():
     assert lost == {}
 
 
-def test_the_same_files_give_the_same_report():
+def test_the_same_files_give_the_same_report() -> None:
     """Byte for byte, but for the duration; the seed follows from the files."""
     texts = []
     for _ in range(2):
@@ -95,7 +99,7 @@ def test_the_same_files_give_the_same_report():
     assert texts[0] == texts[1]
 
 
-def test_another_seed_plays_another_part_of_the_recording():
+def test_another_seed_plays_another_part_of_the_recording() -> None:
     """What a student could hard-code is drawn."""
     seeds = [
         json.loads(run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--json", "--seed", seed).stdout)
@@ -107,7 +111,7 @@ def test_another_seed_plays_another_part_of_the_recording():
 
 
 @pytest.mark.parametrize("bag", ["neato_square", "turtlebot3_path/path.mcap", "standing_best_effort"])
-def test_recordings_of_other_robots_can_be_played(bag):
+def test_recordings_of_other_robots_can_be_played(bag: str) -> None:
     """A correct subscriber is correct on anybody's odometry, whatever its pace and its QoS."""
     path = ROOT.parent / "shared" / "bags" / bag
     if not path.exists():
@@ -116,7 +120,7 @@ def test_recordings_of_other_robots_can_be_played(bag):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_interrupting_the_grader_leaves_nothing_behind(tmp_path):
+def test_interrupting_the_grader_leaves_nothing_behind(tmp_path: Path) -> None:
     """Ctrl-C: exit code 130, one line, no process and no folder."""
     submission = tmp_path / "endless"
     submission.mkdir()
@@ -132,7 +136,7 @@ def test_interrupting_the_grader_leaves_nothing_behind(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["endless"]
 
 
-def test_killing_the_grader_ends_what_it_started(tmp_path):
+def test_killing_the_grader_ends_what_it_started(tmp_path: Path) -> None:
     """SIGKILL gives no time to tidy up: the folder stays, but nothing runs on."""
     submission = tmp_path / "endless"
     submission.mkdir()
@@ -146,7 +150,7 @@ def test_killing_the_grader_ends_what_it_started(tmp_path):
     wait_for(lambda: not processes_in(tmp_path))
 
 
-def wait_for(condition, seconds=60):
+def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
     """Wait until a condition holds; fail if it never does."""
     deadline = time.monotonic() + seconds
     while not condition():
@@ -154,7 +158,7 @@ def wait_for(condition, seconds=60):
         time.sleep(0.05)
 
 
-def processes_in(folder):
+def processes_in(folder: Path) -> list[str]:
     """Return the sandboxed processes whose submission was staged below a folder, as the mount tables say."""
     found = []
     for entry in Path("/proc").iterdir():
@@ -169,7 +173,7 @@ def processes_in(folder):
     return found
 
 
-def test_a_submission_is_never_written_to(tmp_path):
+def test_a_submission_is_never_written_to(tmp_path: Path) -> None:
     """Not even compiled files appear beside the student's."""
     submission = tmp_path / "ada"
     submission.mkdir()

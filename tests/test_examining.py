@@ -1,16 +1,21 @@
 """A machine is examined by trying it: ROS, messages, sandboxes; `grade doctor` says what was found."""
 
 import json
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
+from typing import NoReturn
 
 import pytest
 from click.testing import CliRunner
 
 from grader.app import doctor
+from grader.app.observe import ObserveRequest
 from grader.cli.main import app
-from grader.core.checkup import Fact, TierReport
+from grader.core.checkup import Checkup, Fact, TierReport
 from grader.core.errors import EnvironmentFault, HarnessError
 from grader.execution import machine
 
@@ -20,11 +25,11 @@ HOLDS = TierReport("landlock", "C", usable=True, why="")
 
 
 @pytest.fixture
-def stand_in(monkeypatch):
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
     """Replace what starts processes; returns what was observed, with which tier."""
-    seen = []
+    seen: list[tuple[str, str]] = []
 
-    def observe(request, progress):
+    def observe(request: ObserveRequest, progress: Callable[[str], None]) -> SimpleNamespace:
         progress("observing")
         seen.append((request.isolation, request.files[0].read_text()))
         return SimpleNamespace(topics=[SimpleNamespace(name="/trial", messages=10)], faults=[])
@@ -36,7 +41,7 @@ def stand_in(monkeypatch):
     return seen
 
 
-def examined(monkeypatch, *tiers):
+def examined(monkeypatch: pytest.MonkeyPatch, *tiers: TierReport) -> Checkup:
     monkeypatch.setattr(doctor, "find_ros", lambda: SimpleNamespace(runtime=None))
     monkeypatch.setattr(doctor, "inspect_tiers", lambda ros: tiers)
     monkeypatch.setattr(doctor, "byte_code", lambda runtime: Fact("byte code", "up to date"))
@@ -44,36 +49,41 @@ def examined(monkeypatch, *tiers):
     return doctor.examine(lambda step: None)
 
 
-def test_the_strongest_tier_that_holds_is_used(monkeypatch, stand_in):
+def test_the_strongest_tier_that_holds_is_used(
+    monkeypatch: pytest.MonkeyPatch, stand_in: list[tuple[str, str]]
+) -> None:
     """Messages are exchanged in the sandbox that grading would use."""
     checkup = examined(monkeypatch, BY_ROOT, BY_USER, HOLDS)
     assert (checkup.safe, checkup.used, checkup.remedy) == (True, "landlock", "")
     assert [isolation for isolation, _ in stand_in] == ["landlock"]
 
 
-def test_without_a_sandbox_messages_are_tried_all_the_same(monkeypatch, stand_in):
+def test_without_a_sandbox_messages_are_tried_all_the_same(
+    monkeypatch: pytest.MonkeyPatch, stand_in: list[tuple[str, str]]
+) -> None:
     """It is a node of our own; and what helps this user comes before becoming another."""
     checkup = examined(monkeypatch, BY_ROOT, BY_USER)
     assert (checkup.safe, checkup.used, checkup.remedy) == (False, "", "install bubblewrap")
     assert [isolation for isolation, _ in stand_in] == ["none"]
 
 
-def test_a_run_that_fails_is_a_finding(monkeypatch, stand_in):
+def test_a_run_that_fails_is_a_finding(monkeypatch: pytest.MonkeyPatch, stand_in: list[tuple[str, str]]) -> None:
     """The checkup goes on, and says what failed."""
 
-    def fail(request, progress):
+    def fail(request: ObserveRequest, progress: Callable[[str], None]) -> NoReturn:
         raise HarnessError("the worker died")
 
     monkeypatch.setattr(doctor, "observe", fail)
     checkup = examined(monkeypatch, HOLDS)
+    assert checkup.exchange is not None
     assert checkup.exchange.problem == "the worker died"
     assert not checkup.safe
 
 
-def test_without_ros_the_rest_is_told(monkeypatch):
+def test_without_ros_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """The remedy is the one that grading would name; no sandbox can be tried."""
 
-    def none():
+    def none() -> NoReturn:
         raise EnvironmentFault("ROS 2: expected rclpy, found none in this environment", "pip install it")
 
     monkeypatch.setattr(doctor, "find_ros", none)
@@ -86,15 +96,17 @@ def test_without_ros_the_rest_is_told(monkeypatch):
     assert "  kernel " in result.stdout
 
 
-def test_bubblewrap_that_is_not_there_is_told_with_its_command(monkeypatch):
+def test_bubblewrap_that_is_not_there_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     """Other sandboxes may hold, so this alone is no problem."""
-    monkeypatch.setattr(machine.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     fact = next(fact for fact in machine.software(None) if fact.name == "bubblewrap")
     assert (fact.value, fact.fits) == ("not installed", True)
     assert fact.remedy.endswith("install -y bubblewrap")
 
 
-def test_a_setting_that_forbids_namespaces_is_told_with_both_commands(monkeypatch, tmp_path):
+def test_a_setting_that_forbids_namespaces_is_told_with_both_commands(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """One for now, as a CI runner wants it, and one for good."""
     name = "kernel.apparmor_restrict_unprivileged_userns"
     setting = tmp_path / "kernel" / name.partition(".")[2]
@@ -109,10 +121,10 @@ def test_a_setting_that_forbids_namespaces_is_told_with_both_commands(monkeypatc
 
 
 @pytest.mark.parametrize(("memory", "space", "fits"), [(1 << 40, 1 << 40, True), (1 << 20, 1 << 20, False)])
-def test_too_little_room_is_told(monkeypatch, memory, space, fits):
+def test_too_little_room_is_told(monkeypatch: pytest.MonkeyPatch, memory: int, space: int, fits: bool) -> None:
     """Memory and disk below what one scenario needs."""
     monkeypatch.setattr(machine, "_available_memory", lambda: memory)
-    monkeypatch.setattr(machine.shutil, "disk_usage", lambda folder: SimpleNamespace(free=space))
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=space))
     facts = {fact.name: fact for fact in machine.system()}
     for name in ("memory", "temporary files"):
         assert facts[name].fits is fits
@@ -120,7 +132,7 @@ def test_too_little_room_is_told(monkeypatch, memory, space, fits):
 
 
 @pytest.mark.ros
-def test_a_real_machine_is_examined():
+def test_a_real_machine_is_examined() -> None:
     """The real command: versions, ten messages over DDS, all tiers; the exit code is the verdict's."""
     done = subprocess.run(
         [sys.executable, "-c", "from grader.cli.main import main; main()", "doctor", "--json"],

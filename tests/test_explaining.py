@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from grader.app import explain as explaining
 from grader.app import grade as session
 from grader.app.explain import explain
+from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core.errors import GraderError
+from grader.core.exercise import Exercise
+from grader.core.explanation import CheckExplanation, CriterionExplanation
 from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
@@ -22,28 +26,29 @@ CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_r
 
 
 @pytest.fixture(autouse=True)
-def _read_once(monkeypatch):
+def _read_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every test explains the same rubrics, and reading them takes longer than all the rest."""
     monkeypatch.setattr(explaining, "read_exercises", _read)
 
 
-def _read(request):
+def _read(request: GradeRequest) -> list[Exercise]:
     if request.rubrics not in _READ:
         _READ[request.rubrics] = session.read_exercises(request)
     return _READ[request.rubrics]
 
 
-_READ = {}
+_READ: dict[tuple[Path, ...], list[Exercise]] = {}
 
 
-def grade(*words: str):
+def grade(*words: str) -> Result:
     return CliRunner().invoke(main.app, ["explain", *words])
 
 
 @pytest.mark.parametrize(("exercise", "criterion"), CRITERIA, ids=[c for _, c in CRITERIA])
-def test_every_criterion_is_explained(exercise, criterion):
+def test_every_criterion_is_explained(exercise: str, criterion: str) -> None:
     """What is asked, how it is measured, every parameter's value and meaning, and where the chapter asks for it."""
     (found,) = explain(f"{exercise}/{criterion}")
+    assert isinstance(found, CriterionExplanation)
     assert found.asks
     assert found.situation
     assert found.chapter.startswith(("Exercise ", "Part "))
@@ -55,7 +60,7 @@ def test_every_criterion_is_explained(exercise, criterion):
 
 
 @pytest.mark.parametrize("name", CHECKS)
-def test_every_check_is_explained(name):
+def test_every_check_is_explained(name: str) -> None:
     """Its manual holds a sentence, and one for each parameter; who uses it is told."""
     found = explain(name)[0]
     assert found.asks.endswith(".")
@@ -63,7 +68,7 @@ def test_every_check_is_explained(name):
     assert grade(name).exit_code == 0
 
 
-def test_the_tolerance_is_that_of_the_rubric(tmp_path):
+def test_the_tolerance_is_that_of_the_rubric(tmp_path: Path) -> None:
     """With its unit, and from the rubric that is named."""
     assert "tolerance: 1 Hz" in grade("rate").output
     text = next(iter(builtin_rubrics().values())).read_text(encoding="utf-8")
@@ -71,7 +76,7 @@ def test_the_tolerance_is_that_of_the_rubric(tmp_path):
     assert "tolerance: 1.5 Hz" in grade("rate", "--rubric", str(tmp_path / "mine.yaml")).output
 
 
-def test_a_check_shows_what_a_rubric_has_to_give():
+def test_a_check_shows_what_a_rubric_has_to_give() -> None:
     """Parameters with a default show it, the others that there is none."""
     found = {p.name: (p.value, p.required) for p in explain("log_period")[0].parameters if p.name != "topic"}
     assert found["tolerance"] == ("0.1", False)
@@ -83,6 +88,7 @@ def test_a_check_shows_what_a_rubric_has_to_give():
         "window": False,
         "partly_tolerance": False,
     }
+    assert isinstance(check, CheckExplanation)
     assert check.used_by == (
         "velocity_publisher/rate",
         "two_node_communication/temperature_rate",
@@ -100,7 +106,7 @@ def test_a_check_shows_what_a_rubric_has_to_give():
         ("xyzzy", "publishes"),
     ],
 )
-def test_an_unknown_name_is_answered_with_the_nearest(typed, offered):
+def test_an_unknown_name_is_answered_with_the_nearest(typed: str, offered: str) -> None:
     """Exit code 2; where nothing is near, all names are told."""
     with pytest.raises(GraderError) as error:
         explain(typed)
@@ -108,7 +114,7 @@ def test_an_unknown_name_is_answered_with_the_nearest(typed, offered):
     assert grade(typed).exit_code == 2
 
 
-def test_programs_can_read_it():
+def test_programs_can_read_it() -> None:
     """The same, as JSON and nothing else."""
     found = json.loads(grade("rate", "--json").stdout)
     row, of_a_project = found["explanations"]
@@ -137,7 +143,7 @@ class Manual:
     second: int
 
 
-def test_a_manual_is_read_from_the_docstring():
+def test_a_manual_is_read_from_the_docstring() -> None:
     """Paragraphs become lines; only attributes become parameters."""
     manual = manual_of(Manual)
     assert (manual.summary, manual.details) == ("One sentence.", "More of it.\nAnd more.")

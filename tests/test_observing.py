@@ -3,12 +3,13 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
-from grader.core.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Offer, Trace
+from grader.core.trace import ClockKind, Endpoint, GraphSnapshot, LogRecord, Message, Observation, Offer, Trace
 from grader.judging.judge_run import summarise
 from grader.reporting.observed import render_summary, summary_to_json
 
@@ -16,30 +17,31 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOAT = "std_msgs/msg/Float32"
 
 
-def an_end(kind, topic="/t", node="/a"):
+def an_end(kind: str, topic: str = "/t", node: str = "/a") -> Endpoint:
     return Endpoint(kind, topic, FLOAT, node, 0, "reliable", "volatile")
 
 
-def a_trace(*observations, stop_s=10):
+def a_trace(*observations: Observation, stop_s: int = 10) -> Trace:
     return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
 
 
-def messages(count, period_ms=100, value=float):
+def messages(count: int, period_ms: int = 100, value: Callable[[int], object] = float) -> list[Message]:
     return [Message(n * period_ms * NS_PER_MS, "/t", FLOAT, {"data": value(n)}) for n in range(count)]
 
 
-def test_a_topic_is_described_by_its_pace_and_its_values():
+def test_a_topic_is_described_by_its_pace_and_its_values() -> None:
     """There are n - 1 gaps between n messages; numbers go by their dotted names, NaN is left out."""
     odd = Message(NS_PER_S, "/t", FLOAT, {"data": float("nan"), "deep": {"x": 1, "flag": True, "list": [5]}})
     graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
     (topic,) = summarise(a_trace(graph, *messages(10), odd), ["a.py"], "none").topics
+    assert topic.pace is not None
     assert (topic.messages, topic.first_s, topic.pace.rate_hz) == (11, 0.0, pytest.approx(10.0))
     assert (topic.pace.min_s, topic.pace.max_s) == (pytest.approx(0.1), pytest.approx(0.1))
     assert topic.ranges == {"data": (0.0, 9.0), "deep.x": (1.0, 1.0)}
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_too_few_messages_have_no_pace(count):
+def test_too_few_messages_have_no_pace(count: int) -> None:
     """No division by nothing; also not for messages of one instant."""
     graph = GraphSnapshot(0, ("/a",), (an_end("publisher"),))
     (topic,) = summarise(a_trace(graph, *messages(count)), ["a.py"], "none").topics
@@ -48,7 +50,7 @@ def test_too_few_messages_have_no_pace(count):
     assert topic.pace is None
 
 
-def test_the_text_says_what_was_seen():
+def test_the_text_says_what_was_seen() -> None:
     """Nodes, topics, who is at which end, services and parameters, records; long lists are cut and counted."""
     ends = (an_end("publisher"), an_end("subscription", node="/b"))
     records = [LogRecord(n, "a.py", "INFO", "a", f"line {n}") for n in range(20)]
@@ -70,7 +72,7 @@ def test_the_text_says_what_was_seen():
         assert line in text
 
 
-def test_hostile_text_stays_text():
+def test_hostile_text_stays_text() -> None:
     """Nothing a node says can steer the terminal, and the JSON stays valid UTF-8."""
     record = LogRecord(0, "a.py", "INFO", "a", "\x1b[2J\u202e\udcff")
     summary = summarise(a_trace(record), ["a.py"], "none")
@@ -79,7 +81,7 @@ def test_hostile_text_stays_text():
 
 
 @pytest.mark.ros
-def test_nodes_are_observed_for_real():
+def test_nodes_are_observed_for_real() -> None:
     """Both reference nodes of exercise 3 run together; what they do comes out as JSON and as text."""
     grade = str(Path(sys.executable).with_name("grade"))
     files = [str(ROOT / "reference_solutions" / name) for name in ("temperature_sensor.py", "fan_controller.py")]
@@ -92,7 +94,7 @@ def test_nodes_are_observed_for_real():
     assert "/temperature_sensor ──/temperature──▶ /fan_controller" in text
 
 
-def test_a_file_that_is_none_is_one_line():
+def test_a_file_that_is_none_is_one_line() -> None:
     """Exit code 2, the name and what to do; nothing is started."""
     grade = str(Path(sys.executable).with_name("grade"))
     done = subprocess.run([grade, "observe", "nope.py"], check=False, capture_output=True, text=True)

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
+import pytest
 from click.testing import CliRunner
 
 from grader.app import grade
@@ -14,12 +16,12 @@ from grader.core.scenario import TimedMessage
 from grader.execution.bag import Odometry
 
 
-def test_the_seed_is_named_even_if_nobody_asked_for_one():
+def test_the_seed_is_named_even_if_nobody_asked_for_one() -> None:
     """Without it a changed file would be tried with other values."""
     assert command_words(GradeRequest("./ada"), 7) == ("grade", "./ada", "--seed", "7")
 
 
-def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
+def test_every_option_that_the_result_depends_on_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command, given to the command line, asks for the same."""
     asked = GradeRequest(
         submission="./ada lovelace",
@@ -31,9 +33,9 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
         isolation="none",
         time_budget_s=20.5,
     )
-    heard = []
+    heard: list[GradeRequest] = []
 
-    def hear(request, *_, **__):
+    def hear(request: GradeRequest, *_: object, **__: object) -> NoReturn:
         heard.append(request)
         raise KeyboardInterrupt
 
@@ -42,7 +44,7 @@ def test_every_option_that_the_result_depends_on_comes_back(monkeypatch):
     assert heard == [asked]
 
 
-def test_a_path_is_taken_for_nothing_else():
+def test_a_path_is_taken_for_nothing_else() -> None:
     """Neither for an option nor for the name of a command."""
     assert command_words(GradeRequest("-x"), 1)[1] == "./-x"
     assert command_words(GradeRequest("observe"), 1)[1] == "./observe"
@@ -50,7 +52,7 @@ def test_a_path_is_taken_for_nothing_else():
     assert command_words(GradeRequest("/a/b"), 1)[1] == "/a/b"
 
 
-def test_every_rubric_has_its_digest():
+def test_every_rubric_has_its_digest() -> None:
     """A changed rubric gives another report, and one sees which it was."""
     exercises = read_exercises(GradeRequest("x"))
     found = reproduction(GradeRequest("x"), exercises, None, 7)
@@ -58,7 +60,7 @@ def test_every_rubric_has_its_digest():
     assert found.recording == ""
 
 
-def test_the_digest_of_a_recording_is_that_of_what_is_played():
+def test_the_digest_of_a_recording_is_that_of_what_is_played() -> None:
     """Any other time, byte or topic gives another one."""
     message = TimedMessage(5, b"ab", {})
     recording = Odometry("/odom", (message, replace(message, t_ns=9)))

@@ -18,26 +18,26 @@ GRADE = str(Path(sys.executable).with_name("grade"))
 KEY = "a-key-that-nobody-must-ever-see-5f2e"
 
 
-def test_a_seed_follows_from_key_and_digest():
+def test_a_seed_follows_from_key_and_digest() -> None:
     """The same files get the same run, others another one, and another class yet another one."""
     one, other = SeedKey(b"one key of 16 bytes"), SeedKey(b"two key of 16 bytes")
     assert one.seed("sha256:aa") == one.seed("sha256:aa")
     assert len({key.seed(digest) for key in (one, other, PRACTICE) for digest in ("sha256:aa", "sha256:ab")}) == 6
 
 
-def test_seeds_are_numbers_that_people_can_type():
+def test_seeds_are_numbers_that_people_can_type() -> None:
     """And that every reader of JSON holds exactly."""
     seeds = [PRACTICE.seed(f"sha256:{n}") for n in range(100)]
     assert all(0 <= seed < 2**48 for seed in seeds)
     assert max(seeds) > 2**40  # too many to try all of them
 
 
-def test_a_key_is_in_no_text_made_of_it():
+def test_a_key_is_in_no_text_made_of_it() -> None:
     """Tracebacks show values of dataclasses."""
     assert KEY not in repr(SeedKey(KEY.encode()))
 
 
-def test_a_run_takes_the_key_that_it_is_given(tmp_path):
+def test_a_run_takes_the_key_that_it_is_given(tmp_path: Path) -> None:
     """An option comes before the variable, and the variable is gone afterwards."""
     (tmp_path / "key").write_text("another key, also long enough\n")
     environment = {"GRADER_SEED_KEY": f" {KEY}\n"}
@@ -48,14 +48,14 @@ def test_a_run_takes_the_key_that_it_is_given(tmp_path):
     assert seed_key(None, {"GRADER_SEED_KEY": ""}) is None  # a CI where the secret is not set
 
 
-def test_a_variable_that_is_no_key_is_refused_without_showing_it():
+def test_a_variable_that_is_no_key_is_refused_without_showing_it() -> None:
     """A log of CI can be read by students."""
     with pytest.raises(KeyFileError, match="GRADER_SEED_KEY: expected a key of 16 to 4096 bytes, found 5") as refusal:
         seed_key(None, {"GRADER_SEED_KEY": "short"})
     assert "short" not in refusal.value.message + refusal.value.hint
 
 
-def test_a_kept_key_is_made_once_for_its_owner_alone(tmp_path):
+def test_a_kept_key_is_made_once_for_its_owner_alone(tmp_path: Path) -> None:
     """Whatever the umask says; a copy that others could read is closed again."""
     path = tmp_path / "key"
     before = os.umask(0)
@@ -71,14 +71,14 @@ def test_a_kept_key_is_made_once_for_its_owner_alone(tmp_path):
     assert kept_key(tmp_path / "other") != made
 
 
-def test_a_kept_key_that_was_damaged_is_not_replaced(tmp_path):
+def test_a_kept_key_that_was_damaged_is_not_replaced(tmp_path: Path) -> None:
     """All seeds would change without a word."""
     (tmp_path / "key").write_text("")
     with pytest.raises(KeyFileError, match="expected a key of 16 to 4096 bytes, found 0"):
         kept_key(tmp_path / "key")
 
 
-def test_a_link_is_no_kept_key(tmp_path):
+def test_a_link_is_no_kept_key(tmp_path: Path) -> None:
     """A folder for results may come from somewhere else."""
     (tmp_path / "target").write_text(KEY)
     (tmp_path / "key").symlink_to(tmp_path / "target")
@@ -86,7 +86,7 @@ def test_a_link_is_no_kept_key(tmp_path):
         kept_key(tmp_path / "key")
 
 
-def grade(*arguments, **environment):
+def grade(*arguments: Path | int | str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [GRADE, *map(str, arguments)],
         env={**os.environ, **environment},
@@ -96,7 +96,7 @@ def grade(*arguments, **environment):
     )
 
 
-def test_a_seed_and_a_key_exclude_each_other(tmp_path):
+def test_a_seed_and_a_key_exclude_each_other(tmp_path: Path) -> None:
     """It would not be clear which one the values follow from."""
     done = grade(tmp_path, "--seed", 1, "--seed-key", tmp_path / "key")
     assert (done.returncode, "--seed and --seed-key exclude each other" in done.stderr) == (2, True)
@@ -123,16 +123,17 @@ rclpy.spin(node)
 
 @pytest.mark.ros
 @pytest.mark.parametrize("given", ["variable", "file"])
-def test_nothing_of_the_key_leaves_the_grader(tmp_path, given):
+def test_nothing_of_the_key_leaves_the_grader(tmp_path: Path, given: str) -> None:
     """Not to reports, evidence or messages, nor to a student's process, which looks for it."""
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "velocity_publisher.py").write_text(SPY)
     (tmp_path / "key").write_text(KEY)
     how = {"GRADER_SEED_KEY": KEY} if given == "variable" else {}
-    words = [tmp_path / "in", "--exercise", "velocity_publisher", "--json"]
+    words: list[Path | str] = [tmp_path / "in", "--exercise", "velocity_publisher", "--json"]
     words += ["-o", f"evidence={tmp_path / 'out' / 'evidence'}", "-o", f"html={tmp_path / 'out' / 'page.html'}"]
     (tmp_path / "out").mkdir()
-    done = grade(*words, *(["--seed-key", tmp_path / "key"] if given == "file" else []), **how)
+    key: list[Path | str] = ["--seed-key", tmp_path / "key"] if given == "file" else []
+    done = grade(*words, *key, **how)
     assert done.returncode == 1, done.stderr
     evidence = open_evidence(tmp_path / "out" / "evidence")
     recorded = repr(run_of(evidence, read_exercises(GradeRequest("", exercises=("velocity_publisher",)))))
@@ -144,8 +145,8 @@ def test_nothing_of_the_key_leaves_the_grader(tmp_path, given):
 
 
 @pytest.mark.ros
-def test_a_run_without_a_key_says_that_its_values_can_be_known():
+def test_a_run_without_a_key_says_that_its_values_can_be_known() -> None:
     """A student's own run; with a seed of its own there is nothing to say."""
-    words = [ROOT / "reference_solutions", "--exercise", "velocity_publisher", "--json"]
+    words: list[Path | str] = [ROOT / "reference_solutions", "--exercise", "velocity_publisher", "--json"]
     assert PRACTICE_NOTE in grade(*words, GRADER_SEED_KEY="").stdout
     assert PRACTICE_NOTE not in grade(*words, "--seed", 7).stdout

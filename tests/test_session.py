@@ -1,5 +1,7 @@
 """The stages of grading that need no ROS: which exercises, which recording, which seed."""
 
+from pathlib import Path
+
 import pytest
 
 from grader.app.grade import read_exercises, read_recording
@@ -8,14 +10,14 @@ from grader.core.errors import RecordingError, RubricError
 from grader.rubrics.builtin import builtin_rubrics
 
 
-def test_all_exercises_are_graded_unless_some_are_named():
+def test_all_exercises_are_graded_unless_some_are_named() -> None:
     """The order is that of the rubrics, not that of the command."""
     assert [e.number for e in read_exercises(GradeRequest("x"))] == ["1", "2", "3"]
     named = GradeRequest("x", exercises=("two_node_communication", "velocity_publisher"))
     assert [e.id for e in read_exercises(named)] == ["velocity_publisher", "two_node_communication"]
 
 
-def test_an_unknown_exercise_names_the_nearest():
+def test_an_unknown_exercise_names_the_nearest() -> None:
     """A slip of the finger is answered with the name that was meant, anything else with all there are."""
     with pytest.raises(RubricError, match="--exercise velocity_publishr: expected one of velocity_publisher") as error:
         read_exercises(GradeRequest("x", exercises=("velocity_publishr",)))
@@ -25,12 +27,14 @@ def test_an_unknown_exercise_names_the_nearest():
     assert error.value.hint == f"known are {', '.join(builtin_rubrics())}"
 
 
-def test_the_recording_is_read_only_where_it_is_played(tmp_path):
+def test_the_recording_is_read_only_where_it_is_played(tmp_path: Path) -> None:
     """Exercise 1 plays none; a recording that was named must be usable all the same."""
     first = GradeRequest("x", exercises=("velocity_publisher",))
     assert read_recording(first, read_exercises(first)) is None
     second = GradeRequest("x", exercises=("odom_subscriber",))
-    assert read_recording(second, read_exercises(second)).topic == "/odom"
+    recording = read_recording(second, read_exercises(second))
+    assert recording is not None
+    assert recording.topic == "/odom"
     named = GradeRequest("x", exercises=("velocity_publisher",), odom_bag=tmp_path / "none.mcap")
     with pytest.raises(RecordingError):
         read_recording(named, read_exercises(named))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from grader.app.grade import grade
+from grader.app.grade import Progress, grade
 from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
 from grader.core.report import Report
@@ -24,11 +25,11 @@ FLOAT = "std_msgs/msg/Float32"
 S = 1_000_000_000
 
 
-def job(scenario="alone", **fields):
+def job(scenario: str = "alone", **fields: Any) -> Job:
     return Job(scenario, Plan(scenario, (), "/", "00", 10 * S, "/x", 60 * S, (), (), "virtual", **fields))
 
 
-def trace(clock=ClockKind.VIRTUAL, *, rate_hz=20.0, **fields):
+def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, **fields: Any) -> Trace:
     made = TraceBuilder("a.py", clock=clock).messages("/x", FLOAT, {"data": 1.0}, rate_hz=rate_hz).trace()
     return replace(made, scenario="alone", **fields)
 
@@ -36,15 +37,23 @@ def trace(clock=ClockKind.VIRTUAL, *, rate_hz=20.0, **fields):
 class Recorder:
     """Gives traces of the wall clock in order, and remembers the plans."""
 
-    def __init__(self, *traces):
-        self.traces, self.plans = list(traces), []
+    def __init__(self, *traces: Trace) -> None:
+        self.traces = list(traces)
+        self.plans: list[Plan] = []
 
     def __call__(self, planned: Job) -> Trace:
         self.plans.append(planned.plan)
         return self.traces.pop(0)
 
 
-def checked(recorder, *, reaches=("gc",), share=0.0, virtual=None, **fields):
+def checked(
+    recorder: Recorder,
+    *,
+    reaches: tuple[str, ...] = ("gc",),
+    share: float = 0.0,
+    virtual: Trace | None = None,
+    **fields: Any,
+) -> Trace:
     heard = []
     checks = SpotChecks(share, 1, "sha256:0", reaches)
     jobs = {("one", "alone"): job(**fields)}
@@ -59,14 +68,14 @@ ON_THE_WALL = replace(SAME, clock_reason="the node needs so much processor time"
 BUSY = replace(OTHER, harness_problem="the machine was too busy")
 
 
-def test_who_is_neither_drawn_nor_suspected_is_not_checked():
+def test_who_is_neither_drawn_nor_suspected_is_not_checked() -> None:
     """Nothing is recorded twice."""
     recorder = Recorder()
     assert checked(recorder, reaches=()).clock is ClockKind.VIRTUAL
     assert recorder.plans == []
 
 
-def test_where_the_clocks_agree_virtual_time_counts():
+def test_where_the_clocks_agree_virtual_time_counts() -> None:
     """One short recording, with nothing of the grader in the process."""
     recorder = Recorder(SAME)
     assert checked(recorder) == trace()
@@ -74,7 +83,7 @@ def test_where_the_clocks_agree_virtual_time_counts():
     assert (plan.clock, plan.bare, plan.duration_ns) == ("wall", True, 6 * S)
 
 
-def test_where_they_disagree_the_wall_clock_decides():
+def test_where_they_disagree_the_wall_clock_decides() -> None:
     """Seen twice, then everything is recorded in full, and the reason says how they differ."""
     recorder = Recorder(OTHER, OTHER, OTHER)
     decided = checked(recorder)
@@ -83,12 +92,12 @@ def test_where_they_disagree_the_wall_clock_decides():
     assert [plan.duration_ns for plan in recorder.plans] == [6 * S, 6 * S, 10 * S]
 
 
-def test_a_disagreement_that_does_not_come_again_is_none():
+def test_a_disagreement_that_does_not_come_again_is_none() -> None:
     """It was the machine."""
     assert checked(Recorder(OTHER, SAME)) == trace()
 
 
-def test_a_busy_machine_is_nobodys_mark():
+def test_a_busy_machine_is_nobodys_mark() -> None:
     """Of a drawn submission virtual time counts, with a note; of one that a check is about nothing is decided."""
     drawn = checked(Recorder(BUSY, BUSY, BUSY), reaches=(), share=1.0)
     assert drawn.harness_problem == ""
@@ -96,28 +105,28 @@ def test_a_busy_machine_is_nobodys_mark():
     assert checked(Recorder(BUSY, BUSY, BUSY)).harness_problem.startswith("the machine was too busy")
 
 
-def test_a_busy_machine_is_given_another_try():
+def test_a_busy_machine_is_given_another_try() -> None:
     """A check that was held up counts neither way, unless the clocks agree all the same."""
     assert checked(Recorder(BUSY, BUSY, SAME)) == trace()
     assert checked(Recorder(BUSY, OTHER, BUSY, OTHER, OTHER)).clock is ClockKind.WALL
     assert checked(Recorder(replace(SAME, harness_problem="the machine was too busy"))) == trace()
 
 
-def test_what_a_process_reached_for_is_enough():
+def test_what_a_process_reached_for_is_enough() -> None:
     """The names in its files may hide it."""
     recorder = Recorder(OTHER, OTHER, OTHER)
     assert checked(recorder, reaches=(), virtual=trace(reached=("gc.get_objects",))).clock is ClockKind.WALL
 
 
 @pytest.mark.parametrize("found", [trace(clock_reason="busy"), trace(harness_problem="lost"), ON_THE_WALL])
-def test_what_virtual_time_does_not_decide_is_not_checked(found):
+def test_what_virtual_time_does_not_decide_is_not_checked(found: Trace) -> None:
     """The wall clock has it already, or nobody."""
     recorder = Recorder()
     assert checked(recorder, virtual=found, reaches=(), share=1.0) == found
     assert recorder.plans == []
 
 
-def test_who_is_suspected_is_checked_on_the_wall_clock_as_well():
+def test_who_is_suspected_is_checked_on_the_wall_clock_as_well() -> None:
     """There, too, the grader was in its process; what it does without it counts."""
     assert checked(Recorder(SAME), virtual=ON_THE_WALL) == ON_THE_WALL
     decided = checked(Recorder(OTHER, OTHER, OTHER), virtual=ON_THE_WALL)
@@ -125,13 +134,13 @@ def test_who_is_suspected_is_checked_on_the_wall_clock_as_well():
     assert len(decided.messages("/x")) == len(OTHER.messages("/x"))
 
 
-def test_a_slow_start_is_waited_for():
+def test_a_slow_start_is_waited_for() -> None:
     """As long as in virtual time, and some more."""
     late = TraceBuilder("a.py").messages("/x", FLOAT, {"data": 1.0}, start_s=8.0, rate_hz=20.0).trace()
     assert shortened(job().plan, late).wait_at_most_ns == 18 * S
 
 
-def test_the_draw_repeats_and_has_the_share_asked_for():
+def test_the_draw_repeats_and_has_the_share_asked_for() -> None:
     """It follows from the seed, which only the key tells, and the digest."""
     digests = [f"sha256:{n}" for n in range(2000)]
     drawn = [d for d in digests if is_drawn(0.05, 7, d)]
@@ -145,7 +154,7 @@ def test_the_draw_repeats_and_has_the_share_asked_for():
 # --- for real ---
 
 
-def graded(tmp_path: Path, file: Path, hear=lambda step: None, **options: object) -> Report:
+def graded(tmp_path: Path, file: Path, hear: Progress = lambda step: None, **options: Any) -> Report:
     """Grade a file as a velocity publisher that is watched for three seconds."""
     folder = tmp_path / "submission"
     folder.mkdir(exist_ok=True)
@@ -164,7 +173,7 @@ def graded(tmp_path: Path, file: Path, hear=lambda step: None, **options: object
         for file in sorted((HERE / "cheats").glob("*.py"))
     ],
 )
-def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path, file):
+def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path: Path, file: Path) -> None:
     """Whatever it tells the clocks apart by; what no file shows is found where it is drawn."""
     assert graded(tmp_path, file, clock="virtual").score == 30
     report = graded(tmp_path, file, spot_checks=1.0 if file.stem.startswith("drawn_") else 0.0)
@@ -177,21 +186,25 @@ def test_a_program_that_is_right_only_in_virtual_time_loses(tmp_path, file):
 
 @pytest.mark.ros
 @pytest.mark.parametrize("file", sorted((HERE / "honest").glob("*.py")), ids=lambda file: file.stem)
-def test_an_honest_program_keeps_its_marks(tmp_path, file):
+def test_an_honest_program_keeps_its_marks(tmp_path: Path, file: Path) -> None:
     """It looks suspicious, and is the same on both clocks."""
     assert graded(tmp_path, file).score == 30
 
 
 @pytest.mark.ros
-def test_defining_classes_is_no_reason_for_a_check(tmp_path):
+def test_defining_classes_is_no_reason_for_a_check(tmp_path: Path) -> None:
     """Named tuples, data classes and enumerations run code that Python writes itself."""
-    steps = []
-    report = graded(tmp_path, HERE / "makes_classes.py", steps.append)
+    steps: list[str] = []
+
+    def hear(step: str) -> None:
+        steps.append(step)
+
+    report = graded(tmp_path, HERE / "makes_classes.py", hear)
     assert (report.score, [step for step in steps if "wall clock" in step]) == (30, [])
 
 
 @pytest.mark.ros
-def test_a_checked_process_holds_nothing_of_the_grader(tmp_path):
+def test_a_checked_process_holds_nothing_of_the_grader(tmp_path: Path) -> None:
     """Neither a module, a path, a variable, an argument nor a descriptor; nothing is replaced, and chance is real."""
     (exercise,) = graded(tmp_path, HERE / "looks_around.py").exercises
     assert exercise.clock is ClockKind.WALL

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import io
 import tarfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ruamel.yaml import YAML
@@ -25,7 +27,7 @@ PROGRAMS = YAML(typ="safe").load((HERE / "programs.yaml").read_text(encoding="ut
 KEY = SeedKey(b"a key that no submission holds, of thirty-two bytes or more")
 
 
-def everything(value):
+def everything(value: object) -> Iterator[str]:
     """Yield every text and number of a report."""
     if isinstance(value, dict):
         for inner in value.values():
@@ -37,7 +39,7 @@ def everything(value):
         yield str(value)
 
 
-def test_every_program_is_listed():
+def test_every_program_is_listed() -> None:
     """No folder is forgotten, and none is expected that is not there."""
     assert {p["folder"] for p in PROGRAMS} == {path.name for path in HERE.iterdir() if path.is_dir()}
 
@@ -47,7 +49,7 @@ def test_every_program_is_listed():
     "program",
     [pytest.param(p, id=p["folder"], marks=[pytest.mark.nightly] if p.get("nightly") else []) for p in PROGRAMS],
 )
-def test_a_program_gets_what_it_is_worth(program):
+def test_a_program_gets_what_it_is_worth(program: Mapping[str, Any]) -> None:
     """What a process says about itself is no evidence, and nothing that it did is lost."""
     clock = program.get("decided", "auto")
     request = GradeRequest(str(HERE / program["folder"]), exercises=(program["exercise"],), seed_key=KEY, clock=clock)
@@ -61,7 +63,7 @@ def test_a_program_gets_what_it_is_worth(program):
     assert any(program.get("says", "") in v.reason for v in verdicts)
 
 
-def test_a_folder_whose_name_begins_with_a_dot_is_told(tmp_path):
+def test_a_folder_whose_name_begins_with_a_dot_is_told(tmp_path: Path) -> None:
     """Number 17: a class is never graded without a word about one of its folders."""
     for student in ("ada", ".bob"):
         (tmp_path / "class" / student).mkdir(parents=True)
@@ -72,7 +74,7 @@ def test_a_folder_whose_name_begins_with_a_dot_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["velocity_publisher.py ", "src /velocity_publisher.py"])
-def test_a_name_that_ends_in_a_blank_is_refused(name):
+def test_a_name_that_ends_in_a_blank_is_refused(name: str) -> None:
     """Number 18: like other names that some system cannot keep."""
     packed = io.BytesIO()
     with tarfile.open(fileobj=packed, mode="w") as archive:

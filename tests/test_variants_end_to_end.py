@@ -1,10 +1,11 @@
 """A real node graded by its student's variant, with a result that waits: graded, judged again, and handed back."""
 
 import json
+from pathlib import Path
 
 import jsonschema
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from grader.cli import main
 from grader.reporting.json_report import report_schema
@@ -13,13 +14,15 @@ from grader.rubrics.builtin import builtin_rubrics, shipped_folder
 SOLUTION = shipped_folder().parent / "reference_solutions" / "velocity_publisher.py"
 
 
-def run(*words):
+def run(*words: str) -> Result:
     """Return what a command comes to."""
     return CliRunner().invoke(main.app, list(map(str, words)), catch_exceptions=False)
 
 
 @pytest.mark.ros
-def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(tmp_path, monkeypatch):
+def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Following the task sheet has full marks; evidence needs no key; what waits is in nothing handed back."""
     monkeypatch.chdir(tmp_path)
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")

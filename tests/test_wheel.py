@@ -19,7 +19,7 @@ HOOK = runpy.run_path(str(ROOT / "hatch_build.py"))
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the wheel once, with the build backend of the development environment."""
     folder = tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
@@ -27,7 +27,7 @@ def wheel(tmp_path_factory):
     return next(folder.glob("*.whl"))
 
 
-def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
+def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> None:
     """An instructor needs nothing but the wheel; a student finds no solution in it."""
     names = zipfile.ZipFile(wheel).namelist()
     for needed in (
@@ -44,7 +44,7 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel):
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]
 
 
-def test_the_libraries_of_the_report_travel_as_published_with_their_licences(wheel):
+def test_the_libraries_of_the_report_travel_as_published_with_their_licences(wheel: Path) -> None:
     """Each file in the wheel is the one that the build hook names; nothing else travels beside them."""
     folder, archive = "grader/reporting/html/vendor", zipfile.ZipFile(wheel)
     wanted = {
@@ -58,7 +58,7 @@ def test_the_libraries_of_the_report_travel_as_published_with_their_licences(whe
 
 
 @pytest.fixture
-def npm(tmp_path, monkeypatch):
+def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Put a program in the place of npm, which gives archives with other content."""
     for package, files in HOOK["LIBRARIES"].items():
         archive = re.sub("[/@]", "-", package.lstrip("@"))
@@ -72,7 +72,7 @@ def npm(tmp_path, monkeypatch):
     return program
 
 
-def test_a_library_of_other_content_is_refused(npm, tmp_path):
+def test_a_library_of_other_content_is_refused(npm: Path, tmp_path: Path) -> None:
     """What the registry gives is checked against the digests in the hook, and what was there stays."""
     kept = tmp_path / "vendor" / "kept.js"
     kept.parent.mkdir()
@@ -82,7 +82,7 @@ def test_a_library_of_other_content_is_refused(npm, tmp_path):
     assert kept.read_text() == "kept"
 
 
-def test_a_failure_of_npm_is_told_in_its_own_words(npm, tmp_path):
+def test_a_failure_of_npm_is_told_in_its_own_words(npm: Path, tmp_path: Path) -> None:
     """Without a network the build says what was to be fetched, and what npm said."""
     npm.write_text("#!/bin/sh\necho no network >&2\nexit 1\n")
     with pytest.raises(RuntimeError, match=r"npm pack: expected echarts@[\s\S]*found:\nno network"):
@@ -90,7 +90,7 @@ def test_a_failure_of_npm_is_told_in_its_own_words(npm, tmp_path):
 
 
 @pytest.mark.ros
-def test_the_installed_wheel_grades_from_any_directory(wheel, tmp_path):
+def test_the_installed_wheel_grades_from_any_directory(wheel: Path, tmp_path: Path) -> None:
     """Nothing of the checkout is needed to grade, and nothing of it is used."""
     site = tmp_path / "site"
     install = [
