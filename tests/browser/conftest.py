@@ -1,8 +1,15 @@
 """A real browser for the tests of pages."""
 
+from __future__ import annotations
+
 import shutil
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 #: Everything that a browser does by itself over the network is switched off: what is left comes from the page.
 ARGUMENTS = [
@@ -18,7 +25,7 @@ ARGUMENTS = [
 
 
 @pytest.fixture(scope="session")
-def browser():
+def browser() -> Iterator[Browser]:
     """Return Chromium, driven by playwright; skip where one of them is absent."""
     sync_api = pytest.importorskip(
         "playwright.sync_api", reason="playwright is not installed (pip install -e '.[dev]')"

@@ -1,12 +1,15 @@
 """Reports of whole runs, made by the real judging from traces built in code, with every kind of figure in them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from report_samples import report
 from tracing import FLOAT32, Recording, held_at, position_logs, scripted, velocity
 
+from grader.core.exercise import Exercise
+from grader.core.report import ExerciseReport, Report
 from grader.core.submission import StudentFile, Submission
-from grader.core.trace import FaultKind
+from grader.core.trace import FaultKind, Trace
 from grader.judging.charts import illustrated
 from grader.judging.judge_run import judge_exercise
 from grader.rubrics.builtin import builtin_rubrics
@@ -26,19 +29,19 @@ main()
 """
 
 
-def perfect():
+def perfect() -> Report:
     """Return a report in which everything is met."""
     return _report(velocity().log(1, "publishing"), position_logs(lambda x, y: f"x={x:.3f} y={y:.3f}"), "/fan_speed")
 
 
-def wrong():
+def wrong() -> Report:
     """Return a report with a slow publisher, wrong positions and a controller that talks to nobody."""
     return _report(
         velocity(rate=10).log(1, "publishing", "WARN"), position_logs(lambda x, y: f"x={y:.3f} y={x:.3f}"), "/fan"
     )
 
 
-def crashed(text="ValueError: no"):
+def crashed(text: str = "ValueError: no") -> Report:
     """Return a report of nodes that raised; the text of the exception is given."""
     first = velocity(stop_s=4).fault(
         3,
@@ -52,14 +55,14 @@ def crashed(text="ValueError: no"):
     return _report(first, second, "/fan_speed", name=text)
 
 
-def _report(first, second, speed, name="ada"):
+def _report(first: Recording, second: Recording, speed: str, name: str = "ada") -> Report:
     rubrics = [read_rubric(builtin_rubrics()[id_]) for id_ in CHAPTER]
     recordings = {"alone": first, "waiting_then_driving": second, **_conversation(speed)}
     traces = {name_: recording.trace(name_) for name_, recording in recordings.items()}
     return report(*(_graded(exercise, traces) for exercise in rubrics), name=name)
 
 
-def _graded(exercise, traces):
+def _graded(exercise: Exercise, traces: Mapping[str, Trace]) -> ExerciseReport:
     own = {s.id: traces[s.id] for s in exercise.scenarios}
     submission = Submission(
         "ada", "./ada", Path(), "sha256:" + "0" * 64, {f: StudentFile(f, f) for f in exercise.files}
@@ -69,7 +72,7 @@ def _graded(exercise, traces):
     return illustrated(judged, exercise, own, submission, sources)
 
 
-def _conversation(speed):
+def _conversation(speed: str) -> dict[str, Recording]:
     """Return exercise 3's scenarios; the sensor's values are fixed but look drawn."""
     sensor = Recording(12, process="temperature_sensor.py").endpoint("publisher", "/temperature", FLOAT32, SENSOR)
     sensor.endpoint("subscription", "/fan_speed", FLOAT32, SENSOR)
@@ -87,9 +90,9 @@ def _conversation(speed):
     alone = scripted().endpoint("subscription", "/temperature", FLOAT32, CONTROLLER)
     alone.endpoint("publisher", speed, FLOAT32, CONTROLLER)
     for k in range(80):
-        alone.number(0.51 + 0.2 * k, speed, 100.0 * (held_at(0.5 + 0.2 * k) > 25))
+        alone.number(0.51 + 0.2 * k, speed, 100.0 * ((held_at(0.5 + 0.2 * k) or 0) > 25))
     return {"sensor_alone": sensor, "controller_alone": alone, "together": both}
 
 
-def _drawn(k):
+def _drawn(k: int) -> float:
     return 20 + (k * k * 7919 + 104729 * k) % 1000 / 100

@@ -1,15 +1,19 @@
 """A class of any size, taken in, stored and written as `grade batch` does it; only what grades it is made up."""
 
+from __future__ import annotations
+
 import random
 import tempfile
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import class_reports
 from class_samples import course
 
 from grader.classroom.class_run import grade_class
-from grader.classroom.local import Attempt
+from grader.classroom.local import Attempt, Hear, Task
 from grader.classroom.store import ResultStatus, State
 from grader.classroom.watching import Watcher
 from grader.reporting.html.render import render_html
@@ -38,20 +42,20 @@ REFUSED, FAILED = 41, 77
 class MadeUp:
     """Gives every submission a drawn report; one is refused, at one the grader fails."""
 
-    def __init__(self):
-        self.numbers = {}
+    def __init__(self) -> None:
+        self.numbers: dict[str, int] = {}
 
-    def __call__(self, jobs):
+    def __call__(self, jobs: int) -> MadeUp:
         return self
 
-    def prepare(self, isolation):
+    def prepare(self, isolation: str) -> list[str]:
         return []
 
-    def run(self, tasks, hear):
+    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
         for number, task in enumerate(tasks):
             yield Attempt(task, self.standing(task, number))
 
-    def standing(self, task, number):
+    def standing(self, task: Task, number: int) -> ResultStatus:
         with tempfile.TemporaryDirectory() as staged:
             digest = stage_submission(str(task.submission), (), Path(staged)).digest
         key = task.conditions.key(digest)
@@ -70,7 +74,7 @@ class MadeUp:
         return ResultStatus(state, key, digest, task.label, score=score, max_score=most, usage=usage)
 
 
-def names(count):
+def names(count: int) -> list[str]:
     """Return so many names of students, the hostile ones among them."""
     draw = random.Random(5)
     pairs = [f"{first} {last}" for first in FIRST for last in LAST]
@@ -78,7 +82,7 @@ def names(count):
     return [*draw.sample([*pairs, *more], count - len(HOSTILE)), *HOSTILE]
 
 
-def make_class(folder, count, **changes):
+def make_class(folder: Path, count: int, **changes: Any) -> Path:
     """Grade a class of so many; return the folder with its results."""
     for name in names(count):
         (folder / "homework" / name[:120]).mkdir(parents=True)

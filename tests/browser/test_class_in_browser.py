@@ -1,12 +1,20 @@
 """The page of a class of 300 in a real browser: sorting, searching, filters, links, and hostile names."""
 
+from __future__ import annotations
+
 import re
 import shutil
+from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlparse
 
 import made_class
 import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
 
 pytestmark = pytest.mark.browser
 
@@ -14,7 +22,7 @@ COUNT = 300
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Return the folder with the results of a class."""
     folder = tmp_path_factory.mktemp("class")
     yield made_class.make_class(folder, COUNT)
@@ -24,10 +32,11 @@ def results(tmp_path_factory):
 class Visit:
     """A page that was opened, what its console said, and what it asked for."""
 
-    def __init__(self, browser, folder, **options):
+    def __init__(self, browser: Browser, folder: Path, **options: Any) -> None:
         self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options})
         self.page = self.context.new_page()
-        self.said, self.asked = [], []
+        self.said: list[str] = []
+        self.asked: list[str] = []
         self.page.on("console", lambda message: self.said.append(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
@@ -36,7 +45,7 @@ class Visit:
 
 
 @pytest.fixture(scope="module")
-def visit(browser, results):
+def visit(browser: Browser, results: Path) -> Iterator[Visit]:
     """Return the page, opened once for all tests."""
     made = Visit(browser, results)
     yield made
@@ -44,7 +53,7 @@ def visit(browser, results):
 
 
 @pytest.fixture
-def page(visit):
+def page(visit: Visit) -> Iterator[Page]:
     """Return the page with everybody in the order of names; afterwards its console is still silent."""
     visit.page.evaluate(
         "() => { document.getElementById('all').click(); const head = document.querySelector('th[data-sort=name]');"
@@ -54,25 +63,33 @@ def page(visit):
     assert visit.said == []
 
 
-def rows(page):
+def rows(page: Page) -> list[list[str]]:
     """Return the cells of all rows that are shown, those further down included."""
     page.evaluate("() => { const more = document.getElementById('more'); while (!more.hidden) more.click(); }")
-    return page.evaluate(
+    found: list[list[str]] = page.evaluate(
         "[...document.querySelectorAll('#table tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))"
     )
+    return found
 
 
-def finals(page):
+def number_in(text: str) -> int:
+    """Return the number that a text begins with."""
+    found = re.match(r"\d+", text)
+    assert found
+    return int(found[0])
+
+
+def finals(page: Page) -> list[float]:
     """Return the final scores that are shown, in order."""
     return [float(cells[4]) for cells in rows(page) if cells[4]]
 
 
-def shown(page):
+def shown(page: Page) -> int:
     """Return how many rows the page says it shows."""
     return int(page.inner_text("#shown").split()[0])
 
 
-def test_the_page_loads_its_own_files_and_draws(visit, page, results):
+def test_the_page_loads_its_own_files_and_draws(visit: Visit, page: Page, results: Path) -> None:
     """Nothing else is asked for, the console is silent, and the bars are there."""
     assert {urlparse(url).scheme for url in visit.asked} == {"file"}
     assert all(unquote(urlparse(url).path).startswith(str(results)) for url in visit.asked)
@@ -81,7 +98,7 @@ def test_the_page_loads_its_own_files_and_draws(visit, page, results):
     assert shown(page) == COUNT
 
 
-def test_the_table_sorts_by_score_and_by_name(page):
+def test_the_table_sorts_by_score_and_by_name(page: Page) -> None:
     """Down, up, and back to names; whoever has no score comes last; the order is told to who listens."""
     head = page.locator("th[data-sort=final]")
     head.get_by_role("button").click()
@@ -101,7 +118,7 @@ def test_the_table_sorts_by_score_and_by_name(page):
     assert names.index("Ada Abe") < names.index("Élodie Abe") < names.index("Fatima Abe") < names.index("Zoë Missing")
 
 
-def test_searching_finds_whom_one_means(page):
+def test_searching_finds_whom_one_means(page: Page) -> None:
     """Every word counts, accents and capitals do not; an empty search shows everybody."""
     page.fill("#search", "elodie ABE")
     assert [cells[0].split("\n")[0] for cells in rows(page)] == ["Élodie Abe"]
@@ -113,10 +130,10 @@ def test_searching_finds_whom_one_means(page):
     assert shown(page) == COUNT
 
 
-def test_filters_narrow_the_table_down(page):
+def test_filters_narrow_the_table_down(page: Page) -> None:
     """By a criterion that was not met, by outcome, by status, by score."""
     cell = page.locator("button[data-criterion='odom_subscriber/log_period'][data-outcome=not_met]")
-    count = int(re.match(r"\d+", cell.inner_text())[0])
+    count = number_in(cell.inner_text())
     page.select_option("#criterion", "odom_subscriber/log_period")
     assert page.input_value("#outcome") == "lost"
     assert shown(page) == count == len(rows(page))
@@ -132,10 +149,10 @@ def test_filters_narrow_the_table_down(page):
     assert all(60 <= score <= 80 for score in finals(page))
 
 
-def test_a_number_and_a_cause_show_their_students(page):
+def test_a_number_and_a_cause_show_their_students(page: Page) -> None:
     """The table shows just as many, and the keyboard is there."""
     cell = page.locator("button[data-criterion='velocity_publisher/rate'][data-outcome=blocked]")
-    count = int(re.match(r"\d+", cell.inner_text())[0])
+    count = number_in(cell.inner_text())
     cell.focus()
     page.keyboard.press("Enter")
     assert shown(page) == count
@@ -145,17 +162,17 @@ def test_a_number_and_a_cause_show_their_students(page):
     assert page.evaluate("document.activeElement.id") == "shown"
 
 
-def test_a_bar_shows_its_students_to_the_keyboard(page):
+def test_a_bar_shows_its_students_to_the_keyboard(page: Page) -> None:
     """Arrows walk over the bars and are told, Enter filters."""
     page.locator("[data-figure=scores] .drawing").focus()
     for _ in range(9):
         page.keyboard.press("ArrowRight")
-    assert "80 to 90 %" in page.text_content("[data-said]")
+    assert "80 to 90 %" in (page.text_content("[data-said]") or "")
     page.keyboard.press("Enter")
     assert all(80 <= score < 90 for score in finals(page))
 
 
-def test_every_link_leads_to_a_file_of_the_class(page, results):
+def test_every_link_leads_to_a_file_of_the_class(page: Page, results: Path) -> None:
     """Also those of students with odd names; one is followed."""
     rows(page)
     links = page.evaluate("[...document.querySelectorAll('a[href]')].map((a) => a.href)")
@@ -169,7 +186,7 @@ def test_every_link_leads_to_a_file_of_the_class(page, results):
     other.close()
 
 
-def test_hostile_names_stay_text(visit, page):
+def test_hostile_names_stay_text(visit: Visit, page: Page) -> None:
     """No element, no handler and no script comes of a name; direction marks are shown as what they are."""
     rows(page)
     assert page.title().startswith("homework")
@@ -191,7 +208,7 @@ def test_hostile_names_stay_text(visit, page):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_sticks_out_on_a_phone(browser, results, scheme):
+def test_nothing_sticks_out_on_a_phone(browser: Browser, results: Path, scheme: str) -> None:
     """The page scrolls downwards only; tables scroll inside themselves."""
     size = {"width": 390, "height": 800}
     phone = Visit(browser, results, viewport=size, color_scheme=scheme, is_mobile=True, has_touch=True)
@@ -201,7 +218,7 @@ def test_nothing_sticks_out_on_a_phone(browser, results, scheme):
     assert phone.said == []
 
 
-def test_a_print_has_everybody(page):
+def test_a_print_has_everybody(page: Page) -> None:
     """Rows that the screen shows later are on paper."""
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert page.locator("#table tbody tr").count() == COUNT
@@ -209,7 +226,7 @@ def test_a_print_has_everybody(page):
     assert page.locator("#table tbody tr").count() < COUNT
 
 
-def test_headings_and_controls_have_names(page):
+def test_headings_and_controls_have_names(page: Page) -> None:
     """One h1, no level left out, every control named."""
     levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map((h) => Number(h.tagName[1]))")
     assert levels.count(1) == 1
@@ -222,7 +239,7 @@ def test_headings_and_controls_have_names(page):
     assert unnamed == 0
 
 
-def test_without_scripts_everybody_is_there(browser, results):
+def test_without_scripts_everybody_is_there(browser: Browser, results: Path) -> None:
     """The table, the causes and the lists need none."""
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()

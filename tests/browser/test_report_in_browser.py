@@ -1,12 +1,20 @@
 """The HTML report in a real browser: every picture is drawn, nothing is loaded, and hostile text stays text."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import graded
 import pytest
 
 from grader.reporting.html.assets import shared_assets
 from grader.reporting.html.render import render_html
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
 pytestmark = pytest.mark.browser
 
@@ -17,18 +25,25 @@ ATTACKS = (
 )
 
 
-@pytest.fixture
-def visit(browser, tmp_path):
-    """Return a function that opens a report and gives the page, what its console said and what it asked for."""
-    contexts = []
+class Open(Protocol):
+    """Opens a report; gives the page, what its console said and what it asked for."""
 
-    def opened(html, **options):
+    def __call__(self, html: str, **options: Any) -> tuple[Page, list[str], list[str]]: ...
+
+
+@pytest.fixture
+def visit(browser: Browser, tmp_path: Path) -> Iterator[Open]:
+    """Return a function that opens a report and gives the page, what its console said and what it asked for."""
+    contexts: list[BrowserContext] = []
+
+    def opened(html: str, **options: Any) -> tuple[Page, list[str], list[str]]:
         file = tmp_path / "report.html"
         file.write_text(html, encoding="utf-8")
         context = browser.new_context(**{"viewport": {"width": 1100, "height": 900}, **options})
         contexts.append(context)
         page = context.new_page()
-        said, asked = [], []
+        said: list[str] = []
+        asked: list[str] = []
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))
@@ -41,19 +56,20 @@ def visit(browser, tmp_path):
         context.close()
 
 
-def drawings(page):
+def drawings(page: Page) -> list[tuple[str, bool]]:
     """Return (figure id, whether it has a picture of some size with something in it)."""
-    return page.evaluate(
+    found: list[tuple[str, bool]] = page.evaluate(
         """() => [...document.querySelectorAll("[data-figure]")].map((figure) => {
             const pictures = [...figure.querySelectorAll(".drawing svg")];
             const drawn = (svg) => svg.getBoundingClientRect().height > 30 && svg.querySelector("path, rect");
             return [figure.id, pictures.length > 0 && pictures.every(drawn)];
         })"""
     )
+    return found
 
 
 @pytest.mark.parametrize(("name", "scheme"), [("perfect", "light"), ("wrong", "dark"), ("crashed", "light")])
-def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit, name, scheme):
+def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, name: str, scheme: str) -> None:
     """The console is silent, and the page itself is all that was ever asked for."""
     page, said, asked = visit(render_html(MADE[name]()), color_scheme=scheme)
     drawn = drawings(page)
@@ -63,7 +79,7 @@ def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit, name, sch
     assert [url for url in asked if not url.endswith("/report.html")] == []
 
 
-def test_shared_files_beside_the_report_draw_the_same(visit, tmp_path):
+def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Path) -> None:
     """A class keeps one copy of the scripts."""
     (tmp_path / "assets").mkdir()
     for name, content in shared_assets().items():
@@ -75,7 +91,7 @@ def test_shared_files_beside_the_report_draw_the_same(visit, tmp_path):
 
 
 @pytest.mark.parametrize("text", ATTACKS)
-def test_hostile_text_stays_text_wherever_it_is_shown(visit, text):
+def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) -> None:
     """In the page, in tooltips, in tables, in the legend and inside the charts."""
     page, said, asked = visit(render_html(graded.crashed(text)))
     for summary in page.query_selector_all("figure .table > summary"):
@@ -91,12 +107,13 @@ def test_hostile_text_stays_text_wherever_it_is_shown(visit, text):
     assert len(asked) == 1
 
 
-def test_a_pointer_over_a_chart_is_told_the_value(visit):
+def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     """The tooltip shows the time and the value of what is under it."""
     page, said, _ = visit(render_html(graded.perfect()))
     chart = page.locator("[data-figure=velocity_publisher-1] .drawing")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
+    assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 100)
     tip = chart.locator(".tip")
     tip.wait_for(state="visible")
@@ -105,44 +122,52 @@ def test_a_pointer_over_a_chart_is_told_the_value(visit):
     assert said == []
 
 
-def test_a_pointer_over_answers_is_told_what_was_expected(visit):
+def test_a_pointer_over_answers_is_told_what_was_expected(visit: Open) -> None:
     """What was said long ago and still holds is in the tooltip as well."""
     page, _, _ = visit(render_html(graded.perfect()))
     figure = page.locator("figure", has=page.get_by_role("heading", name="Answers on /fan_speed"))
     figure.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
-    said = figure.locator("[data-said]").text_content()
+    said = figure.locator("[data-said]").text_content() or ""
     assert {part.split(" ")[1] for part in said.split(";")} == {"0.7", "temperature", "expected", "fan"}
 
 
-def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit):
+def test_a_pointer_over_a_timeline_is_told_what_was_logged(visit: Open) -> None:
     """The text of the record, as it was written."""
     page, said, _ = visit(render_html(graded.perfect()))
     chart = page.locator("#odom_subscriber figure").last.locator(".drawing")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
+    assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 55)
     chart.locator(".tip .text").wait_for(state="visible")
     assert chart.locator(".tip .text").inner_text().startswith("x=")
     assert said == []
 
 
-def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit):
+def test_keys_walk_along_a_chart_and_tell_a_screen_reader(visit: Open) -> None:
     """Arrow keys go from point to point; the words go to a live region."""
     page, _, _ = visit(render_html(graded.perfect()))
     chart = page.locator("[data-figure=velocity_publisher-1]")
     chart.locator(".drawing").focus()
     page.keyboard.press("ArrowRight")
-    first = chart.locator("[data-said]").text_content()
+    first = chart.locator("[data-said]").text_content() or ""
     page.keyboard.press("ArrowRight")
     assert first.startswith("time ")
     assert chart.locator("[data-said]").text_content() != first
 
 
-def window_of(page, figure):
+def width_of(element: Locator) -> float:
+    """Return how wide an element is on the screen."""
+    box = element.bounding_box()
+    assert box is not None
+    return box["width"]
+
+
+def window_of(page: Page, figure: str) -> list[float]:
     """Return which part of a chart is shown, in percent."""
-    return page.evaluate(
+    shown: list[float] = page.evaluate(
         """(id) => {
             const element = document.querySelector(`[data-figure=${id}] .drawing`);
             const { start, end } = echarts.getInstanceByDom(element).getOption().dataZoom[0];
@@ -150,11 +175,12 @@ def window_of(page, figure):
         }""",
         figure,
     )
+    return shown
 
 
-def turn_wheel(page, figure, *, ctrl):
+def turn_wheel(page: Page, figure: str, *, ctrl: bool) -> bool:
     """Turn the wheel over a chart; return whether the chart keeps it from the page, once it has zoomed if it does."""
-    return page.evaluate(
+    kept: bool = page.evaluate(
         """async ([id, ctrlKey]) => {
             const target = document.querySelector(`[data-figure=${id}] .drawing svg`);
             const chart = echarts.getInstanceByDom(target.closest(".drawing"));
@@ -171,9 +197,10 @@ def turn_wheel(page, figure, *, ctrl):
         }""",
         [figure, ctrl],
     )
+    return kept
 
 
-def test_buttons_keys_and_the_wheel_zoom(visit):
+def test_buttons_keys_and_the_wheel_zoom(visit: Open) -> None:
     """In, out, along and back to all of it."""
     page, said, _ = visit(render_html(graded.perfect()))
     figure = "velocity_publisher-1"
@@ -195,28 +222,28 @@ def test_buttons_keys_and_the_wheel_zoom(visit):
     assert said == []
 
 
-def test_the_wheel_alone_scrolls_the_page(visit):
+def test_the_wheel_alone_scrolls_the_page(visit: Open) -> None:
     """A chart under the pointer is no trap."""
     page, _, _ = visit(render_html(graded.perfect()))
     assert not turn_wheel(page, "velocity_publisher-1", ctrl=False)
     assert window_of(page, "velocity_publisher-1") == [0, 100]
 
 
-def test_the_graph_lights_up_and_grows(visit):
+def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     """Hovering or focusing a node shows what it is connected to; the buttons enlarge the drawing."""
     page, said, _ = visit(render_html(graded.perfect()))
     figure = page.locator("[data-figure]", has=page.locator(".stages")).last
     node = figure.locator("[data-box]").first
     node.focus()
     assert figure.locator(".edge.lit").count() > 0
-    assert "publishes" in figure.locator("[data-said]").text_content()
-    width = figure.locator("svg[viewBox]:not(.fold)").first.bounding_box()["width"]
+    assert "publishes" in (figure.locator("[data-said]").text_content() or "")
+    width = width_of(figure.locator("svg[viewBox]:not(.fold)").first)
     figure.get_by_label("Zoom in").click()
-    assert figure.locator(".stage svg").first.bounding_box()["width"] > 1.5 * width
+    assert width_of(figure.locator(".stage svg").first) > 1.5 * width
     assert said == []
 
 
-def test_both_directions_are_in_the_graph(visit):
+def test_both_directions_are_in_the_graph(visit: Open) -> None:
     """The last situation shows temperature going one way and the fan speed the other."""
     page, _, _ = visit(render_html(graded.perfect()))
     stage = page.locator("#two_node_communication .stage").last
@@ -234,19 +261,23 @@ def test_both_directions_are_in_the_graph(visit):
     }
 
 
-def test_every_chart_can_be_read_as_a_table(visit):
+def test_every_chart_can_be_read_as_a_table(visit: Open) -> None:
     """All its numbers, with headings."""
     page, _, _ = visit(render_html(graded.perfect()))
     for figure in page.query_selector_all("[data-figure]"):
-        figure.query_selector(".table > summary").click()
-        assert figure.wait_for_selector(".scroll:not(:empty)").inner_text()
+        summary = figure.query_selector(".table > summary")
+        assert summary is not None
+        summary.click()
+        filled = figure.wait_for_selector(".scroll:not(:empty)")
+        assert filled is not None
+        assert filled.inner_text()
     rows = page.locator("[data-figure=velocity_publisher-1] tbody tr")
     assert rows.count() > 300
 
 
 @pytest.mark.parametrize("width", [320, 390])
 @pytest.mark.parametrize("name", MADE)
-def test_nothing_sticks_out_on_a_phone(visit, name, width):
+def test_nothing_sticks_out_on_a_phone(visit: Open, name: str, width: int) -> None:
     """The page scrolls downwards only."""
     page, said, _ = visit(
         render_html(MADE[name]()), viewport={"width": width, "height": 700}, is_mobile=True, has_touch=True
@@ -256,7 +287,7 @@ def test_nothing_sticks_out_on_a_phone(visit, name, width):
     assert said == []
 
 
-def test_a_print_shows_every_criterion_and_every_chart(visit):
+def test_a_print_shows_every_criterion_and_every_chart(visit: Open) -> None:
     """What is folded on the screen is unfolded on paper, and charts fit the sheet; afterwards all is as before."""
     page, said, _ = visit(render_html(graded.wrong()), color_scheme="dark")
     folded = page.locator("details.criterion:not([open])").count()
@@ -270,14 +301,14 @@ def test_a_print_shows_every_criterion_and_every_chart(visit):
     assert said == []
 
 
-def test_a_link_to_a_folded_criterion_unfolds_it(visit):
+def test_a_link_to_a_folded_criterion_unfolds_it(visit: Open) -> None:
     """A colleague can be sent to the very place."""
     page, _, _ = visit(render_html(graded.perfect()))
     page.evaluate("location.hash = '#velocity_publisher-rate'")
     page.wait_for_selector("#velocity_publisher-rate[open]")
 
 
-def test_headings_landmarks_and_names_are_there(visit):
+def test_headings_landmarks_and_names_are_there(visit: Open) -> None:
     """For whoever listens to the page: one h1, no level left out, every control and picture named."""
     page, _, _ = visit(render_html(graded.wrong()))
     levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3, h4, h5')].map((h) => Number(h.tagName[1]))")
@@ -292,7 +323,7 @@ def test_headings_landmarks_and_names_are_there(visit):
     assert unnamed == 0
 
 
-def test_without_scripts_the_report_is_there_in_words(visit, browser, tmp_path):
+def test_without_scripts_the_report_is_there_in_words(visit: Open, browser: Browser, tmp_path: Path) -> None:
     """Mail programs and wary people switch them off."""
     file = tmp_path / "plain.html"
     file.write_text(render_html(graded.wrong()), encoding="utf-8")

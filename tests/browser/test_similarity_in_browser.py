@@ -1,8 +1,16 @@
 """The page that shows two similar submissions side by side, in a real browser: what it loads, and what it runs."""
 
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import copies
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.browser
 
@@ -14,7 +22,7 @@ EVIL = "<img src=x onerror=document.title='owned'>"
 
 
 @pytest.fixture
-def results(tmp_path):
+def results(tmp_path: Path) -> Path:
     """Return the results of a class of two, one of them with a hostile name, who wrote the same in other names."""
     folder = hand_in(tmp_path / "in", **{EVIL: 10, "bob": 7})
     comment = "    # </code></pre><script>document.title='owned'</script>\n"
@@ -25,11 +33,12 @@ def results(tmp_path):
 
 
 @pytest.mark.parametrize("width", [1280, 390])
-def test_two_submissions_side_by_side(browser, results, width):
+def test_two_submissions_side_by_side(browser: Browser, results: Path, width: int) -> None:
     """From the class to the pair by links; side by side where there is room; nothing runs, nothing is loaded."""
     context = browser.new_context(viewport={"width": width, "height": 900})
     page = context.new_page()
-    said, asked = [], []
+    said: list[str] = []
+    asked: list[str] = []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.goto((results / "index.html").as_uri())
@@ -37,6 +46,8 @@ def test_two_submissions_side_by_side(browser, results, width):
     page.on("request", lambda request: asked.append(request.url))
     page.click("text=Pair 1")
     left, right = (side.bounding_box() for side in page.locator(".side").all())
+    assert left is not None
+    assert right is not None
     assert (left["y"] == right["y"]) == (width > 1000)
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert page.locator(".side").first.locator("mark").count() > 20
