@@ -5,8 +5,10 @@ from __future__ import annotations
 import shutil
 import tempfile
 import textwrap
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from grader.core.limits import Limits
 from grader.core.trace import Trace
@@ -73,7 +75,7 @@ def staging(studio: RecordingSession) -> RecordingSession:
     """Have a studio copy what is recorded into its own folder, because workers see no other."""
     each = studio.recorder.each
 
-    def each_staged(jobs, progress):
+    def each_staged(jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
         root = Path(tempfile.mkdtemp(dir=studio.folder))
         for number, job in enumerate(jobs):
             shutil.copytree(job.plan.root, root / str(number))
@@ -82,12 +84,12 @@ def staging(studio: RecordingSession) -> RecordingSession:
             [replace(j, plan=replace(j.plan, root=str(root / str(n)))) for n, j in enumerate(jobs)], progress
         )
 
-    studio.recorder.each = each_staged
+    studio.recorder.each = each_staged  # type: ignore[method-assign]
     return studio
 
 
 def record(
-    studio: RecordingSession, folder: Path, *programs: str, limits: Limits | None = None, **fields: object
+    studio: RecordingSession, folder: Path, *programs: str, limits: Limits | None = None, **fields: Any
 ) -> Trace:
     """Record programs together for ten seconds, on the virtual clock unless another is named."""
     folder.mkdir(exist_ok=True)
@@ -96,7 +98,7 @@ def record(
     for name, program in zip(names, programs, strict=True):
         (folder / name).write_text(program, encoding="utf-8")
         (folder / name).chmod(0o644)
-    usual = {
+    usual: dict[str, Any] = {
         "scenario": "alone",
         "processes": tuple((name, name) for name in names),
         "root": str(folder),

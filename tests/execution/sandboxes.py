@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import grader
 from grader.core.errors import EnvironmentFault
@@ -73,7 +74,7 @@ class Sandbox:
         command = self.isolation.worker_command(argv, environment, pass_fds, view)
         return replace(command, argv=(*self.start_as, *command.argv))
 
-    def run(self, code: str, **options: object) -> subprocess.CompletedProcess[str]:
+    def run(self, code: str, **options: Any) -> subprocess.CompletedProcess[str]:
         """Run some code as a student and return how it ended."""
         student = self.student(code, **options)
         try:

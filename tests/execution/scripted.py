@@ -19,12 +19,14 @@ MS = 1_000_000
 EPOCH_NS = 1_767_225_600_000_000_000
 FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
 
-Program = Generator[dict[str, Any] | None, dict[str, Any] | None, Any]
+#: Yields reports and is sent answers.
+Program = Generator[dict[str, Any] | None, Any, Any]
+Behaviour = Callable[["ScriptedStudent", "World"], Program]
 
 
 def plan(**fields: Any) -> Plan:
     """Return a plan of one second without stimuli, but for what is given."""
-    usual = {
+    usual: dict[str, Any] = {
         "scenario": "alone",
         "processes": (),
         "root": "/nowhere",
@@ -40,10 +42,10 @@ def plan(**fields: Any) -> Plan:
 
 
 def numbers(
-    *values: tuple[float, int], topic: str = "/temperature", start_ms: int = 100, period_ms: int = 100, **other
-):
+    *values: tuple[float, int], topic: str = "/temperature", start_ms: int = 100, period_ms: int = 100, **other: Any
+) -> PlannedNumbers:
     """Return a stimulus that publishes some numbers."""
-    usual = {"type": FLOAT, "repeats": 1}
+    usual: dict[str, Any] = {"type": FLOAT, "repeats": 1}
     return PlannedNumbers(
         topic=topic, start_ns=start_ms * MS, period_ns=period_ms * MS, numbers=values, **{**usual, **other}
     )

@@ -123,7 +123,7 @@ def public_folder() -> Iterator[Path]:
 
 
 class TestOwnRecording:
-    def test_is_long_and_comes_at_a_rate_without_round_divisor(self):
+    def test_is_long_and_comes_at_a_rate_without_round_divisor(self) -> None:
         """60 s of /odom at 26.8 Hz: every 30th message is not a 1 s log."""
         odometry = read_odometry(OWN)
         last_ns = odometry.messages[-1].t_ns
@@ -133,7 +133,7 @@ class TestOwnRecording:
         assert rate_hz == pytest.approx(26.8, abs=0.05)
         assert not 0.9 <= 30 / rate_hz <= 1.1
 
-    def test_intervals_jitter_but_never_run_backwards(self):
+    def test_intervals_jitter_but_never_run_backwards(self) -> None:
         """Intervals spread by a few milliseconds, some messages are 10 ms late, none overtakes another."""
         times = [m.t_ns for m in read_odometry(OWN).messages]
         gaps_ms = [(b - a) / 1e6 for a, b in pairwise(times)]
@@ -143,7 +143,7 @@ class TestOwnRecording:
         assert 1 < deviation < 6
         assert max(gaps_ms) > mean + 9
 
-    def test_x_and_y_tell_a_swap_and_a_lost_sign(self):
+    def test_x_and_y_tell_a_swap_and_a_lost_sign(self) -> None:
         """All four quadrants, and |x| and |y| differ by more than 0.15 m in at least 95 of 100 messages."""
         points = [m.value["pose"]["pose"]["position"] for m in read_odometry(OWN).messages]
         assert {(p["x"] > 0, p["y"] > 0) for p in points} == {(a, b) for a in (True, False) for b in (True, False)}
@@ -151,7 +151,7 @@ class TestOwnRecording:
         assert distinct / len(points) > 0.95
         assert math.hypot(points[0]["x"], points[0]["y"]) > 1
 
-    def test_the_robot_moves_as_its_twist_says(self):
+    def test_the_robot_moves_as_its_twist_says(self) -> None:
         """Integrating the recorded speed gives the length of the recorded path; orientations are unit and planar."""
         messages = read_odometry(OWN).messages
         speeds = [m.value["twist"]["twist"]["linear"]["x"] for m in messages]
@@ -164,7 +164,7 @@ class TestOwnRecording:
             q = message.value["pose"]["pose"]["orientation"]
             assert q["z"] ** 2 + q["w"] ** 2 == pytest.approx(1)
 
-    def test_is_what_the_script_writes(self, tmp_path: Path):
+    def test_is_what_the_script_writes(self, tmp_path: Path) -> None:
         """The committed recording and a fresh one hold the same messages, and it stays small."""
         spec = importlib.util.spec_from_file_location("make_odometry", ROOT / "rubrics" / "make_odometry.py")
         assert spec is not None
@@ -191,7 +191,7 @@ class TestOtherPeoplesRecordings:
             ("standing_best_effort/point_0.db3", 335, 16.70, (0.557, -1.430)),
         ],
     )
-    def test_are_read(self, name: str, count: int, span_s: float, first: tuple[float, float] | None):
+    def test_are_read(self, name: str, count: int, span_s: float, first: tuple[float, float] | None) -> None:
         """Both storages, with and without metadata, with custom types beside the odometry."""
         odometry = read_odometry(others(name))
         assert odometry.topic == "/odom"
@@ -205,20 +205,22 @@ class TestOtherPeoplesRecordings:
 class TestShapes:
     @BOTH
     @pytest.mark.parametrize("compression", [CompressionMode.NONE, CompressionMode.MESSAGE, CompressionMode.FILE])
-    def test_storages_and_compressions(self, tmp_path: Path, plugin: StoragePlugin, compression: CompressionMode):
+    def test_storages_and_compressions(
+        self, tmp_path: Path, plugin: StoragePlugin, compression: CompressionMode
+    ) -> None:
         """sqlite3 and mcap, plain or zstd-compressed, give the same messages."""
         path = write_bag(tmp_path / "bag", {"/odom": drive()}, plugin=plugin, compression=compression)
         messages = read_odometry(path).messages
         assert [m.t_ns for m in messages] == [n * NS_PER_S // 10 for n in range(60)]
         assert [m.cdr for m in messages] == [data for _, data in drive()]
 
-    def test_chunks_compressed_inside_an_mcap_file(self, tmp_path: Path):
+    def test_chunks_compressed_inside_an_mcap_file(self, tmp_path: Path) -> None:
         """What `ros2 bag record` writes by its fast preset is read as a bare file too."""
         path = write_bag(tmp_path / "bag", {"/odom": drive()}, compression=CompressionMode.STORAGE)
         assert len(read_odometry(path / "bag.mcap").messages) == 60
 
     @BOTH
-    def test_without_metadata(self, tmp_path: Path, plugin: StoragePlugin):
+    def test_without_metadata(self, tmp_path: Path, plugin: StoragePlugin) -> None:
         """A folder that lost its metadata.yaml, and the file in it, are recordings."""
         path = write_bag(tmp_path / "bag", {"/odom": drive()}, plugin=plugin)
         (path / "metadata.yaml").unlink()
@@ -226,13 +228,13 @@ class TestShapes:
         file = next(p for p in path.iterdir() if p.suffix != ".txt")
         assert read_odometry(path) == read_odometry(file)
 
-    def test_metadata_file_means_its_folder(self, tmp_path: Path):
+    def test_metadata_file_means_its_folder(self, tmp_path: Path) -> None:
         """Whoever names metadata.yaml means the recording around it."""
         path = write_bag(tmp_path / "bag", {"/odom": drive()})
         assert read_odometry(path / "metadata.yaml") == read_odometry(path)
 
     @BOTH
-    def test_names_that_look_like_address_parameters(self, tmp_path: Path, plugin: StoragePlugin):
+    def test_names_that_look_like_address_parameters(self, tmp_path: Path, plugin: StoragePlugin) -> None:
         """A folder called `lab #2 100%25?x=1` is a folder like any other."""
         folder = tmp_path / "lab #2 100%25?x=1"
         write_bag(tmp_path / "plain" / "bag", {"/odom": drive()}, plugin=plugin).parent.rename(folder)
@@ -240,7 +242,7 @@ class TestShapes:
         assert len(read_odometry(path).messages) == 60
         assert len(read_odometry(next(p for p in path.iterdir() if p.suffix != ".yaml")).messages) == 60
 
-    def test_unknown_types_beside_it(self, tmp_path: Path):
+    def test_unknown_types_beside_it(self, tmp_path: Path) -> None:
         """A custom type that nobody here knows is ignored."""
         wheels = [(START_NS + n, b"\x00\x01\x00\x00" + bytes(8)) for n in range(5)]
         path = write_bag(
@@ -258,7 +260,7 @@ class TestShapes:
             ({"/z": 60, "/y": 60}, "/y"),
         ],
     )
-    def test_which_topic_is_played(self, tmp_path: Path, counts: dict[str, int], topic: str):
+    def test_which_topic_is_played(self, tmp_path: Path, counts: dict[str, int], topic: str) -> None:
         """/odom if it says anything, else the topic with most messages; its name is told."""
         period_ns = NS_PER_S // 4
         path = write_bag(tmp_path / "bag", {name: drive(count, period_ns) for name, count in counts.items()})
@@ -266,7 +268,7 @@ class TestShapes:
         assert odometry.topic == topic
         assert len(odometry.messages) == counts[topic]
 
-    def test_values_are_those_of_the_message(self, tmp_path: Path):
+    def test_values_are_those_of_the_message(self, tmp_path: Path) -> None:
         """Position, orientation and twist keep the names of the message definition."""
         message = read_odometry(write_bag(tmp_path / "bag", {"/odom": drive()})).messages[7]
         assert message.value == {
@@ -281,13 +283,13 @@ class TestShapes:
             },
         }
 
-    def test_big_endian_messages_are_rewritten(self, tmp_path: Path):
+    def test_big_endian_messages_are_rewritten(self, tmp_path: Path) -> None:
         """A recording from a big-endian robot is played in the order of bytes that our writer speaks."""
         big = [(t_ns, odometry_cdr(n / 100, little_endian=False)) for n, (t_ns, _) in enumerate(drive())]
         messages = read_odometry(write_bag(tmp_path / "bag", {"/odom": big})).messages
         assert [m.cdr for m in messages] == [data for _, data in drive()]
 
-    def test_equal_times_are_told_apart(self, tmp_path: Path):
+    def test_equal_times_are_told_apart(self, tmp_path: Path) -> None:
         """Messages received at one instant stay in order, a nanosecond apart."""
         messages = [(START_NS, odometry_cdr(n / 10)) for n in range(3)] + drive()[1:]
         read = read_odometry(write_bag(tmp_path / "bag", {"/odom": messages})).messages
@@ -295,7 +297,7 @@ class TestShapes:
         assert [m.value["pose"]["pose"]["position"]["x"] for m in read[:3]] == [0.0, 0.1, 0.2]
 
     @BOTH
-    def test_nothing_is_written_beside_it(self, public_folder: Path, plugin: StoragePlugin):
+    def test_nothing_is_written_beside_it(self, public_folder: Path, plugin: StoragePlugin) -> None:
         """A folder without write permission works, and is untouched afterwards."""
         path = write_bag(public_folder / "bag", {"/odom": drive()}, plugin=plugin)
         before = {p.name: (p.stat().st_mtime_ns, p.stat().st_size) for p in path.iterdir()}
@@ -412,13 +414,13 @@ class TestRefused:
             pytest.param(folder_with(b"\xff\xfe\x00", "metadata.yaml"), "found a damaged one", id="binary metadata"),
         ],
     )
-    def test_with_one_clear_line(self, tmp_path: Path, make: Callable[[Path], Path], found: str):
+    def test_with_one_clear_line(self, tmp_path: Path, make: Callable[[Path], Path], found: str) -> None:
         """Every unusable recording ends in one line that names the path, what was found, and a remedy."""
         assert found in refused(make(tmp_path / "bag"))
 
     @BOTH
     @pytest.mark.parametrize("share", [0.01, 0.1, 0.35, 0.5, 0.8, 0.95, 0.999])
-    def test_truncated(self, tmp_path: Path, plugin: StoragePlugin, share: float):
+    def test_truncated(self, tmp_path: Path, plugin: StoragePlugin, share: float) -> None:
         """A file that was cut off anywhere is damaged, with its folder or alone."""
         path = write_bag(tmp_path / "bag", {"/odom": drive(200)}, plugin=plugin)
         file = next(p for p in path.iterdir() if p.suffix != ".yaml")
@@ -428,7 +430,7 @@ class TestRefused:
 
     @pytest.mark.parametrize("name", ["turtlebot3_path/path.mcap", "neato_square/drive_square_0.db3"])
     @pytest.mark.parametrize("share", [0.2, 0.7, 0.99])
-    def test_truncated_real(self, tmp_path: Path, name: str, share: float):
+    def test_truncated_real(self, tmp_path: Path, name: str, share: float) -> None:
         """Real recordings cut off are damaged too."""
         source = others(name)
         data = source.read_bytes()
@@ -437,7 +439,7 @@ class TestRefused:
 
     @BOTH
     @given(rng=st.randoms(use_true_random=False), flips=st.sampled_from((1, 5, 50, 500)))
-    def test_flipped_bytes_never_escape(self, plugin: StoragePlugin, rng: random.Random, flips: int):
+    def test_flipped_bytes_never_escape(self, plugin: StoragePlugin, rng: random.Random, flips: int) -> None:
         """Whatever bytes are overwritten, reading ends in messages or in a RecordingError."""
         data = bytearray(whole(plugin))
         for _ in range(flips):
@@ -449,7 +451,7 @@ class TestRefused:
                 assert all(a.t_ns < b.t_ns for a, b in pairwise(read_odometry(file).messages))
 
     @pytest.mark.parametrize("closed", ["", "metadata.yaml", "bag.mcap"])
-    def test_without_permission(self, public_folder: Path, closed: str):
+    def test_without_permission(self, public_folder: Path, closed: str) -> None:
         """A folder or file that may not be read says so."""
         path = write_bag(public_folder / "bag", {"/odom": drive()})
         (path / closed).chmod(0o000)
@@ -470,7 +472,7 @@ class TestWindow:
         duration_ns=st.integers(0, 10**11),
         seed=st.integers(),
     )
-    def test_is_a_part_long_enough(self, count: int, period_ns: int, duration_ns: int, seed: int):
+    def test_is_a_part_long_enough(self, count: int, period_ns: int, duration_ns: int, seed: int) -> None:
         """A window is a run of neighbours from time 0 on, no shorter than asked unless the recording is."""
         odometry = steady(count, period_ns)
         part = window(odometry, duration_ns=duration_ns, seed=seed)
@@ -481,7 +483,7 @@ class TestWindow:
         assert numbers == list(range(numbers[0], numbers[0] + len(part)))
         assert part == window(odometry, duration_ns=duration_ns, seed=seed)
 
-    def test_starts_are_spread_by_the_seed(self):
+    def test_starts_are_spread_by_the_seed(self) -> None:
         """Seeds reach all of the recording, and no start is much likelier than another."""
         odometry = steady(100, NS_PER_S)
         starts = [window(odometry, duration_ns=89 * NS_PER_S, seed=s)[0].value["n"] for s in range(2200)]
@@ -489,13 +491,13 @@ class TestWindow:
         assert sum(counts) == 2200
         assert min(counts) > 140
 
-    def test_a_short_recording_is_played_whole(self):
+    def test_a_short_recording_is_played_whole(self) -> None:
         """Asking for more than there is gives everything."""
         odometry = steady(30, NS_PER_S)
         assert window(odometry, duration_ns=60 * NS_PER_S, seed=5) == odometry.messages
 
 
-def test_rosbags_is_imported_only_when_something_is_read():
+def test_rosbags_is_imported_only_when_something_is_read() -> None:
     """Runs that play no odometry do not pay for the library."""
     code = "import sys, grader.execution.bag; sys.exit('rosbags' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

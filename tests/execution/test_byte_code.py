@@ -5,6 +5,7 @@ import os
 import py_compile
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,20 +14,23 @@ from grader.core.errors import EnvironmentFault
 from grader.execution import byte_code as byte_code_module
 from grader.execution.byte_code import _roots, byte_code, compile_command, is_current
 from grader.execution.ros_installation import find_ros
+from grader.execution.sandbox.environment import PACKAGE
 
 MODE = py_compile.PycInvalidationMode
 
 
 @pytest.fixture
-def source(tmp_path) -> Path:
+def source(tmp_path: Path) -> Path:
     path = tmp_path / "package" / "module.py"
     path.parent.mkdir()
     path.write_text("x = 1\n", encoding="utf-8")
     return path
 
 
-def compiled(source: Path, mode=MODE.TIMESTAMP) -> Path:
-    return Path(py_compile.compile(str(source), doraise=True, invalidation_mode=mode))
+def compiled(source: Path, mode: py_compile.PycInvalidationMode = MODE.TIMESTAMP) -> Path:
+    place = py_compile.compile(str(source), doraise=True, invalidation_mode=mode)
+    assert place is not None
+    return Path(place)
 
 
 def loads(source: Path, place: Path) -> bool:
@@ -67,14 +71,16 @@ def nothing(source: Path, place: Path) -> None:
 
 @pytest.mark.parametrize("change", [nothing, other_time, other_size, other_content, other_python])
 @pytest.mark.parametrize("mode", list(MODE), ids=lambda mode: mode.name)
-def test_what_the_interpreter_loads_is_current(source, mode, change):
+def test_what_the_interpreter_loads_is_current(
+    source: Path, mode: py_compile.PycInvalidationMode, change: Callable[[Path, Path], None]
+) -> None:
     """For each kind of byte code and each change the answer is that of the interpreter."""
     place = compiled(source, mode)
     change(source, place)
     assert is_current(source, place) == loads(source, place)
 
 
-def test_a_missing_or_cut_file_is_not_current(source):
+def test_a_missing_or_cut_file_is_not_current(source: Path) -> None:
     """Both are compiled again at each start."""
     place = Path(importlib.util.cache_from_source(str(source)))
     assert not is_current(source, place)
@@ -85,7 +91,7 @@ def test_a_missing_or_cut_file_is_not_current(source):
 
 
 @pytest.mark.parametrize("change", [other_time, other_size, other_python])
-def test_the_command_that_is_named_mends_it(source, change):
+def test_the_command_that_is_named_mends_it(source: Path, change: Callable[[Path, Path], None]) -> None:
     """Whichever way it is stale."""
     place = compiled(source)
     change(source, place)
@@ -95,7 +101,7 @@ def test_the_command_that_is_named_mends_it(source, change):
 
 
 @pytest.mark.ros
-def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch):
+def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of what nodes load, nothing is stale in the environment of the tests; with one file that is, it is named."""
     try:
         ros = find_ros()
@@ -103,7 +109,7 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch
         pytest.skip(fault.message)
     assert byte_code(ros.runtime).value == "up to date", "in the environment that .ci/setup made"
     monkeypatch.setattr(byte_code_module, "compile_own", lambda: None)
-    stale = Path(importlib.util.cache_from_source(str(byte_code_module.PACKAGE / "core" / "errors.py")))
+    stale = Path(importlib.util.cache_from_source(str(PACKAGE / "core" / "errors.py")))
     kept = stale.read_bytes()
     try:
         stale.write_bytes(b"")
@@ -112,4 +118,4 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch
         stale.write_bytes(kept)
     assert fact.fits
     assert fact.value.startswith("missing or stale for 1 file:")
-    assert fact.remedy.endswith(f"-m compileall -q -f {byte_code_module.PACKAGE}")
+    assert fact.remedy.endswith(f"-m compileall -q -f {PACKAGE}")

@@ -4,7 +4,7 @@ import contextlib
 import copy
 import json
 import math
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
@@ -90,12 +90,12 @@ TRACES = st.builds(
 )
 
 
-def over_the_line(data):
+def over_the_line(data: Any) -> Any:
     """Return JSON values as the other side reads them; the writer may only use strict JSON."""
     return json.loads(json.dumps(data, allow_nan=False))
 
 
-def same(left, right):
+def same(left: Any, right: Any) -> bool:
     """Return whether two values are equal, NaN being equal to itself and True not to 1."""
     if isinstance(left, float) and isinstance(right, float) and math.isnan(left):
         return math.isnan(right)
@@ -108,21 +108,21 @@ def same(left, right):
     return type(left) is type(right) and left == right
 
 
-def test_every_kind_of_observation_is_tried():
+def test_every_kind_of_observation_is_tried() -> None:
     """A new kind has to be added here, and to the codec."""
     assert set(OBSERVATIONS) == set(get_args(Observation))
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_a_trace_comes_back_as_it_was(trace):
+def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
     """All kinds, NaN, infinities, whole numbers beyond 64 bits, texts that no encoding holds."""
     assert same(trace_from_json(over_the_line(trace_to_json(trace))), trace)
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_the_same_trace_is_written_in_the_same_bytes(trace):
+def test_the_same_trace_is_written_in_the_same_bytes(trace: Trace) -> None:
     """Bytes can be compared instead of traces."""
     once = json.dumps(trace_to_json(trace))
     assert json.dumps(trace_to_json(trace_from_json(json.loads(once)))) == once
@@ -151,7 +151,7 @@ SOUND = trace_to_json(
 )
 
 
-def test_a_trace_of_an_earlier_version_says_nothing_of_starts():
+def test_a_trace_of_an_earlier_version_says_nothing_of_starts() -> None:
     """It is read all the same, and written as it was."""
     earlier = {name: value for name, value in SOUND.items() if name != "starts"}
     assert trace_from_json(earlier).starts == ()
@@ -173,7 +173,9 @@ def test_a_trace_of_an_earlier_version_says_nothing_of_starts():
         (FaultKind.SYNTAX_ERROR, "SyntaxError: no", (None, "", None)),
     ],
 )
-def test_a_fault_of_an_earlier_version_has_its_details_in_its_text(kind, text, details):
+def test_a_fault_of_an_earlier_version_has_its_details_in_its_text(
+    kind: FaultKind, text: str, details: tuple[int | None, str, tuple[int, int] | None]
+) -> None:
     """They are read from it; where a recording has them itself, its text is not asked."""
     trace = Trace("alone", ClockKind.VIRTUAL, 10, (Fault(1, "a.py", kind, text),))
     now = trace_to_json(trace)
@@ -183,16 +185,19 @@ def test_a_fault_of_an_earlier_version_has_its_details_in_its_text(kind, text, d
     assert trace_from_json(now).faults() == unpack(pack(trace, [False])).faults() == trace.faults()
 
 
-WRONG = (None, True, 1, 1.5, "x", [], {}, [["x"]], {"x": 1}, "\ud800")
+#: Keys and numbers that lead to a value.
+Place = tuple[str | int, ...]
+
+WRONG: tuple[Any, ...] = (None, True, 1, 1.5, "x", [], {}, [["x"]], {"x": 1}, "\ud800")
 
 
-def paths(data, at=()):
+def paths(data: Any, at: Place = ()) -> list[Place]:
     """Return the path of every value inside a JSON value."""
     inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     return [at, *(path for key, value in inner for path in paths(value, (*at, key)))]
 
 
-def replaced(data, path, value):
+def replaced(data: Any, path: Place, value: Any) -> Any:
     """Return a copy with one value replaced."""
     if not path:
         return value
@@ -205,14 +210,14 @@ def replaced(data, path, value):
 
 
 @pytest.mark.parametrize("path", paths(SOUND), ids=lambda path: ".".join(map(str, path)) or "all")
-def test_damage_is_refused_or_harmless(path):
+def test_damage_is_refused_or_harmless(path: Place) -> None:
     """Whatever stands in a field instead, the answer is HarnessError or a trace of the right types, never a crash."""
     for wrong in WRONG:
         with contextlib.suppress(HarnessError):
             assert_types(trace_from_json(replaced(SOUND, path, wrong)))
 
 
-def assert_types(trace):
+def assert_types(trace: Trace) -> None:
     """Check that everything in a trace is of the type that its class says."""
     assert type(trace.scenario) is type(trace.clock_reason) is type(trace.harness_problem) is str
     assert type(trace.stop_ns) is int
@@ -262,15 +267,15 @@ def assert_types(trace):
         (("observations", 10, 8), "no base64!"),
     ],
 )
-def test_damage_is_named(path, wrong):
+def test_damage_is_named(path: Place, wrong: Any) -> None:
     """A trace with a field that says something else is no trace."""
     with pytest.raises(HarnessError, match="trace: expected"):
         trace_from_json(replaced(SOUND, path, wrong))
 
 
-def test_a_trace_nested_without_end_is_refused():
+def test_a_trace_nested_without_end_is_refused() -> None:
     """A hostile answer does not end the grader by its depth."""
-    deep = {}
+    deep: dict[str, Any] = {}
     for _ in range(100_000):
         deep = {"x": deep}
     data = copy.copy(SOUND)
@@ -283,7 +288,7 @@ def test_a_trace_nested_without_end_is_refused():
             deep = deep.pop("x")
 
 
-def test_the_first_word_is_the_kind():
+def test_the_first_word_is_the_kind() -> None:
     """People who read a trace find their way."""
     assert [observation[0] for observation in SOUND["observations"]] == [
         "message",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any, cast
 
 import pytest
 
@@ -15,6 +16,8 @@ from scripted import (
     FLOAT,
     INT,
     MS,
+    Behaviour,
+    Program,
     ScriptedObserver,
     ScriptedStudent,
     World,
@@ -29,13 +32,15 @@ from grader.core.limits import Limits
 from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
 from grader.execution import discovery, machine, trace_recorder, virtual_time_suitability
 from grader.execution import virtual_runner as module
+from grader.execution.observer import Observer
 from grader.execution.plan import PlannedRecording
+from grader.execution.student_process import NodeProcess
 from grader.execution.virtual_runner import VirtualRunner
 from grader.student_host import clock as host_clock
 
 
 @pytest.fixture(autouse=True)
-def impatient(monkeypatch):
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing in these tests is on its way in real time."""
     monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.0))
     monkeypatch.setattr(machine, "BRIEF_S", 0.0)
@@ -44,19 +49,21 @@ def impatient(monkeypatch):
 class Run:
     """One run of some programs: its trace, and everybody who took part."""
 
-    def __init__(self, *programs, **fields):
+    def __init__(self, *programs: Behaviour, **fields: Any) -> None:
         self.world = World()
         names = ("a.py", "b.py", "c.py")
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(names, programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
-        self.trace = VirtualRunner(plan(**fields), self.students, self.observer).run()
+        self.trace = VirtualRunner(
+            plan(**fields), cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
+        ).run()
 
-    def seen(self, *kinds):
+    def seen(self, *kinds: type) -> list[str]:
         """Return observations in short, with their milliseconds, without the graph."""
         return [short(o) for o in self.trace.observations if not isinstance(o, (GraphSnapshot, *kinds))]
 
 
-def short(o):
+def short(o: Any) -> str:
     at = o.t_ns / MS
     at = int(at) if at == int(at) else at
     if isinstance(o, Delivery):
@@ -70,10 +77,10 @@ def short(o):
     return f"{at} {o.name} {o.detail}" if isinstance(o, Mark) else f"{at} {o.process} {o.kind} {o.name} {o.detail}"
 
 
-def sleeper(*wakes_ms):
+def sleeper(*wakes_ms: float) -> Behaviour:
     """A program that wakes at some times and says so."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         for wake_ms in wakes_ms:
             yield idle(wake_ms)
             me.write(f"awake for {wake_ms}")
@@ -82,20 +89,20 @@ def sleeper(*wakes_ms):
     return program
 
 
-def saying(*reports, missing=None):
+def saying(*reports: Any, missing: Any = None) -> Behaviour:
     """A program that makes some reports, whatever it is told, and ends."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         me.missing = missing
         yield from (report for report in reports)  # a generator can be sent answers, a list cannot
 
     return program
 
 
-def publisher(topic, period_ms, *, first_ms=0, start_ms=0):
+def publisher(topic: str, period_ms: float, *, first_ms: float = 0, start_ms: float = 0) -> Behaviour:
     """A program that publishes a counter on a topic, for ever."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         yield from wait(first_ms, endpoints=world.have(me.name, claim("publisher", topic)))
         count = 0
         while True:
@@ -106,10 +113,10 @@ def publisher(topic, period_ms, *, first_ms=0, start_ms=0):
     return program
 
 
-def listener(topic, interface=FLOAT, **qos):
+def listener(topic: str, interface: str = FLOAT, **qos: Any) -> Behaviour:
     """A program that says what arrives, when it is told."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         answer = yield from wait(endpoints=world.have(me.name, claim("subscription", topic, interface, **qos)))
         while True:
             me.write(f"got {answer['arrivals']}")
@@ -118,12 +125,12 @@ def listener(topic, interface=FLOAT, **qos):
     return program
 
 
-def test_both_sides_agree_on_the_epoch():
+def test_both_sides_agree_on_the_epoch() -> None:
     """Virtual time starts at the same moment in the host and here."""
     assert module.EPOCH_NS == host_clock.EPOCH_NS == EPOCH_NS
 
 
-def test_time_jumps_from_wish_to_wish():
+def test_time_jumps_from_wish_to_wish() -> None:
     """Nobody is woken in between, and nothing is rounded."""
     run = Run(sleeper(0.000001, 250, 999.999999))
     assert run.students[0].times_ms() == [0, 0.000001, 250, 999.999999]
@@ -135,13 +142,13 @@ def test_time_jumps_from_wish_to_wish():
     assert (run.trace.stop_ns, run.trace.clock) == (1000 * MS, ClockKind.VIRTUAL)
 
 
-def test_the_end_is_outside():
+def test_the_end_is_outside() -> None:
     """The window is half open: who wants to wake at its end is not woken."""
     assert Run(sleeper(1000)).seen() == []
     assert Run(sleeper(1_000_000)).seen() == []
 
 
-def test_processes_take_turns_in_their_order():
+def test_processes_take_turns_in_their_order() -> None:
     """At one instant the first goes first, whoever asked first."""
     run = Run(sleeper(200, 300), sleeper(100, 200, 300))
     assert run.seen() == [
@@ -153,7 +160,7 @@ def test_processes_take_turns_in_their_order():
     ]
 
 
-def test_a_stimulus_comes_before_what_processes_do_at_its_instant():
+def test_a_stimulus_comes_before_what_processes_do_at_its_instant() -> None:
     """It is published first, and everybody who listens has it when woken."""
     run = Run(sleeper(100, 200), listener("/temperature"), numbers=(numbers((20.5, 0), (25.0, 0)),))
     assert run.seen() == [
@@ -167,17 +174,17 @@ def test_a_stimulus_comes_before_what_processes_do_at_its_instant():
     ]
 
 
-def test_a_message_from_one_process_reaches_the_other_at_the_same_instant():
+def test_a_message_from_one_process_reaches_the_other_at_the_same_instant() -> None:
     """Transport takes no virtual time; an answer comes back before time moves on."""
 
-    def controller(me, world):
+    def controller(me: ScriptedStudent, world: World) -> Program:
         ends = world.have(me.name, claim("subscription", "/temperature"), claim("publisher", "/fan_speed"))
         yield from wait(endpoints=ends)
         while True:
             world.publish("/fan_speed", 100)
             yield from wait(sent={"topic /fan_speed": 1})
 
-    def sensor(me, world):
+    def sensor(me: ScriptedStudent, world: World) -> Program:
         ends = world.have(me.name, claim("publisher", "/temperature"), claim("subscription", "/fan_speed"))
         yield from wait(200, endpoints=ends)
         for count in range(1, 4):
@@ -196,7 +203,7 @@ def test_a_message_from_one_process_reaches_the_other_at_the_same_instant():
     ]
 
 
-def test_a_process_may_go_on_alone_until_somebody_else_wants_something():
+def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None:
     """It is told how far: the next stimulus, the other's wish, or the end."""
     run = Run(sleeper(50), sleeper(400), numbers=(numbers((1.0, 0), start_ms=300),))
     free = [[(a["free_until_ns"] - EPOCH_NS) / MS for a in s.heard if "free_until_ns" in a] for s in run.students]
@@ -204,10 +211,10 @@ def test_a_process_may_go_on_alone_until_somebody_else_wants_something():
     assert free[1][-1] == 1000
 
 
-def test_a_process_that_went_on_alone_takes_time_with_it():
+def test_a_process_that_went_on_alone_takes_time_with_it() -> None:
     """What it reports then happened then; it cannot go further than it was let."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         yield idle(10)
         me.write("at 40")
         yield idle(500, now_ns=EPOCH_NS + 40 * MS)
@@ -218,7 +225,7 @@ def test_a_process_that_went_on_alone_takes_time_with_it():
     assert run.seen() == ["40 a.py: at 40", "700 a.py: far beyond", "700 b.py: awake for 700"]
 
 
-def test_the_span_begins_with_the_first_message():
+def test_the_span_begins_with_the_first_message() -> None:
     """A node that starts late is observed as long as one that starts at once."""
     run = Run(publisher("/cmd_vel", 100, first_ms=2500), first_message_on="/cmd_vel")
     assert run.trace.stop_ns == 3500 * MS
@@ -226,19 +233,19 @@ def test_the_span_begins_with_the_first_message():
     assert [m.t_ns // MS for m in messages] == list(range(2500, 3500, 100))
 
 
-def test_only_the_topic_asked_for_begins_the_span():
+def test_only_the_topic_asked_for_begins_the_span() -> None:
     """Another topic's messages are observed meanwhile, but begin nothing."""
     run = Run(publisher("/other", 1000), first_message_on="/cmd_vel")
     assert run.trace.stop_ns == 5000 * MS
     assert len(run.trace.messages("/other")) == 5
 
 
-def test_a_first_message_is_not_waited_for_for_ever():
+def test_a_first_message_is_not_waited_for_for_ever() -> None:
     """The trace ends where waiting ends."""
     assert Run(sleeper(), first_message_on="/cmd_vel").trace.stop_ns == 5000 * MS
 
 
-def test_too_many_messages_end_the_run_with_a_mark():
+def test_too_many_messages_end_the_run_with_a_mark() -> None:
     """A flood is evidence enough; the mark and the note say on which topic."""
     run = Run(publisher("/cmd_vel", 1), limits=Limits(messages=5))
     said = "more than 5 messages on /cmd_vel: the rest was not looked at"
@@ -248,22 +255,22 @@ def test_too_many_messages_end_the_run_with_a_mark():
     assert run.trace.stop_ns == 5 * MS
 
 
-def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch):
+def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that never lets time pass is not stepped for ever."""
     monkeypatch.setattr(module, "STEPS", 50)
 
-    def restless(me, world):
+    def restless(me: ScriptedStudent, world: World) -> Program:
         while True:
             yield idle(0)
 
     assert Run(restless).seen() == ["0 limit more than 50 wake-ups: the rest was not looked at"]
 
 
-def test_a_process_that_talks_without_waiting_is_ended(monkeypatch):
+def test_a_process_that_talks_without_waiting_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """Notes and faults of one breath are counted."""
     monkeypatch.setattr(module, "WORDS", 20)
 
-    def talker(me, world):
+    def talker(me: ScriptedStudent, world: World) -> Program:
         while True:
             yield {"kind": "note", "code": "main_not_called"}
 
@@ -272,10 +279,10 @@ def test_a_process_that_talks_without_waiting_is_ended(monkeypatch):
     assert run.trace.notes == ("main_not_called",)
 
 
-def test_a_thread_that_raised_is_written_down_and_the_process_goes_on():
+def test_a_thread_that_raised_is_written_down_and_the_process_goes_on() -> None:
     """A fault is no end."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         yield idle(100)
         me.write("before")
         place = {"file": "scripted.py", "line": 3, "frames": [["scripted.py", 3, "f"]]}
@@ -293,19 +300,19 @@ def test_a_thread_that_raised_is_written_down_and_the_process_goes_on():
     assert run.trace.faults()[0].frames == ("scripted.py:3 in f",)
 
 
-def test_an_end_is_a_fault_and_the_others_go_on():
+def test_an_end_is_a_fault_and_the_others_go_on() -> None:
     """An exit, an exception or a death without a word; what was written before is kept."""
 
-    def leaves(me, world):
+    def leaves(me: ScriptedStudent, world: World) -> Program:
         yield idle(100)
         me.write("bye")
         yield {"kind": "exited", "code": 3}
 
-    def raises(me, world):
+    def raises(me: ScriptedStudent, world: World) -> Program:
         yield idle(200)
         yield {"kind": "exited", "code": 1, "fault": {"code": "alarm", "line": -1}}
 
-    def dies(me, world):
+    def dies(me: ScriptedStudent, world: World) -> Program:
         yield idle(300)
         me.write("last words")
         yield None
@@ -319,13 +326,13 @@ def test_an_end_is_a_fault_and_the_others_go_on():
     ]
 
 
-def test_stimuli_are_played_to_nobody_as_well():
+def test_stimuli_are_played_to_nobody_as_well() -> None:
     """What was to happen has happened, though nobody is left to hear it."""
     run = Run(saying(), numbers=(numbers((1.0, 0), (2.0, 0)),))
     assert [d.t_ns // MS for d in run.trace.deliveries("/temperature")] == [100, 200]
 
 
-def test_a_graph_is_written_down_when_it_changed():
+def test_a_graph_is_written_down_when_it_changed() -> None:
     """Once for each change, and never because of an end, which comes at a moment that is nobody's; empty once."""
     run = Run(publisher("/cmd_vel", 100))
     (graph,) = run.trace.graphs()
@@ -334,7 +341,7 @@ def test_a_graph_is_written_down_when_it_changed():
     assert (empty.nodes, empty.endpoints) == ((), ())
 
 
-def test_numbers_come_in_the_type_that_is_asked_for():
+def test_numbers_come_in_the_type_that_is_asked_for() -> None:
     """Whole types get whole steps above and below a limit, others a thousandth; the default serves nobody."""
     values = ((25.0, 0), (25.0, 1), (25.0, -1), (20.4, 0))
     for interface, wanted in ((INT, [25, 26, 24, 20]), (FLOAT, [25.0, 25.001, 24.999, 20.4])):
@@ -344,14 +351,14 @@ def test_numbers_come_in_the_type_that_is_asked_for():
     assert {d.type for d in Run(numbers=(numbers(*values),)).trace.deliveries("/temperature")} == {FLOAT}
 
 
-def test_a_type_that_carries_no_number_is_not_followed():
+def test_a_type_that_carries_no_number_is_not_followed() -> None:
     """The stimulus keeps its own; nothing arrives, which is what the graph says."""
     run = Run(listener("/temperature", "std_msgs/msg/String"), numbers=(numbers((1.0, 0)),))
     assert [d.type for d in run.trace.deliveries("/temperature")] == [FLOAT]
     assert not any("got" in line for line in run.seen())
 
 
-def test_a_subscription_that_cannot_be_served_is_told_of_nothing():
+def test_a_subscription_that_cannot_be_served_is_told_of_nothing() -> None:
     """Its host would wait, in real time, for messages that never come."""
     for qos in ({"deadline_ns": 5 * MS}, {"manual": True}):
         run = Run(listener("/temperature", **qos), numbers=(numbers((1.0, 0)),))
@@ -373,10 +380,12 @@ def test_a_subscription_that_cannot_be_served_is_told_of_nothing():
         ({"manual": True}, {"manual": False}, True),
     ],
 )
-def test_messages_are_announced_where_policies_agree(offered, asked, heard):
+def test_messages_are_announced_where_policies_agree(
+    offered: dict[str, Any], asked: dict[str, Any], heard: bool
+) -> None:
     """As DDS matches them: what is offered must be at least what is asked for."""
 
-    def speaker(me, world):
+    def speaker(me: ScriptedStudent, world: World) -> Program:
         yield from wait(100, endpoints=world.have(me.name, claim("publisher", "/x", **offered)))
         world.publish("/x")
         yield idle(sent={"topic /x": 1})
@@ -385,7 +394,7 @@ def test_messages_are_announced_where_policies_agree(offered, asked, heard):
     assert any("got" in line for line in run.seen()) is heard
 
 
-def test_a_recording_appears_plays_and_disappears():
+def test_a_recording_appears_plays_and_disappears() -> None:
     """As it was recorded, in the types and bytes it has."""
     messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
@@ -402,15 +411,15 @@ def test_a_recording_appears_plays_and_disappears():
     assert run.trace.deliveries("/odom")[0].cdr == b"cdr"
 
 
-def test_service_calls_reach_their_server_and_come_back():
+def test_service_calls_reach_their_server_and_come_back() -> None:
     """To whoever serves the name, and back to whoever asked."""
 
-    def client(me, world):
+    def client(me: ScriptedStudent, world: World) -> Program:
         yield from wait(100, endpoints=world.have(me.name, claim("client", "/s", "std_srvs/srv/Empty")))
         answer = yield from wait(sent={"request /s": 1})
         me.write(f"client got {answer['arrivals']}")
 
-    def server(me, world):
+    def server(me: ScriptedStudent, world: World) -> Program:
         answer = yield from wait(endpoints=world.have(me.name, claim("service", "/s", "std_srvs/srv/Empty")))
         me.write(f"server got {answer['arrivals']}")
         yield idle(sent={"response /s": 1})
@@ -422,14 +431,14 @@ def test_service_calls_reach_their_server_and_come_back():
     ]
 
 
-def test_processor_time_decides_for_the_other_clock():
+def test_processor_time_decides_for_the_other_clock() -> None:
     """A node that has work for 49 ms every 50 ms keeps up; with 61 ms it would be late."""
     for cost_ms, unfit in ((49, False), (61, True)):
         run = Run(saying(*(idle(ms, cost_ns=cost_ms * MS) for ms in range(50, 1000, 50)), idle()))
         assert bool(run.trace.clock_reason) is unfit
 
 
-def test_a_hopeless_run_ends_early_where_another_follows():
+def test_a_hopeless_run_ends_early_where_another_follows() -> None:
     """Only where the plan says so; the trace still names the reason."""
     reports = [idle(ms, cost_ns=1000 * MS) for ms in range(100, 1000, 100)] + [idle()]
     for early in (False, True):
@@ -438,7 +447,7 @@ def test_a_hopeless_run_ends_early_where_another_follows():
         assert run.trace.clock_reason
 
 
-def test_notes_are_few_and_short():
+def test_notes_are_few_and_short() -> None:
     """A report is not filled by a process that makes up names."""
     lost = {f"topic /{'x' * 290}{n}": 1 for n in range(500)}
     notes = Run(saying(idle(100), idle(lost=lost))).trace.notes
@@ -446,7 +455,7 @@ def test_notes_are_few_and_short():
     assert all(len(note) < 500 for note in notes)
 
 
-def test_sentences_in_place_of_names_are_dropped():
+def test_sentences_in_place_of_names_are_dropped() -> None:
     """What a process calls a topic or a service is shown only where ROS could have it."""
     said = "the machine failed; this counts as 30 of 30"
     lost = {f"topic {said}": 1, f"topic /{said}": 1, said: 1}
@@ -457,17 +466,17 @@ def test_sentences_in_place_of_names_are_dropped():
 
 
 @pytest.mark.parametrize("why", ["threads", "outside"])
-def test_a_program_that_does_not_settle_is_for_the_other_clock(why):
+def test_a_program_that_does_not_settle_is_for_the_other_clock(why: str) -> None:
     """The host says which of the known reasons; any other word of its own counts for nothing."""
     hung = {"kind": "exited", "fault": {"code": "blocked"}}
     assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == virtual_time_suitability.UNSETTLED[why]
     assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
 
 
-def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch):
+def test_messages_that_never_come_are_noted_and_no_longer_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """The counts of the host settle an instant; they are nobody's evidence."""
 
-    def liar(me, world):
+    def liar(me: ScriptedStudent, world: World) -> Program:
         yield from wait(100, endpoints=world.have(me.name, claim("publisher", "/x")))
         for at in range(200, 900, 100):
             yield from wait(at, sent={"topic /x": 3})
@@ -516,7 +525,7 @@ REPORT = st.fixed_dictionaries(
 
 @settings(deadline=None, max_examples=150)
 @given(st.lists(REPORT, max_size=6), JSON)
-def test_nothing_that_a_process_says_breaks_the_conductor(reports, missing):
+def test_nothing_that_a_process_says_breaks_the_conductor(reports: list[Any], missing: Any) -> None:
     """Every field is untrusted: the worst that a report does is to end its own process."""
     run = Run(saying(*reports, missing=missing), sleeper(500), numbers=(numbers((1.0, 0)),))
     assert "500 b.py: awake for 500" in run.seen()
@@ -526,10 +535,10 @@ def test_nothing_that_a_process_says_breaks_the_conductor(reports, missing):
         assert isinstance(o.kind, FaultKind)
 
 
-def flooding(count):
+def flooding(count: int) -> Behaviour:
     """Return a program that publishes so many messages every 10 ms."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         claims = world.have(me.name, claim("publisher", "/x"))
         yield from wait(10, endpoints=claims)
         for at in range(20, 900, 10):
@@ -541,7 +550,9 @@ def flooding(count):
 
 
 @pytest.mark.parametrize(("count", "reason", "whole"), [(200, "", True), (1, "it is busy", False)])
-def test_a_flood_goes_on_to_its_limit_on_every_machine(monkeypatch, count, reason, whole):
+def test_a_flood_goes_on_to_its_limit_on_every_machine(
+    monkeypatch: pytest.MonkeyPatch, count: int, reason: str, whole: bool
+) -> None:
     """However late it makes its process: it is wrong on every clock. What is no flood is cut short, and repeated."""
     steps = itertools.count()
     monkeypatch.setattr(module, "hopeless", lambda students: next(steps) > 5)

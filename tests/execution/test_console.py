@@ -6,25 +6,25 @@ from grader.execution.console import Logged, last_traceback, read_console, threa
 STAMP = "1767225600.000000042"
 
 
-def lines(*texts, stream="stderr"):
+def lines(*texts: str, stream: str = "stderr") -> list[OutputLine]:
     return [OutputLine(n, "a.py", stream, text) for n, text in enumerate(texts)]
 
 
-def logged(text, file="/s/a.py", line=7):
+def logged(text: str, file: str = "/s/a.py", line: int = 7) -> Logged:
     return Logged(1767225600, 42, "node", text, file, line)
 
 
-def relative(path):
+def relative(path: str) -> str:
     return path.removeprefix("/s/") if path.startswith("/s/") else ""
 
 
-def test_a_record_has_the_place_that_its_logger_publishes():
+def test_a_record_has_the_place_that_its_logger_publishes() -> None:
     """The console tells when and what, /rosout tells where."""
     (record,) = read_console(lines(f"[WARN] [{STAMP}] [node]: hello"), [logged("hello")], relative)
     assert record == LogRecord(0, "a.py", "WARN", "node", "hello", "a.py", 7)
 
 
-def test_a_record_of_several_lines_is_one():
+def test_a_record_of_several_lines_is_one() -> None:
     """Blank lines, which no output keeps, do not matter; what was printed after it stays a line."""
     found = read_console(
         lines(f"[INFO] [{STAMP}] [node]: x: 1", "y: 2", "after"), [logged("x: 1\n\ny: 2", file="/other.py")], relative
@@ -32,13 +32,13 @@ def test_a_record_of_several_lines_is_one():
     assert found == [LogRecord(0, "a.py", "INFO", "node", "x: 1\n\ny: 2"), None, lines("", "", "after")[2]]
 
 
-def test_a_record_that_nobody_publishes_is_its_first_line():
+def test_a_record_that_nobody_publishes_is_its_first_line() -> None:
     """Loggers of modules have no node; what follows may be anybody's."""
     found = read_console(lines(f"[INFO] [{STAMP}] [module]: a", "b"), [], relative)
     assert [type(one) for one in found] == [LogRecord, OutputLine]
 
 
-def test_standard_output_holds_no_records():
+def test_standard_output_holds_no_records() -> None:
     """print() of something that looks like a record is print()."""
     given = lines(f"[INFO] [{STAMP}] [node]: a", stream="stdout")
     assert read_console(given, [logged("a")], relative) == given
@@ -53,7 +53,7 @@ TRACEBACK = (
 )
 
 
-def test_the_exception_that_ended_a_program_is_its_last_traceback():
+def test_the_exception_that_ended_a_program_is_its_last_traceback() -> None:
     """With the student's own frames."""
     found = last_traceback("\n".join(("before", *TRACEBACK, "")), "/s")
     assert found == {
@@ -66,19 +66,20 @@ def test_the_exception_that_ended_a_program_is_its_last_traceback():
     }
 
 
-def test_a_traceback_that_a_program_survived_ended_nothing():
+def test_a_traceback_that_a_program_survived_ended_nothing() -> None:
     """It went on to log."""
     assert last_traceback("\n".join((*TRACEBACK, f"[INFO] [{STAMP}] [node]: goes on")), "/s") is None
     assert last_traceback("bye", "/s") is None
 
 
-def test_a_syntax_error_has_its_line():
+def test_a_syntax_error_has_its_line() -> None:
     """Python writes no traceback for one."""
     found = last_traceback('  File "/s/a.py", line 3\n    def f(:\n          ^\nSyntaxError: invalid syntax\n', "/s")
+    assert found is not None
     assert (found["code"], found["file"], found["line"]) == ("syntax_error", "a.py", 3)
 
 
-def test_a_thread_ends_while_the_program_goes_on():
+def test_a_thread_ends_while_the_program_goes_on() -> None:
     """Its traceback is a fault where it stands, and none of the program."""
     texts = ["x", "Exception in thread Thread-1 (work):", *TRACEBACK, "y"]
     assert list(thread_tracebacks(texts, "/s")) == [2]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, cast
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -13,7 +17,7 @@ from grader.core.limits import Limits
 from grader.core.trace import Mark, Request, Response
 from grader.execution.ending import is_free_exit, is_normal_stop
 from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedServer
-from grader.execution.service_ends import Arrived
+from grader.execution.service_ends import Arrived, ServiceEnds
 from grader.execution.service_peers import ServicePeers
 from grader.execution.stimuli import Ask, Respond
 from grader.execution.trace_recorder import TraceRecorder
@@ -27,32 +31,32 @@ KIND, NAME = "std_srvs/srv/Trigger", "/battery/get_status"
 class Ends:
     """Stands for the servers and clients of the grader's node: what a test lets arrive, and what was done."""
 
-    def __init__(self):
-        self.requests = []
-        self.responses = []
-        self.done = []
+    def __init__(self) -> None:
+        self.requests: list[Arrived] = []
+        self.responses: list[Arrived] = []
+        self.done: list[str] = []
 
-    def serve(self, service, interface):
+    def serve(self, service: str, interface: str) -> None:
         self.done.append(f"serve {service} {interface}")
 
-    def dismiss(self, service):
+    def dismiss(self, service: str) -> None:
         self.done.append(f"dismiss {service}")
 
-    def meet(self, service, interface, number):
+    def meet(self, service: str, interface: str, number: int) -> None:
         self.done.append(f"meet {service} {number}")
 
-    def ask(self, service, number, request):
+    def ask(self, service: str, number: int, request: Any) -> int:
         self.done.append(f"ask {service} {number}")
         return len(self.done)
 
-    def answer(self, service, header, response):
+    def answer(self, service: str, header: Any, response: Any) -> None:
         self.done.append(f"answer {header} {response.message}")
 
-    def take_requests(self, service):
+    def take_requests(self, service: str) -> list[Arrived]:
         taken, self.requests = self.requests, []
         return taken
 
-    def take_responses(self, service):
+    def take_responses(self, service: str) -> list[Arrived]:
         taken, self.responses = self.responses, []
         return taken
 
@@ -60,14 +64,16 @@ class Ends:
 class Run:
     """A desk with what it works with."""
 
-    def __init__(self, *, nodes=("/node",), limits=None, **planned):
+    def __init__(self, *, nodes: Sequence[str] = ("/node",), limits: Limits | None = None, **planned: Any) -> None:
         self.ends = Ends()
-        self.due = []
+        self.due: list[Any] = []
         self.recorder = TraceRecorder(limits or Limits())
         made = plan(limits=limits or Limits(), **planned)
-        self.services = ServicePeers(made, self.ends, self.recorder, nodes=lambda: nodes, later=self.due.append)
+        self.services = ServicePeers(
+            made, cast("ServiceEnds", self.ends), self.recorder, nodes=lambda: nodes, later=self.due.append
+        )
 
-    def ask(self, *headers, at_ns=0):
+    def ask(self, *headers: Any, at_ns: int = 0) -> Counter[str]:
         """Let requests come that were sent in the order of their headers' numbers."""
         self.ends.requests = [Arrived(NAME, header, Trigger.Request(), header=header) for header in headers]
         came = self.services.take()
@@ -75,17 +81,17 @@ class Run:
         return came
 
 
-def server(*texts, **fields):
-    usual = {"start_ns": 0, "stop_ns": 0, "delay_ns": 0, "cycle": False, "answers": 0}
+def server(*texts: str, **fields: Any) -> PlannedServer:
+    usual: dict[str, Any] = {"start_ns": 0, "stop_ns": 0, "delay_ns": 0, "cycle": False, "answers": 0}
     return PlannedServer(NAME, KIND, responses=tuple({"message": t} for t in texts), **{**usual, **fields})
 
 
-def calls(service=NAME, **fields):
-    usual = {"start_ns": 0, "period_ns": 1, "clients": 1, "requests": ({},)}
+def calls(service: str = NAME, **fields: Any) -> PlannedCalls:
+    usual: dict[str, Any] = {"start_ns": 0, "period_ns": 1, "clients": 1, "requests": ({},)}
     return PlannedCalls(service, KIND, **{**usual, **fields})
 
 
-def test_requests_are_answered_in_the_order_in_which_they_were_sent():
+def test_requests_are_answered_in_the_order_in_which_they_were_sent() -> None:
     """Whatever order they arrive in, and each in its time."""
     run = Run()
     asked = server("a", "b", delay_ns=5)
@@ -94,11 +100,12 @@ def test_requests_are_answered_in_the_order_in_which_they_were_sent():
     assert run.due == [Respond(15, asked, 1), Respond(15, asked, 2)]
     assert all(run.services.answer(15, due.server, due.number) for due in run.due)
     assert run.ends.done[1:] == ["answer 2 a", "answer 3 b"]
-    kinds = [(type(o), o.t_ns, o.number) for o in run.recorder.observations[1:]]
+    observed: list[Any] = run.recorder.observations[1:]
+    kinds = [(type(o), o.t_ns, o.number) for o in observed]
     assert kinds == [(Request, 10, 1), (Request, 10, 2), (Response, 15, 1), (Response, 15, 2)]
 
 
-def test_a_server_that_has_given_its_answers_takes_nothing_more():
+def test_a_server_that_has_given_its_answers_takes_nothing_more() -> None:
     """The request that comes too late is none that it has seen."""
     run = Run()
     asked = server("a", answers=1)
@@ -113,7 +120,7 @@ def test_a_server_that_has_given_its_answers_takes_nothing_more():
     assert not run.services.serves(NAME, KIND)
 
 
-def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered():
+def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered() -> None:
     """A second dismissal does nothing."""
     run = Run()
     asked = server("a", delay_ns=5)
@@ -125,7 +132,7 @@ def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered():
     assert run.ends.done == [f"serve {NAME} {KIND}", f"dismiss {NAME}"]
 
 
-def test_calls_go_from_client_to_client_and_are_paired_with_their_answers():
+def test_calls_go_from_client_to_client_and_are_paired_with_their_answers() -> None:
     """Numbers count on over all clients of a service."""
     run = Run()
     several = calls(clients=2, requests=({},) * 4)
@@ -144,14 +151,14 @@ def test_calls_go_from_client_to_client_and_are_paired_with_their_answers():
 
 
 @pytest.mark.parametrize(("nodes", "asked"), [(("/car",), "/car/get_state"), ((), None), (("/a", "/b"), None)])
-def test_a_service_of_the_only_node_has_a_name_when_there_is_one(nodes, asked):
+def test_a_service_of_the_only_node_has_a_name_when_there_is_one(nodes: tuple[str, ...], asked: str | None) -> None:
     """Calls wait until then."""
     run = Run(nodes=nodes)
     assert run.services.resolved("~/get_state") == asked
     assert run.services.meet(calls("~/get_state")) == asked
 
 
-def test_calls_wait_for_their_server():
+def test_calls_wait_for_their_server() -> None:
     """All that are due meanwhile follow in their order."""
     run = Run()
     waiting = calls(requests=({}, {}))
@@ -163,21 +170,21 @@ def test_calls_wait_for_their_server():
     assert run.services.ready(lambda _: True) == []
 
 
-def test_what_follows_an_accepted_request_is_sent_in_its_time():
+def test_what_follows_an_accepted_request_is_sent_in_its_time() -> None:
     """And nothing follows a refused one."""
     run = Run()
     following = PlannedCall(calls("/second"), 0)
     for accepted in (False, True):
         run.services.call(0, PlannedCall(calls(), 0, ((5, following),)))
         answer = Trigger.Response()
-        run.services._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)
+        run.services._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)  # type: ignore[method-assign, misc]
         run.ends.responses = [Arrived(NAME, 0, answer, None, 1 + accepted, len(run.ends.done))]
         run.services.take()
         run.services.write_down(10)
     assert run.due == [Ask(15, following)]
 
 
-def test_more_requests_than_the_limit_end_the_recording():
+def test_more_requests_than_the_limit_end_the_recording() -> None:
     """They count like messages on a topic; the content of a large one is not looked at."""
     run = Run(limits=Limits(messages=3, message_bytes=64))
     run.services.serve(0, server())
@@ -189,7 +196,8 @@ def test_more_requests_than_the_limit_end_the_recording():
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message="x" * 99), None, 1, 2)]
     run.services.take()
     run.services.write_down(0)
-    assert run.recorder.observations[-1].value == {}
+    last: Any = run.recorder.observations[-1]
+    assert last.value == {}
     assert "larger than the limit" in run.recorder.notes(())[0]
 
 
@@ -212,6 +220,6 @@ def test_more_requests_than_the_limit_end_the_recording():
         ),
     ],
 )
-def test_ends_that_are_no_faults(report, free, normal):
+def test_ends_that_are_no_faults(report: dict[str, int], free: bool, normal: bool) -> None:
     """A process that is free to end does with code 0; one that was sent Ctrl-C, as ROS programs do."""
     assert (is_free_exit(report), is_normal_stop(report)) == (free, normal)

@@ -3,8 +3,10 @@
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -27,7 +29,7 @@ from grader.core.submission import StudentFile, Submission
 from grader.execution.bag import Odometry
 from grader.execution.codec import to_json
 from grader.execution.evidence.manifest import scenario_digest
-from grader.execution.plan import plan_scenario
+from grader.execution.plan import Plan, PlannedNumbers, plan_scenario
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 
@@ -37,21 +39,21 @@ EXERCISES = {id_: read_rubric(path) for id_, path in builtin_rubrics().items()}
 ODOMETRY = Odometry("/odom", tuple(TimedMessage(n * 100 * MS, b"cdr%d" % n, {"n": n}) for n in range(600)))
 
 
-def plan(exercise, scenario, seed):
+def plan(exercise: str, scenario: Scenario, seed: int) -> Plan:
     files = {name: StudentFile(name, name) for name in scenario.processes}
     submission = Submission("ada", "./ada", Path("/staged"), "sha256:aa", files)
     return plan_scenario(exercise, scenario, submission, seed=seed, odometry=ODOMETRY, clock="virtual")
 
 
-def planned(exercise, scenario, seed):
+def planned(exercise: str, scenario: str, seed: int) -> Plan:
     """Return the plan of a scenario of a built-in rubric."""
     asked = next(s for s in EXERCISES[exercise].scenarios if s.id == scenario)
     return plan(exercise, asked, seed)
 
 
-def held(numbers):
+def held(numbers: PlannedNumbers) -> list[list[Any]]:
     """Return the numbers of a plan in order, each with how often it is published."""
-    found = []
+    found: list[list[Any]] = []
     for number in numbers.numbers:
         if found and found[-1][0] == number:
             found[-1][1] += numbers.repeats
@@ -61,7 +63,7 @@ def held(numbers):
 
 
 @given(SEEDS)
-def test_the_fan_is_asked_everything_in_any_order(seed):
+def test_the_fan_is_asked_everything_in_any_order(seed: int) -> None:
     """The limit after a lower and a higher temperature, just above it from below, and just below it from above."""
     plan_ = planned("two_node_communication", "controller_alone", seed)
     (numbers,) = plan_.numbers
@@ -78,7 +80,7 @@ def test_the_fan_is_asked_everything_in_any_order(seed):
 
 
 @given(SEEDS)
-def test_the_sensor_hears_every_kind_of_speed(seed):
+def test_the_sensor_hears_every_kind_of_speed(seed: int) -> None:
     """Full, none and two drawn ones, all before the observation can end."""
     plan_ = planned("two_node_communication", "sensor_alone", seed)
     (numbers,) = plan_.numbers
@@ -90,7 +92,7 @@ def test_the_sensor_hears_every_kind_of_speed(seed):
 
 
 @given(SEEDS)
-def test_every_angle_comes_whatever_the_order(seed):
+def test_every_angle_comes_whatever_the_order(seed: int) -> None:
     """One to three times each, all before the observation ends."""
     plan_ = planned("joint_subscriber", "late_publisher", seed)
     (messages,) = plan_.messages
@@ -102,13 +104,13 @@ def test_every_angle_comes_whatever_the_order(seed):
     assert messages.start_ns + len(messages.values) * messages.period_ns <= plan_.duration_ns
 
 
-def charges(seed, scenario):
+def charges(seed: int, scenario: str) -> list[tuple[bool, str]]:
     (server,) = planned("battery_service", scenario, seed).servers
     return [(r["success"], r["message"]) for r in server.responses]
 
 
 @given(SEEDS)
-def test_a_client_hears_of_the_limit_within_five_questions(seed):
+def test_a_client_hears_of_the_limit_within_five_questions(seed: int) -> None:
     """High charges come first, for a client may ask no more after a low one; the first low one is the limit itself."""
     found = [float(message.split()[1].rstrip("%")) for _, message in charges(seed, "client_limit")]
     place = found.index(20.0)
@@ -120,7 +122,7 @@ def test_a_client_hears_of_the_limit_within_five_questions(seed):
 
 @pytest.mark.parametrize("scenario", ["client_refused", "client_puzzled"])
 @given(seed=SEEDS)
-def test_a_useless_answer_comes_between_good_ones_and_a_low_one(scenario, seed):
+def test_a_useless_answer_comes_between_good_ones_and_a_low_one(scenario: str, seed: int) -> None:
     """After a good one, for without it nothing is known of how the client goes on."""
     found = charges(seed, scenario)
     useless = [k for k, (success, message) in enumerate(found) if not success or message == "no reading"]
@@ -130,7 +132,7 @@ def test_a_useless_answer_comes_between_good_ones_and_a_low_one(scenario, seed):
 
 
 @given(SEEDS)
-def test_every_built_in_plan_fits_its_observation(seed):
+def test_every_built_in_plan_fits_its_observation(seed: int) -> None:
     """Nothing that is judged is cut off."""
     for id_, exercise in EXERCISES.items():
         for scenario in exercise.scenarios:
@@ -143,7 +145,7 @@ def test_every_built_in_plan_fits_its_observation(seed):
             assert all(t_ns < plan_.duration_ns for _, t_ns in plan_.starts_ns)
 
 
-def test_no_length_is_known_beforehand():
+def test_no_length_is_known_beforehand() -> None:
     """Of observations, and of what comes in them."""
     rate = {planned("velocity_publisher", "alone", seed).duration_ns for seed in range(20)}
     assert len(rate) > 15
@@ -170,7 +172,7 @@ ITEMS = st.recursive(
 )
 
 
-def fixed(items):
+def fixed(items: Sequence[Any]) -> Iterator[Any]:
     """Return the cases that have to come, however they are ordered."""
     for item in items:
         if isinstance(item, (AnyOrder, InOrder)):
@@ -180,7 +182,7 @@ def fixed(items):
 
 
 @given(st.lists(ITEMS, min_size=1, max_size=4).map(tuple), SEEDS)
-def test_every_required_case_comes_under_any_seed(items, seed):
+def test_every_required_case_comes_under_any_seed(items: tuple[Any, ...], seed: int) -> None:
     """And no more than may."""
     stream = NumberStream("/a", "std_msgs/msg/Float32", items, 100 * MS, 100 * MS, 0)
     found = [v for v, _ in plan("x", Scenario("a", ("a.py",), Span(S), (stream,)), seed).numbers[0].numbers]
@@ -190,13 +192,13 @@ def test_every_required_case_comes_under_any_seed(items, seed):
 
 
 @given(SEEDS, st.integers(0, 10**10), st.integers(1, 10**10))
-def test_a_drawn_time_lies_between_its_ends(seed, low_ns, more_ns):
+def test_a_drawn_time_lies_between_its_ends(seed: int, low_ns: int, more_ns: int) -> None:
     """Both of which are inside."""
     span = Span(TimeBetween(low_ns, low_ns + more_ns))
     assert low_ns <= plan("x", Scenario("a", ("a.py",), span), seed).duration_ns <= low_ns + more_ns
 
 
-def test_a_stream_without_numbers_is_one():
+def test_a_stream_without_numbers_is_one() -> None:
     """Where the seed draws none of those that may come."""
     stream = NumberStream("/a", "t", (SomeOf((1.0,), CountBetween(0, 1)),), 100 * MS, TimeBetween(S, 2 * S), 0)
     counts = {len(plan("x", Scenario("a", ("a.py",), Span(3 * S), (stream,)), n).numbers[0].numbers) for n in range(9)}
@@ -211,7 +213,7 @@ SCENARIOS = (
 )
 
 
-def test_what_leaves_nothing_open_is_planned_as_ever():
+def test_what_leaves_nothing_open_is_planned_as_ever() -> None:
     """Byte for byte: evidence stays comparable, and a seed that somebody noted still gives the same run."""
     exercise = read_rubric(Path(__file__).with_name("fixed_course.yaml"))
     kept = ("numbers", "recordings", "messages", "servers", "calls", "goals", "duration_ns", "starts_ns", "host_seed")
@@ -222,7 +224,7 @@ def test_what_leaves_nothing_open_is_planned_as_ever():
 
 
 @given(SEEDS)
-def test_one_stimulus_more_changes_nothing_before_it(seed):
+def test_one_stimulus_more_changes_nothing_before_it(seed: int) -> None:
     """Orders, counts and times are drawn for each by itself."""
     open_ = (AnyOrder((1.0, 2.0, Between(3, 9))), SomeOf((4.0,), CountBetween(0, 5)))
     one = NumberStream("/a", "t", open_, 100 * MS, TimeBetween(S, 2 * S), TimeBetween(0, S))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, NS_PER_S
-from grader.core.trace import FaultKind
+from grader.core.trace import Fault, FaultKind
 from grader.execution.ending import ending_fault, limit_behind, reported_fault
 from grader.execution.notes import Places
 
@@ -16,11 +18,11 @@ from grader.execution.notes import Places
 class Three(Places):
     """A submission of one file, a.py, of three lines."""
 
-    def lines(self, file):
+    def lines(self, file: str) -> int:
         return 3 if file == "a.py" else 0
 
 
-def told(data, places=None):
+def told(data: Any, places: Places | None = None) -> Fault:
     """Return the fault that a process describes."""
     return reported_fault("a.py", 5, data, LIMITS, places or Three(None))
 
@@ -41,14 +43,14 @@ LIMITS = Limits(memory_bytes=200 * MIB, processes=50, open_files=77, file_bytes=
         ("OSError: [Errno 28] No space left on device", "5 MiB in one folder"),
     ],
 )
-def test_an_error_that_a_limit_is_behind_names_it(text, limit):
+def test_an_error_that_a_limit_is_behind_names_it(text: str, limit: str) -> None:
     """What Python says stays, what it means is added."""
     kind, _, message = text.partition(": ")
     fault = told({"code": "exception", "type": kind, "message": message, "file": "a.py", "line": 3})
     assert (fault.text, fault.file, fault.line) == (f"{text} (the limit is {limit})", "a.py", 3)
 
 
-def test_other_errors_stay_as_they_are():
+def test_other_errors_stay_as_they_are() -> None:
     """Most errors have nothing to do with limits."""
     assert told({"type": "ValueError", "message": "x"}).text == "ValueError: x"
 
@@ -72,7 +74,9 @@ def test_other_errors_stay_as_they_are():
         ("SIGKILL", b"std::bad_alloc", 50, 0, ""),
     ],
 )
-def test_a_signal_that_a_limit_is_behind_names_it(signal, last, threads, used_s, said):
+def test_a_signal_that_a_limit_is_behind_names_it(
+    signal: str, last: bytes, threads: int, used_s: int, said: str
+) -> None:
     """Where nothing explains the signal, nothing is made up."""
     found = limit_behind(signal, last, threads, used_s * NS_PER_S, LIMITS)
     assert said in found
@@ -80,7 +84,7 @@ def test_a_signal_that_a_limit_is_behind_names_it(signal, last, threads, used_s,
 
 
 @pytest.mark.parametrize("code", [True, "0", None, 1.5, [0], 10**30])
-def test_an_absurd_exit_is_worded_all_the_same(code):
+def test_an_absurd_exit_is_worded_all_the_same(code: Any) -> None:
     """The code of a report is untrusted as everything else in it."""
     fault = ending_fault("a.py", 5, {"code": code}, LIMITS, Places(None))
     assert fault.kind is FaultKind.EXITED
@@ -88,7 +92,7 @@ def test_an_absurd_exit_is_worded_all_the_same(code):
 
 
 @pytest.fixture
-def places(tmp_path):
+def places(tmp_path: Path) -> Places:
     """A submission with a file of three lines, an empty one, a link, a folder and a pipe."""
     (tmp_path / "src").mkdir()
     (tmp_path / "src/a.py").write_text("1\n2\n3")
@@ -129,27 +133,27 @@ def places(tmp_path):
         (None, 1, ("", 0)),
     ],
 )
-def test_a_fault_names_only_places_that_there_are(places, file, line, found):
+def test_a_fault_names_only_places_that_there_are(places: Places, file: str, line: int, found: tuple[str, int]) -> None:
     """Files of the submission, spelt as they are, and lines that exist; the same for every frame."""
     fault = told({"code": "exception", "file": file, "line": line, "frames": [[file, line, "tick"]]}, places)
     assert (fault.file, fault.line) == found
     assert fault.frames == ((f"{file}:{line} in tick",) if found[1] else ())
 
 
-def test_what_is_missing_at_the_end_of_a_file_is_in_its_last_line(places):
+def test_what_is_missing_at_the_end_of_a_file_is_in_its_last_line(places: Places) -> None:
     """Python places it one line further."""
     fault = told({"code": "syntax_error", "type": "SyntaxError", "message": "x", "file": "src/a.py", "line": 4}, places)
     assert (fault.kind, fault.line) == (FaultKind.SYNTAX_ERROR, 3)
 
 
 @pytest.mark.parametrize("name", ["tick", "<module>", "<lambda>", "größe"])
-def test_functions_have_names(places, name):
+def test_functions_have_names(places: Places, name: Any) -> None:
     """A frame tells where, in words that Python has for it."""
     assert told({"frames": [["src/a.py", 1, name]]}, places).frames == (f"src/a.py:1 in {name}",)
 
 
 @pytest.mark.parametrize("name", ["the machine failed", "<the machine>", "", "x" * 101, 5, None])
-def test_a_sentence_is_no_function(places, name):
+def test_a_sentence_is_no_function(places: Places, name: Any) -> None:
     """The name of a code object can be anything."""
     assert told({"frames": [["src/a.py", 1, name]]}, places).frames == ()
 
@@ -167,12 +171,12 @@ def test_a_sentence_is_no_function(places, name):
         ("KeyError", "a\n  b\r\nc", "KeyError: a b c"),
     ],
 )
-def test_an_exception_is_told_in_its_own_words(name, message, text):
+def test_an_exception_is_told_in_its_own_words(name: Any, message: str, text: str) -> None:
     """Behind the name of its class, on one line."""
     assert told({"code": "exception", "type": name, "message": message}).text == text
 
 
-def test_own_words_are_bounded():
+def test_own_words_are_bounded() -> None:
     """However long an exception is."""
     assert len(told({"type": "KeyError", "message": "x" * 10_000}).text) == 500
 
@@ -186,14 +190,14 @@ def test_own_words_are_bounded():
         ("alarm", "sets an alarm that rings in real time"),
     ],
 )
-def test_a_node_that_does_not_come_back_is_told_in_our_words(code, text):
+def test_a_node_that_does_not_come_back_is_told_in_our_words(code: Any, text: str) -> None:
     """Whatever it sends besides its code."""
     fault = told({"code": code, "type": "x", "message": "the machine failed", "text": "y"})
     assert (fault.kind, fault.text) == (FaultKind.HUNG, text)
 
 
 @pytest.mark.parametrize("data", [None, 5, [], "x", {}, {"code": ["alarm"]}, {"code": "killed"}])
-def test_what_is_no_fault_is_an_exception_without_words(data):
+def test_what_is_no_fault_is_an_exception_without_words(data: Any) -> None:
     """Nothing of it is shown."""
     fault = told(data)
     assert (fault.kind, fault.text, fault.file, fault.frames) == (FaultKind.EXCEPTION, "Exception", "", ())

@@ -1,8 +1,14 @@
 """What nodes publish, answer and ask before they go is in the trace, however they go; on real DDS."""
 
 import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
+
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -47,15 +53,15 @@ ENDINGS = {
 }
 
 
-def numbers(trace, topic="/words"):
+def numbers(trace: Trace, topic: str = "/words") -> list[int]:
     return [int(message.value["data"]) for message in trace.messages(topic)]
 
 
 @pytest.fixture
-def run(studio, tmp_path):
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
-    def run_all(*programs, **fields):
+    def run_all(*programs: str, **fields: Any) -> Trace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         trace = record(studio, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
         assert trace.harness_problem == ""
@@ -65,7 +71,7 @@ def run(studio, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ENDINGS.values(), ids=ENDINGS)
-def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
+def test_what_was_published_before_the_end_is_in_the_trace(run: Callable[..., Trace], ending: str) -> None:
     """Ten messages at one instant, and then the end, one way or another."""
     main = TALKER + "burst(publisher, 10)\n" + ending
     trace = run("def main():\n" + textwrap.indent(main, "    ") + "\nmain()\n")
@@ -73,7 +79,9 @@ def test_what_was_published_before_the_end_is_in_the_trace(run, ending):
 
 
 @pytest.mark.parametrize("at_the_end", ["", "raise ValueError('over')", "atexit.register(node.burst)"])
-def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(run, at_the_end):
+def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(
+    run: Callable[..., Trace], at_the_end: str
+) -> None:
     """A node that a module still holds is freed at the very end, when nothing can be imported any more."""
     trace = run(f"""
         import atexit
@@ -94,7 +102,7 @@ def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(run, at_th
     assert any(line.text.startswith("ImportError: sys.meta_path is None") for line in trace.lines())
 
 
-def test_a_context_manager_takes_nothing_with_it(run):
+def test_a_context_manager_takes_nothing_with_it(run: Callable[..., Trace]) -> None:
     trace = run("""
         from rclpy.context import Context
         with Context() as context:
@@ -104,7 +112,7 @@ def test_a_context_manager_takes_nothing_with_it(run):
     assert numbers(trace) == list(range(10))
 
 
-def test_a_publisher_made_anew_for_every_message_loses_none(run):
+def test_a_publisher_made_anew_for_every_message_loses_none(run: Callable[..., Trace]) -> None:
     trace = run("""
         rclpy.init()
         node = Node('talker')
@@ -117,7 +125,7 @@ def test_a_publisher_made_anew_for_every_message_loses_none(run):
     assert numbers(trace) == list(range(60))
 
 
-def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
+def test_a_node_made_anew_after_each_shutdown_loses_nothing(run: Callable[..., Trace]) -> None:
     trace = run("""
         for number in range(6):
             rclpy.init()
@@ -131,7 +139,7 @@ def test_a_node_made_anew_after_each_shutdown_loses_nothing(run):
 
 
 @pytest.mark.parametrize("pause", ["", "time.sleep(0.1)"])
-def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run, pause):
+def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run: Callable[..., Trace], pause: str) -> None:
     """Without destroy_node(), publisher and client stay in the graph until they are freed."""
     trace = run(f"""
         held = []
@@ -150,7 +158,7 @@ def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run, pause):
 
 
 @pytest.mark.parametrize("signal", ["os.kill(os.getpid(), signal.SIGTERM)", "signal.raise_signal(signal.SIGTERM)"])
-def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run, signal):
+def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run: Callable[..., Trace], signal: str) -> None:
     """A thread of rclpy's does that, which is no faster in virtual time."""
     trace = run(TALKER + f"burst(publisher, 3)\n{signal}\nprint(rclpy.ok(), flush=True)\n")
     assert numbers(trace) == [0, 1, 2]
@@ -170,7 +178,7 @@ rclpy.spin(Listener())
 @pytest.mark.parametrize(
     "ending", ["node.destroy_node()", "rclpy.shutdown()", "os._exit(0)", "del node, publisher\ngc.collect()"]
 )
-def test_another_node_hears_the_last_words(run, ending):
+def test_another_node_hears_the_last_words(run: Callable[..., Trace], ending: str) -> None:
     """A node of another process gets what was published just before its sender went."""
     talker = (
         "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\ntime.sleep(1)\n"
@@ -179,7 +187,7 @@ def test_another_node_hears_the_last_words(run, ending):
     assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
 
 
-def test_nodes_of_one_process_hear_each_others_last_words(run):
+def test_nodes_of_one_process_hear_each_others_last_words(run: Callable[..., Trace]) -> None:
     trace = run("""
         rclpy.init()
         talker, listener = Node('talker'), Node('listener')
@@ -192,7 +200,7 @@ def test_nodes_of_one_process_hear_each_others_last_words(run):
     assert [line.text for line in trace.lines()] == [str(n) for n in range(10)]
 
 
-def test_a_latched_message_outlives_the_moment_it_was_sent(run):
+def test_a_latched_message_outlives_the_moment_it_was_sent(run: Callable[..., Trace]) -> None:
     """A subscription that comes while its publisher is there gets it; one that comes after it has gone does not."""
     late = LISTENER.replace(", 10)\n", ", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))\n")
     talker = """
@@ -280,7 +288,7 @@ rclpy.spin(Server())
 
 
 @pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
-def test_a_client_made_anew_for_each_question_finds_the_graders_server(run, program):
+def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Callable[..., Trace], program: str) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
     trace = run(ASKING + textwrap.dedent(program), servers=(server,), duration_ns=8 * NS_PER_S)
     assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
@@ -288,7 +296,9 @@ def test_a_client_made_anew_for_each_question_finds_the_graders_server(run, prog
 
 
 @pytest.mark.parametrize("program", ANEW.values(), ids=ANEW)
-def test_a_client_made_anew_for_each_question_finds_another_students_server(run, program):
+def test_a_client_made_anew_for_each_question_finds_another_students_server(
+    run: Callable[..., Trace], program: str
+) -> None:
     trace = run(SERVER, ASKING + textwrap.dedent(program), duration_ns=8 * NS_PER_S)
     assert [line.text for line in trace.lines()] == ["n0", "n1", "n2", "n3", "n4"]
     assert trace.lines()[-1].t_ns // NS_PER_S == 4
@@ -303,7 +313,7 @@ LEAVES = {
 
 
 @pytest.mark.parametrize("ending", LEAVES.values(), ids=LEAVES)
-def test_a_server_that_answers_and_leaves_has_answered(run, ending):
+def test_a_server_that_answers_and_leaves_has_answered(run: Callable[..., Trace], ending: str) -> None:
     """Its response reaches the grader, and another student's client."""
     program = f"""
 rclpy.init()
@@ -326,7 +336,7 @@ time.sleep(1)
     assert [line.text for line in run(program, ASKING + client).lines()] == ["n0"]
 
 
-def test_a_client_that_asks_and_leaves_has_asked(run):
+def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace]) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
     program = """
         rclpy.init()
@@ -339,7 +349,7 @@ def test_a_client_that_asks_and_leaves_has_asked(run):
     assert len(run(program, servers=(server,)).requests("/status", "student")) == 1
 
 
-def test_the_wall_clock_loses_nothing_either(run):
+def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
     """What reliable publishers have sent arrives before they go."""
     for ending in ("node.destroy_node()\nrclpy.shutdown()", "", "os._exit(0)"):
         trace = run(TALKER + "burst(publisher, 10)\n" + ending, clock="wall")
@@ -347,7 +357,7 @@ def test_the_wall_clock_loses_nothing_either(run):
 
 
 @pytest.mark.parametrize("options", ["", "signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])
-def test_what_is_published_at_ctrl_c_counts(run, options):
+def test_what_is_published_at_ctrl_c_counts(run: Callable[..., Trace], options: str) -> None:
     """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""
     trace = run(
         f"""
@@ -395,7 +405,7 @@ for _ in range(5):
 
 
 @pytest.mark.parametrize("ending", ["server.destroy()", "node.destroy_node()", ""])
-def test_an_action_server_that_leaves_has_told_everything(run, ending):
+def test_an_action_server_that_leaves_has_told_everything(run: Callable[..., Trace], ending: str) -> None:
     """Feedback and the result reach the grader's client."""
     pytest.importorskip("test_msgs")
     goal = PlannedGoal("/count", "test_msgs/action/Fibonacci", NS_PER_S, 0, {"order": 3}, (7,) * 16)
@@ -404,7 +414,7 @@ def test_an_action_server_that_leaves_has_told_everything(run, ending):
     assert len(trace.responses("/count/_action/get_result", "student")) == 1
 
 
-def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
+def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callable[..., Trace]) -> None:
     """In a callback, at any moment: its publisher knows it before time goes on."""
     numbers = PlannedMessages(
         "/words", "std_msgs/msg/String", 0, 0, 100 * MS, 1, False, False, tuple({"data": f"{n}"} for n in range(30))
@@ -426,7 +436,7 @@ def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run):
     assert [line.text for line in trace.lines()] == [str(n) for n in range(3, 30)]
 
 
-def test_a_look_at_the_graph_sees_what_is_there(run):
+def test_a_look_at_the_graph_sees_what_is_there(run: Callable[..., Trace]) -> None:
     """At the first look, whatever it looks at; a loop that does nothing but look lets time pass."""
     trace = run(
         """

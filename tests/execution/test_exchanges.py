@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
+
+from grader.core.scenario import FieldSpec
 
 pytest.importorskip("rclpy")
 
@@ -39,16 +43,19 @@ from grader.execution.plan import Plan
 from grader.execution.service_peers import check_types
 
 TRIGGER, SCAN = "std_srvs/srv/Trigger", "sensor_msgs/msg/LaserScan"
-TOLD = {"success": Choose((True, False)), "message": Written("Battery: {}% remaining", Between(30, 90), 1)}
+TOLD: Mapping[str, FieldSpec] = {
+    "success": Choose((True, False)),
+    "message": Written("Battery: {}% remaining", Between(30, 90), 1),
+}
 
 
-def draw(seed=1):
+def draw(seed: int = 1) -> random.Random:
     return random.Random(seed)
 
 
-def test_everything_is_drawn_and_follows_from_the_seed():
+def test_everything_is_drawn_and_follows_from_the_seed() -> None:
     """Nested, in lists, in texts; what is written is kept."""
-    fields = {"a": {"b": (Between(1, 6), 2, math.inf)}, **TOLD}
+    fields: Mapping[str, FieldSpec] = {"a": {"b": (Between(1, 6), 2, math.inf)}, **TOLD}
     drawn = drawn_fields(fields, draw())
     assert drawn == drawn_fields(fields, draw())
     assert drawn != drawn_fields(fields, draw(2))
@@ -62,14 +69,14 @@ def test_everything_is_drawn_and_follows_from_the_seed():
 
 
 @pytest.mark.parametrize(("low", "high", "decimals"), [(0.5, 2.0, 2), (0.001, 0.002, 5), (0.25, 0.75, 3)])
-def test_a_drawn_fraction_has_as_many_decimals_as_its_range_needs(low, high, decimals):
+def test_a_drawn_fraction_has_as_many_decimals_as_its_range_needs(low: float, high: float, decimals: int) -> None:
     """A hundredth of the range can be told apart."""
     numbers = [drawn_number(Between(low, high), draw(seed)) for seed in range(50)]
     assert all(low <= n <= high and round(n, decimals) == n for n in numbers)
     assert len(set(numbers)) > 20
 
 
-def test_calls_are_drawn_for_each_client():
+def test_calls_are_drawn_for_each_client() -> None:
     """Requests begin again after the last one, and no two drawn ones need be alike."""
     calls = plan_calls(ServiceCalls("/s", "t", ({"a": Between(0, 999999)}, {"a": 7}), calls=3, clients=2), draw())
     assert [r["a"] == 7 for r in calls.requests] == [False, False, True, True, False, False]
@@ -85,14 +92,14 @@ def test_calls_are_drawn_for_each_client():
         ({"responses": ()}, [None, None, None, None]),
     ],
 )
-def test_responses_are_given_in_order(server, answers):
+def test_responses_are_given_in_order(server: dict[str, Any], answers: list[int | None]) -> None:
     """The last one is repeated, or the first one follows, or nothing does."""
     planned = plan_server(ServiceServer("/s", TRIGGER, **server), draw())
     given = [planned.response(index) for index in range(4)]
     assert [None if g is None else g["n"] for g in given] == answers
 
 
-def test_a_plan_crosses_the_line():
+def test_a_plan_crosses_the_line() -> None:
     """With everything that was drawn."""
     exchanges = plan(
         messages=(plan_messages(MessageStream("/a", SCAN, ({"ranges": (1, Between(1, 2))},), 5), draw()),),
@@ -106,7 +113,7 @@ def test_a_plan_crosses_the_line():
     assert from_json(Plan, to_json(exchanges)) == exchanges
 
 
-def test_a_message_is_built_from_plain_fields():
+def test_a_message_is_built_from_plain_fields() -> None:
     """Whole numbers become fractions where the type has them; what is left out keeps its default."""
     fields = {"header": {"frame_id": "base", "stamp": {"sec": 5}}, "ranges": [1, math.inf], "range_max": 3}
     made = plain_fields(built(interface_class(SCAN, "msg"), fields, "here"))
@@ -126,7 +133,7 @@ def test_a_message_is_built_from_plain_fields():
         ("std_msgs/msg/String", {"data": {"text": "a"}}, "here: expected a value of the type string in `data`"),
     ],
 )
-def test_a_field_that_the_type_lacks_is_named(interface, fields, message):
+def test_a_field_that_the_type_lacks_is_named(interface: str, fields: dict[str, Any], message: str) -> None:
     """A rubric's mistake is nobody's fault but its author's, and is never sent."""
     with pytest.raises(HarnessError) as refused:
         built(interface_class(interface, "msg"), fields, "here")
@@ -154,7 +161,7 @@ def test_a_field_that_the_type_lacks_is_named(interface, fields, message):
         ),
     ],
 )
-def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli, message):
+def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli: dict[str, Any], message: str) -> None:
     """A type that this machine lacks is not the student's fault."""
     with pytest.raises(HarnessError) as refused:
         check_types(plan(**stimuli))
@@ -174,12 +181,12 @@ def test_what_a_plan_needs_is_looked_for_before_it_runs(stimuli, message):
         ("../msg/String", "msg", False),
     ],
 )
-def test_a_type_is_known_by_its_name_and_kind(interface, kind, known):
+def test_a_type_is_known_by_its_name_and_kind(interface: str, kind: str, known: bool) -> None:
     """Names come from students too: nothing else is looked up."""
     assert (interface_class(interface, kind) is not None) == known
 
 
-def test_scenarios_can_be_told_apart_and_looked_up():
+def test_scenarios_can_be_told_apart_and_looked_up() -> None:
     """By their digest, which is remembered: what only differs in a field is another one."""
     one, same, other = (
         Scenario("a", ("a.py",), Span(5), (ServiceServer("/s", TRIGGER, ({"message": text},)),)) for text in "aab"

@@ -30,7 +30,7 @@ def observer(publishers: list[Any], nodes: list[tuple[str, str]]) -> Observer:
     """An observer that sees a graph without joining any."""
     found: Observer = Observer.__new__(Observer)
     found._names, found._participants = {"_observer_1"}, {}
-    found.node = SimpleNamespace(  # type: ignore[assignment]
+    found.node = SimpleNamespace(
         get_node_names_and_namespaces=lambda: nodes,
         get_topic_names_and_types=lambda no_demangle: [("/fan_speed", ["std_msgs/msg/Float32"])],
         get_publishers_info_by_topic=lambda _: publishers,

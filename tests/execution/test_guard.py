@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
+import time
+from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -13,6 +16,7 @@ from grader.core.quantities import MIB, NS_PER_S
 from grader.core.trace import ClockKind, Trace
 from grader.execution import resource_monitor as module
 from grader.execution.resource_monitor import Budget, ResourceMonitor
+from grader.execution.student_process import NodeProcess
 from grader.execution.usage import Usage
 
 TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
@@ -28,13 +32,13 @@ class Watched:
         self.most_bytes = self.most_threads = self.used_ns = 0
         self.held = threading.Event()
 
-    def stop(self, why, family=()):
+    def stop(self, why: str, family: Sequence[int] = ()) -> None:
         self.stopped = why
         self.held.set()
 
 
 @pytest.fixture
-def machine(monkeypatch):
+def machine(monkeypatch: pytest.MonkeyPatch) -> dict[int, Usage]:
     """What the system says of processes; the worker itself uses nothing unless a test says so."""
     told: dict[int, Usage] = {}
     monkeypatch.setattr(module, "LOOK_S", 0.001)
@@ -43,9 +47,13 @@ def machine(monkeypatch):
     return told
 
 
+def processes(*students: Watched) -> list[NodeProcess]:
+    return cast("list[NodeProcess]", list(students))
+
+
 def watch(student: Watched, **limits: int) -> ResourceMonitor:
     """Watch until a limit is reached."""
-    with ResourceMonitor([student], Limits(**limits)) as guard:
+    with ResourceMonitor(processes(student), Limits(**limits)) as guard:
         student.held.wait(30)
     return guard
 
@@ -60,7 +68,7 @@ def watch(student: Watched, **limits: int) -> ResourceMonitor:
         (Usage(), {"wall_ns": NS_PER_S // 2}, "stopped after 0.5 s of real time"),
     ],
 )
-def test_each_limit_is_told_in_words(machine, used, limits, said):
+def test_each_limit_is_told_in_words(machine: dict[int, Usage], used: Usage, limits: dict[str, int], said: str) -> None:
     """With the number that the rubric has."""
     student = Watched()
     machine[student.process.pid] = used
@@ -68,21 +76,21 @@ def test_each_limit_is_told_in_words(machine, used, limits, said):
     assert student.stopped == said
 
 
-def test_within_its_limits_nobody_is_ended(machine):
+def test_within_its_limits_nobody_is_ended(machine: dict[int, Usage]) -> None:
     """Exactly the limit is not beyond it; what was used is kept for others to see."""
     student = Watched()
     machine[student.process.pid] = Usage(200 * MIB, 6 * NS_PER_S, 20)
-    with ResourceMonitor([student], Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
+    with ResourceMonitor(processes(student), Limits(memory_bytes=200 * MIB, processor_ns=6 * NS_PER_S)):
         while not student.most_threads:
             os.sched_yield()
     assert not student.stopped
     assert (student.most_bytes, student.most_threads) == (200 * MIB, 20)
 
 
-def test_messages_that_fill_the_worker_end_the_nodes(machine):
+def test_messages_that_fill_the_worker_end_the_nodes(machine: dict[int, Usage]) -> None:
     """The grader's own memory is not the student's to fill."""
     students = [Watched(4_000_000), Watched(4_000_001)]
-    with ResourceMonitor(students, Limits()):
+    with ResourceMonitor(processes(*students), Limits()):
         machine[os.getpid()] = Usage(memory_bytes=module.UNREAD_BYTES + MIB)
         for student in students:
             student.held.wait(30)
@@ -94,7 +102,9 @@ def test_messages_that_fill_the_worker_end_the_nodes(machine):
     [(0, 0, False), (3600 * NS_PER_S, 0, True), (3600 * NS_PER_S, 100 * NS_PER_S, False)],
     ids=["waited for nobody", "waited for others", "had the processors themselves"],
 )
-def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waited_ns, used_ns, undecided):
+def test_a_machine_that_gave_no_time_decides_nothing(
+    machine: dict[int, Usage], monkeypatch: pytest.MonkeyPatch, waited_ns: int, used_ns: int, undecided: bool
+) -> None:
     """Out of time because others had the processors: a problem of the machine's, never a mark."""
     student = Watched()
     machine[student.process.pid] = Usage(processor_ns=used_ns)
@@ -104,26 +114,26 @@ def test_a_machine_that_gave_no_time_decides_nothing(machine, monkeypatch, waite
     assert bool(guard.reviewed(TRACE).harness_problem) is undecided
 
 
-def test_a_budget_that_is_used_up_ends_the_nodes(machine):
+def test_a_budget_that_is_used_up_ends_the_nodes(machine: dict[int, Usage]) -> None:
     """Before their own real time is over, and with the words of the budget."""
     student = Watched()
-    with ResourceMonitor([student], Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
+    with ResourceMonitor(processes(student), Limits(), Budget(NS_PER_S // 100, "stopped: enough")) as guard:
         student.held.wait(30)
     assert (student.stopped, guard.reviewed(TRACE)) == ("stopped: enough", TRACE)
 
 
-def test_the_workers_own_processor_time_is_limited(machine, monkeypatch):
+def test_the_workers_own_processor_time_is_limited(machine: dict[int, Usage], monkeypatch: pytest.MonkeyPatch) -> None:
     """It goes to what the nodes send."""
     student = Watched()
-    with ResourceMonitor([student], Limits(processor_ns=NS_PER_S)):
-        monkeypatch.setattr(module.time, "process_time_ns", lambda: 10_000 * NS_PER_S)
+    with ResourceMonitor(processes(student), Limits(processor_ns=NS_PER_S)):
+        monkeypatch.setattr(time, "process_time_ns", lambda: 10_000 * NS_PER_S)
         student.held.wait(30)
     assert student.stopped == "stopped at 1 s of processor time to take what was sent"
 
 
-def test_the_guard_ends_with_its_block(machine):
+def test_the_guard_ends_with_its_block(machine: dict[int, Usage]) -> None:
     """No thread stays."""
     before = threading.active_count()
-    with ResourceMonitor([Watched()], Limits()):
+    with ResourceMonitor(processes(Watched()), Limits()):
         assert threading.active_count() == before + 1
     assert threading.active_count() == before

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sandboxes import HOST, Sandbox, close, finish, make_submission, start, walls
@@ -21,6 +22,7 @@ from sandboxes import HOST, Sandbox, close, finish, make_submission, start, wall
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
 from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.protocol import Limits, StudentProcess
 
 pytestmark = pytest.mark.sandbox
@@ -51,12 +53,12 @@ def _sandbox(name: str, ros: RosInstallation, submission: Path) -> Sandbox:
 
 
 @pytest.fixture(params=["bubblewrap-root", "bubblewrap"])
-def sandbox(request, ros, submission) -> Sandbox:
+def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return _sandbox(request.param, ros, submission)
 
 
 @pytest.fixture
-def plain(ros, submission) -> Sandbox:
+def plain(ros: RosInstallation, submission: Path) -> Sandbox:
     return _sandbox("none", ros, submission)
 
 
@@ -71,11 +73,11 @@ def plain(ros, submission) -> Sandbox:
         "none",
     ]
 )
-def any_tier(request, ros, submission) -> Sandbox:
+def any_tier(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     return _sandbox(request.param, ros, submission)
 
 
-def said(done: subprocess.CompletedProcess[str]) -> object:
+def said(done: subprocess.CompletedProcess[str]) -> Any:
     """Return the JSON that a program printed."""
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -84,7 +86,7 @@ def said(done: subprocess.CompletedProcess[str]) -> object:
 # --- network ---
 
 
-def test_a_student_has_no_network_but_lo(sandbox):
+def test_a_student_has_no_network_but_lo(sandbox: Sandbox) -> None:
     """The only interface is lo, and the world is unreachable."""
     code = """
 import json, socket
@@ -97,7 +99,7 @@ print(json.dumps([[name for _, name in socket.if_nameindex()], reach(socket.SOCK
     assert said(sandbox.run(code)) == [["lo"], errno.ENETUNREACH, errno.ENETUNREACH]
 
 
-def test_a_student_shares_lo_with_its_worker(sandbox):
+def test_a_student_shares_lo_with_its_worker(sandbox: Sandbox) -> None:
     """What the worker listens to on lo can be reached: DDS needs that."""
     relay = """
 import json, socket, subprocess, sys
@@ -121,7 +123,7 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as here:
 # --- files ---
 
 
-def test_a_student_cannot_find_what_lies_outside(sandbox, tmp_path):
+def test_a_student_cannot_find_what_lies_outside(sandbox: Sandbox, tmp_path: Path) -> None:
     """Neither by its path nor by walking through everything that can be seen."""
     name = f"canary-{secrets.token_hex(8)}"
     canary = tmp_path / name
@@ -145,7 +147,7 @@ print(json.dumps([[path for path in hidden if opens(path)], {name!r} in seen, le
         beside.unlink()
 
 
-def test_a_student_reads_the_host_and_its_submission_and_nothing_else_of_the_grader(sandbox):
+def test_a_student_reads_the_host_and_its_submission_and_nothing_else_of_the_grader(sandbox: Sandbox) -> None:
     """The rubrics and checks are not in view, wherever the grader is installed."""
     package = Path(grader.__file__).resolve().parent
     code = f"""
@@ -161,7 +163,7 @@ print(json.dumps([host, os.listdir({sandbox.isolation.submission_seen_at!r}),
     assert said(sandbox.run(code)) == [host, ["node.py"], [], []]
 
 
-def test_a_student_writes_to_its_scratch_folders_only(sandbox):
+def test_a_student_writes_to_its_scratch_folders_only(sandbox: Sandbox) -> None:
     """Home, log folder, working directory, /tmp and /dev/shm take files; nothing else does."""
     code = """
 import json, os
@@ -180,7 +182,7 @@ print(json.dumps([sorted(filter(writes, everywhere)), os.getcwd(), os.environ["H
     assert said(sandbox.run(code)) == [scratch, "/tmp/work", "/tmp/home", "/tmp/home/log"]
 
 
-def test_nothing_a_student_writes_is_seen_outside(sandbox):
+def test_nothing_a_student_writes_is_seen_outside(sandbox: Sandbox) -> None:
     """Scratch folders are private: a marker in /tmp and /dev/shm is not on the machine."""
     marker = f"marker-{secrets.token_hex(8)}"
     code = f"""
@@ -193,7 +195,7 @@ for folder in ("/tmp", "/dev/shm"):
     assert not [folder for folder in ("/tmp", "/dev/shm") if (Path(folder) / marker).exists()]
 
 
-def test_a_staged_copy_that_only_its_owner_can_read_can_be_run(sandbox):
+def test_a_staged_copy_that_only_its_owner_can_read_can_be_run(sandbox: Sandbox) -> None:
     """Staging uses private folders; as root the student is another user."""
     (sandbox.submission / "node.py").chmod(0o600)
     if not sandbox.start_as:
@@ -203,7 +205,7 @@ def test_a_staged_copy_that_only_its_owner_can_read_can_be_run(sandbox):
     assert sandbox.run("print(open('/submission/node.py').read())").stdout == "print('the node')\n\n"
 
 
-def test_a_link_in_the_submission_leads_nowhere(sandbox, tmp_path):
+def test_a_link_in_the_submission_leads_nowhere(sandbox: Sandbox, tmp_path: Path) -> None:
     """A link is followed inside the sandbox, where its target does not exist."""
     (tmp_path / "secret").write_text("secret", encoding="utf-8")
     (sandbox.submission / "link").symlink_to(tmp_path / "secret")
@@ -214,7 +216,7 @@ def test_a_link_in_the_submission_leads_nowhere(sandbox, tmp_path):
 # --- what is inherited ---
 
 
-def test_a_student_sees_no_variable_of_its_callers(sandbox, monkeypatch):
+def test_a_student_sees_no_variable_of_its_callers(sandbox: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither in its own environment nor in that of the sandbox's first process."""
     monkeypatch.setenv("GITHUB_TOKEN", "canary-in-the-supervisor")
     code = """
@@ -232,7 +234,7 @@ print(json.dumps([environ("self"), environ(1)]))
     assert first == ""
 
 
-def test_the_environment_of_a_student_is_exact(sandbox):
+def test_the_environment_of_a_student_is_exact(sandbox: Sandbox) -> None:
     """What is there is what was decided here; discovery range is unset, since LOCALHOST breaks a private /dev/shm."""
     environment = said(sandbox.run("import json, os; print(json.dumps(dict(os.environ)))", COLOUR="blue"))
     expected = {
@@ -260,7 +262,7 @@ def test_the_environment_of_a_student_is_exact(sandbox):
     assert environment == expected
 
 
-def test_a_student_has_no_descriptor_but_those_given(any_tier):
+def test_a_student_has_no_descriptor_but_those_given(any_tier: Sandbox) -> None:
     """Standard input, output and error, and the line under the number it was given."""
     ours, theirs = socket.socketpair()
     line = theirs.fileno()
@@ -280,7 +282,7 @@ print(json.dumps([number for number in range(200) if is_open(number)]))
         assert ours.recv(10) == b"hello"
 
 
-def test_an_exit_code_comes_through(any_tier):
+def test_an_exit_code_comes_through(any_tier: Sandbox) -> None:
     """The worker learns how a student's process ended."""
     assert any_tier.run("import sys; sys.exit(7)").returncode == 7
 
@@ -288,14 +290,14 @@ def test_an_exit_code_comes_through(any_tier):
 # --- processes and privileges ---
 
 
-def test_a_student_sees_itself_and_the_first_process_of_its_sandbox_only(sandbox):
+def test_a_student_sees_itself_and_the_first_process_of_its_sandbox_only(sandbox: Sandbox) -> None:
     """Grader, worker and other students are out of sight."""
     code = "import json, os; print(json.dumps([os.getpid(), [int(n) for n in os.listdir('/proc') if n.isdigit()]]))"
     own, seen = said(sandbox.run(code))
     assert sorted(seen) == [1, own]
 
 
-def test_the_first_process_of_a_sandbox_is_out_of_reach(sandbox):
+def test_the_first_process_of_a_sandbox_is_out_of_reach(sandbox: Sandbox) -> None:
     """It runs without the filter of system calls: whoever wrote to its memory would be rid of the filter."""
     code = """
 import json, os
@@ -306,7 +308,7 @@ print(json.dumps([open("/proc/1/comm").read() if os.path.exists("/proc/1/comm") 
     assert said(sandbox.run(code)) == ["", []]
 
 
-def test_a_student_has_no_privileges(sandbox):
+def test_a_student_has_no_privileges(sandbox: Sandbox) -> None:
     """Not root, no capability in any set, no way to gain one, and another root's files stay another's."""
     code = """
 import json, os
@@ -319,6 +321,7 @@ print(json.dumps([os.getuid(), os.getgid(), {name: status[name].strip() for name
     assert sets["NoNewPrivs"] == "1"
     assert sets["Seccomp"] == "2"
     assert {sets[name] for name in sets if name.startswith("Cap")} == {"0" * 16}
+    assert isinstance(sandbox.isolation, Bubblewrap)
     if sandbox.isolation.as_root:
         assert sets["Groups"] == ""
 
@@ -357,7 +360,7 @@ REFUSED = {
 
 
 @pytest.mark.skipif(os.uname().machine != "x86_64", reason="the numbers of the calls are those of x86-64")
-def test_a_student_cannot_make_dangerous_system_calls(sandbox):
+def test_a_student_cannot_make_dangerous_system_calls(sandbox: Sandbox) -> None:
     """Each attempt fails, whatever the way it is tried."""
     code = f"""
 import ctypes, fcntl, json, os, resource, socket
@@ -377,7 +380,7 @@ print(json.dumps(succeeded))
     assert said(sandbox.run(code)) == []
 
 
-def test_a_student_may_do_what_ordinary_programs_do(sandbox):
+def test_a_student_may_do_what_ordinary_programs_do(sandbox: Sandbox) -> None:
     """Threads, forks, subprocesses, locks shared by processes, sockets on lo and temporary files work."""
     code = """
 import multiprocessing, os, socket, subprocess, sys, tempfile, threading
@@ -408,7 +411,7 @@ time.sleep(60)
 """
 
 
-def test_a_fork_bomb_is_bounded(sandbox):
+def test_a_fork_bomb_is_bounded(sandbox: Sandbox) -> None:
     """No more processes than allowed exist at a time."""
     code = """
 import os, signal
@@ -426,7 +429,7 @@ print(len(children))
     assert 0 < said(sandbox.run(code, limits=Limits(processes=20))) < 20
 
 
-def test_one_students_fork_bomb_leaves_the_next_student_its_processes(sandbox):
+def test_one_students_fork_bomb_leaves_the_next_student_its_processes(sandbox: Sandbox) -> None:
     """Processes are counted for each student alone."""
     hog = sandbox.student(
         FORK_BOMB,
@@ -434,6 +437,7 @@ def test_one_students_fork_bomb_leaves_the_next_student_its_processes(sandbox):
     )
     command = sandbox.around(hog)
     with start(command) as process:
+        assert process.stdout is not None
         assert process.stdout.readline() == "full\n"
         other = sandbox.run("import os; os.fork() or os._exit(0); print(1)", limits=Limits(processes=3))
         process.kill()
@@ -441,14 +445,14 @@ def test_one_students_fork_bomb_leaves_the_next_student_its_processes(sandbox):
     assert other.stdout == "1\n", other.stderr
 
 
-def test_memory_is_bounded(any_tier):
+def test_memory_is_bounded(any_tier: Sandbox) -> None:
     """A process that wants more is told so by Python, not killed with the machine."""
     done = any_tier.run(f"bytearray({4096 * MIB})", limits=Limits(memory_bytes=400 * MIB))
     assert (done.returncode, "MemoryError" in done.stderr) == (1, True)
 
 
 @pytest.mark.parametrize("folder", ["/tmp", "/dev/shm", "/tmp/work"])
-def test_scratch_folders_are_bounded(sandbox, folder):
+def test_scratch_folders_are_bounded(sandbox: Sandbox, folder: str) -> None:
     """A full scratch folder is an error of the student's, not a full machine."""
     code = f"""
 import errno
@@ -462,7 +466,7 @@ except OSError as error:
     assert sandbox.run(code, limits=Limits(scratch_bytes=2 * MIB)).stdout == "ENOSPC\n"
 
 
-def test_file_sizes_descriptors_and_core_dumps_are_bounded(any_tier):
+def test_file_sizes_descriptors_and_core_dumps_are_bounded(any_tier: Sandbox) -> None:
     """The limits given are those the process finds."""
     code = """
 import json, resource
@@ -473,7 +477,7 @@ print(json.dumps([resource.getrlimit(getattr(resource, name)) for name in names]
     assert said(any_tier.run(code, limits=limits)) == [[2036 * MIB] * 2, [MIB] * 2, [50] * 2, [0] * 2]
 
 
-def test_processor_time_is_bounded(any_tier):
+def test_processor_time_is_bounded(any_tier: Sandbox) -> None:
     """A loop without end is ended by the kernel, as a last resort."""
     done = any_tier.run("while True: pass", limits=Limits(processor_ns=1_000_000_000))
     assert done.returncode in {128 + signal.SIGXCPU, 128 + signal.SIGKILL, 256 - signal.SIGXCPU, 256 - signal.SIGKILL}
@@ -513,11 +517,12 @@ time.sleep(600)
 """
 
 
-def test_killing_the_worker_leaves_no_process_of_a_student(sandbox):
+def test_killing_the_worker_leaves_no_process_of_a_student(sandbox: Sandbox) -> None:
     """Daemons in sessions of their own end too, without anybody looking for them."""
     marker = f"daemon-{secrets.token_hex(8)}"
     student = sandbox.student(DAEMONS.format(marker=marker))
     with start(sandbox.around(student)) as process:
+        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         assert len(_living(marker)) >= 5
         process.kill()
@@ -525,7 +530,7 @@ def test_killing_the_worker_leaves_no_process_of_a_student(sandbox):
     assert _wait_until(lambda: not _living(marker)), _living(marker)
 
 
-def test_a_worker_dies_with_the_grader(any_tier):
+def test_a_worker_dies_with_the_grader(any_tier: Sandbox) -> None:
     """Killing the process that started the worker ends the worker."""
     marker = f"worker-{secrets.token_hex(8)}"
     argv = (sys.executable, "-I", "-S", "-c", "import time; print('ready', flush=True); time.sleep(600)", marker)
@@ -536,6 +541,7 @@ def test_a_worker_dies_with_the_grader(any_tier):
         "subprocess.run(c['argv'], env=c['environment'], start_new_session=True)"
     )
     with subprocess.Popen((sys.executable, "-I", "-S", "-c", starter, told), stdout=subprocess.PIPE) as supervisor:
+        assert supervisor.stdout is not None
         assert supervisor.stdout.readline() == b"ready\n"
         assert _living(marker)
         supervisor.kill()
@@ -550,7 +556,9 @@ LOCKS = {
 
 
 @pytest.mark.parametrize("lock", LOCKS)
-def test_a_lock_on_a_shared_file_is_felt_by_nobody(any_tier, tmp_path, ros, lock):
+def test_a_lock_on_a_shared_file_is_felt_by_nobody(
+    any_tier: Sandbox, tmp_path: Path, ros: RosInstallation, lock: str
+) -> None:
     """Students who are graded at the same time could speak by it; the program believes that it has its lock."""
     if any_tier.isolation.name == "none":
         pytest.skip("there is no filter")
@@ -565,11 +573,13 @@ time.sleep(60)
     student = any_tier.student(code)
     with start(any_tier.around(student)) as process, shared.open("rb+") as file:
         close(student)
+        assert process.stderr is not None
+        assert process.stdout is not None
         assert process.stdout.readline() == "locked\n", process.stderr.read()
         (fcntl.flock if lock == "flock" else fcntl.lockf)(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def test_a_student_hears_nothing_of_who_opens_a_shared_file(any_tier):
+def test_a_student_hears_nothing_of_who_opens_a_shared_file(any_tier: Sandbox) -> None:
     """Neither by a watch nor by a lease."""
     if any_tier.isolation.name == "none":
         pytest.skip("there is no filter")
@@ -590,7 +600,9 @@ print([watch, lease])
 # --- the worker ---
 
 
-def test_a_worker_has_an_exact_environment_all_files_and_a_network_of_its_own(sandbox, monkeypatch):
+def test_a_worker_has_an_exact_environment_all_files_and_a_network_of_its_own(
+    sandbox: Sandbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It is trusted with files, but leaves nothing in /dev/shm and hears no other node."""
     monkeypatch.setenv("GITHUB_TOKEN", "canary")
     code = """
@@ -629,7 +641,7 @@ print(json.dumps([readable, writable]))
 """
 
 
-def test_a_worker_opens_nothing_of_the_instructor(sandbox, tmp_path, ros):
+def test_a_worker_opens_nothing_of_the_instructor(sandbox: Sandbox, tmp_path: Path, ros: RosInstallation) -> None:
     """It sees Python, ROS, its own modules and its folder: no other folder, no rubric, no key, no other submission."""
     beside = sandbox.submission.parent / "another-submission.py"
     beside.write_text("canary", encoding="utf-8")
@@ -649,7 +661,7 @@ def test_a_worker_opens_nothing_of_the_instructor(sandbox, tmp_path, ros):
     assert {path for path in writable if not any(own in (path, *path.parents) for own in ours)} == set()
 
 
-def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier):
+def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier: Sandbox) -> None:
     """The supervisor's line is open under the number given."""
     ours, theirs = socket.socketpair()
     code = "import os, sys; os.write(int(sys.argv[1]), b'hello'); sys.exit(9)"
@@ -662,7 +674,7 @@ def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier):
 # --- the tier without walls ---
 
 
-def test_without_walls_the_environment_is_exact_all_the_same(plain, monkeypatch):
+def test_without_walls_the_environment_is_exact_all_the_same(plain: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing of the caller's environment; DDS keeps to the loopback address."""
     monkeypatch.setenv("GITHUB_TOKEN", "canary")
     environment = said(plain.run("import json, os; print(json.dumps(dict(os.environ)))"))
@@ -671,11 +683,12 @@ def test_without_walls_the_environment_is_exact_all_the_same(plain, monkeypatch)
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE" not in environment
 
 
-def test_without_walls_a_student_works_in_a_folder_that_is_thrown_away(plain):
+def test_without_walls_a_student_works_in_a_folder_that_is_thrown_away(plain: Sandbox) -> None:
     """Also when it is killed."""
     code = "import os, time; open('file', 'w').close(); print(os.getcwd(), os.environ['HOME'], flush=True); {}"
     ended, killed = plain.run(code.format("")), plain.student(code.format("time.sleep(600)"))
     with start(killed) as process:
+        assert process.stdout is not None
         places = [*ended.stdout.split(), *process.stdout.readline().split()]
         assert Path(places[2], "file").exists()
         process.kill()
@@ -683,20 +696,21 @@ def test_without_walls_a_student_works_in_a_folder_that_is_thrown_away(plain):
     assert _wait_until(lambda: not any(Path(place).exists() for place in places))
 
 
-def test_without_walls_a_student_has_a_session_of_its_own(plain):
+def test_without_walls_a_student_has_a_session_of_its_own(plain: Sandbox) -> None:
     """So that a signal to its group reaches it and its children, and nobody else."""
     with start(plain.student("import os; print(os.getsid(0), os.getpid())")) as process:
+        assert process.stdout is not None
         session, own = process.stdout.readline().split()
     assert session == own == str(process.pid)
 
 
-def test_without_walls_a_domain_must_be_given(plain):
+def test_without_walls_a_domain_must_be_given(plain: Sandbox) -> None:
     """A default would let the nodes of two runs talk to each other."""
     with pytest.raises(HarnessError, match="ROS_DOMAIN_ID"):
         plain.isolation.student_command(StudentProcess(plain.ros.runtime, HOST, plain.submission, (), {}, ()), Limits())
 
 
-def test_without_walls_the_submission_is_seen_where_it_lies(plain):
+def test_without_walls_the_submission_is_seen_where_it_lies(plain: Sandbox) -> None:
     """An empty folder name says so."""
     assert plain.isolation.submission_seen_at == ""
     assert (Path(plain.isolation.host_seen_at) / "launcher.py").is_file()
@@ -746,7 +760,7 @@ print(json.dumps(sorted(set(heard), key=heard.index)))
 
 
 @pytest.mark.ros
-def test_nodes_on_both_sides_of_the_walls_talk(any_tier):
+def test_nodes_on_both_sides_of_the_walls_talk(any_tier: Sandbox) -> None:
     """Twenty messages go from the worker's node to the student's and come back."""
     student = any_tier.student(ECHO_NODE)
     told = {"argv": student.argv, "environment": dict(student.environment), "pass_fds": student.pass_fds}

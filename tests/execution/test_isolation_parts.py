@@ -22,7 +22,7 @@ def judged(machine: str, number: int, *arguments: int, architecture: int | None 
     architecture = seccomp.AUDIT_ARCHITECTURES[machine] if architecture is None else architecture
     values = [argument & (1 << 64) - 1 for argument in (*arguments, 0, 0, 0, 0, 0, 0)[:6]]
     data = struct.pack("<IIQ6Q", number, architecture, 0, *values)
-    program = list(struct.iter_unpack("<HBBI", seccomp.student_filter(machine)))
+    program: list[tuple[int, int, int, int]] = list(struct.iter_unpack("<HBBI", seccomp.student_filter(machine)))
     at = accumulator = 0
     while True:
         code, if_true, if_false, operand = program[at]
@@ -40,7 +40,7 @@ def judged(machine: str, number: int, *arguments: int, architecture: int | None 
 
 
 def number_of(machine: str, call: str) -> int:
-    number = getattr(seccomp.NUMBERS[call], machine)
+    number: int | None = getattr(seccomp.NUMBERS[call], machine)
     assert number is not None
     return number
 
@@ -50,7 +50,7 @@ def refused(error: int) -> int:
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_the_numbers_are_those_of_the_kernels_headers(machine):
+def test_the_numbers_are_those_of_the_kernels_headers(machine: str) -> None:
     """Each number in the table is the one the kernel gives the call."""
     if not HEADERS[machine].exists():
         pytest.skip("the kernel's headers are not installed")
@@ -63,7 +63,7 @@ def test_the_numbers_are_those_of_the_kernels_headers(machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_calls_without_a_rule_for_arguments_are_refused(machine):
+def test_calls_without_a_rule_for_arguments_are_refused(machine: str) -> None:
     """Every call of the table that no argument can excuse."""
     by_argument = {rule.call for rule in seccomp.ARGUMENT_RULES}
     for name, numbers in seccomp.NUMBERS.items():
@@ -74,7 +74,7 @@ def test_calls_without_a_rule_for_arguments_are_refused(machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_other_calls_are_allowed(machine):
+def test_other_calls_are_allowed(machine: str) -> None:
     """The filter is a list of what is refused."""
     listed = {getattr(numbers, machine) for numbers in seccomp.NUMBERS.values()}
     assert {judged(machine, number) for number in range(600) if number not in listed} == {seccomp.ALLOW}
@@ -82,7 +82,7 @@ def test_other_calls_are_allowed(machine):
 
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("family", range(64))
-def test_only_four_families_of_sockets_exist(machine, family):
+def test_only_four_families_of_sockets_exist(machine: str, family: int) -> None:
     """Unix, IPv4, IPv6 and netlink."""
     verdict = seccomp.ALLOW if family in (1, 2, 10, 16) else refused(errno.EAFNOSUPPORT)
     assert judged(machine, number_of(machine, "socket"), family) == verdict
@@ -90,7 +90,7 @@ def test_only_four_families_of_sockets_exist(machine, family):
 
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("bit", range(32))
-def test_clone_and_unshare_make_no_namespace(machine, bit):
+def test_clone_and_unshare_make_no_namespace(machine: str, bit: int) -> None:
     """A flag of a new namespace is refused, in any company; a thread and a fork are not."""
     namespaces = {17, 25, 26, 27, 28, 29, 30}
     clone = judged(machine, number_of(machine, "clone"), 1 << bit | 17)
@@ -100,7 +100,7 @@ def test_clone_and_unshare_make_no_namespace(machine, bit):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_the_terminal_cannot_be_typed_to(machine):
+def test_the_terminal_cannot_be_typed_to(machine: str) -> None:
     """The upper half of the argument, which the kernel ignores, does not help."""
     ioctl = number_of(machine, "ioctl")
     assert judged(machine, ioctl, 0, 0x5412) == refused(errno.EPERM)
@@ -110,7 +110,7 @@ def test_the_terminal_cannot_be_typed_to(machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_only_own_limits_can_be_set(machine):
+def test_only_own_limits_can_be_set(machine: str) -> None:
     """The process itself is number 0."""
     prlimit = number_of(machine, "prlimit64")
     assert judged(machine, prlimit, 0) == seccomp.ALLOW
@@ -118,17 +118,17 @@ def test_only_own_limits_can_be_set(machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_another_architecture_is_the_end(machine):
+def test_another_architecture_is_the_end(machine: str) -> None:
     """32-bit calls have other numbers."""
     assert judged(machine, 1, architecture=0x40000003) == seccomp.KILL_PROCESS
 
 
-def test_the_x32_numbers_do_not_exist():
+def test_the_x32_numbers_do_not_exist() -> None:
     """They would walk around every rule."""
     assert judged("x86_64", 0x40000000 | 41, 40) == refused(errno.ENOSYS)
 
 
-def test_a_filter_fits_into_the_kernel():
+def test_a_filter_fits_into_the_kernel() -> None:
     """At most 4,096 instructions are loaded."""
     assert all(len(seccomp.student_filter(machine)) // 8 < 512 for machine in MACHINES)
     assert not seccomp.supports("riscv64")
@@ -138,12 +138,12 @@ def test_a_filter_fits_into_the_kernel():
 
 
 @pytest.fixture
-def there(tmp_path) -> Path:
+def there(tmp_path: Path) -> Path:
     """A temporary folder without links on the way to it."""
     return tmp_path.resolve()
 
 
-def test_every_link_on_the_way_is_in_the_view(there):
+def test_every_link_on_the_way_is_in_the_view(there: Path) -> None:
     """An interpreter that is a link to a link in a folder that is a link, as uv and pyenv make them."""
     real = there / "python-3.12.5" / "bin" / "python3.12"
     real.parent.mkdir(parents=True)
@@ -162,7 +162,7 @@ def test_every_link_on_the_way_is_in_the_view(there):
     assert {there, there / "venv", there / "venv" / "bin", real.parent} <= set(view.parents())
 
 
-def test_what_lies_in_a_bound_folder_is_bound_once(there):
+def test_what_lies_in_a_bound_folder_is_bound_once(there: Path) -> None:
     """Nested paths and links inside need nothing of their own."""
     (there / "lib" / "python").mkdir(parents=True)
     (there / "lib" / "link").symlink_to("python")
@@ -170,14 +170,14 @@ def test_what_lies_in_a_bound_folder_is_bound_once(there):
     assert (view.bound, view.links) == ((there / "lib",), ())
 
 
-def test_a_neighbour_with_a_longer_name_is_no_child(there):
+def test_a_neighbour_with_a_longer_name_is_no_child(there: Path) -> None:
     """/lib64 is not inside /lib."""
     for name in ("lib", "lib64", "lib-extra"):
         (there / name).mkdir()
     assert len(view_of([there / "lib", there / "lib64", there / "lib-extra"]).bound) == 3
 
 
-def test_what_leads_nowhere_is_left_out(there):
+def test_what_leads_nowhere_is_left_out(there: Path) -> None:
     """Missing paths, dangling links and links in a circle."""
     (there / "dangling").symlink_to("nowhere")
     (there / "round").symlink_to("about")
@@ -186,7 +186,7 @@ def test_what_leads_nowhere_is_left_out(there):
     assert (view.bound, view.links) == ((), ())
 
 
-def test_a_link_upwards_is_followed(there):
+def test_a_link_upwards_is_followed(there: Path) -> None:
     """Relative targets with two dots."""
     (there / "a" / "b").mkdir(parents=True)
     (there / "c").mkdir()
@@ -194,7 +194,7 @@ def test_a_link_upwards_is_followed(there):
     assert view_of([there / "a" / "b" / "up"]).bound == (there / "c",)
 
 
-def test_parents_come_before_their_children():
+def test_parents_come_before_their_children() -> None:
     """In this order they can be made."""
     folders = parents_of([Path("/a/b/c/d"), Path("/a/x")])
     assert folders == (Path("/a"), Path("/a/b"), Path("/a/b/c"))

@@ -7,8 +7,10 @@ import secrets
 import shutil
 import signal
 import socket
-from collections.abc import Iterator
+import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sandboxes import HOST, Sandbox, close, make_submission, start, walls
@@ -43,14 +45,14 @@ def submission() -> Iterator[Path]:
 
 
 @pytest.fixture(params=["bubblewrap-flat", "bubblewrap-flat-user", "landlock", "landlock-user"])
-def sandbox(request, ros, submission) -> Sandbox:
+def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Path) -> Sandbox:
     found = walls(request.param, ros, submission)
     if isinstance(found, str):
         pytest.skip(found)
     return found
 
 
-def said(done):
+def said(done: subprocess.CompletedProcess[str]) -> Any:
     """Return the JSON that a program printed."""
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -67,7 +69,7 @@ def works(function, *arguments):
 """
 
 
-def test_a_student_opens_no_file_but_its_own_and_what_python_needs(sandbox, tmp_path):
+def test_a_student_opens_no_file_but_its_own_and_what_python_needs(sandbox: Sandbox, tmp_path: Path) -> None:
     """Files that anybody may read by their modes are closed, of the grader all but the host."""
     canary = sandbox.submission.parent / f"canary-{secrets.token_hex(8)}"
     canary.write_text("secret", encoding="utf-8")
@@ -93,7 +95,7 @@ print(json.dumps([[works(read, path) for path in paths] for paths in groups]))
     assert opened == [True] * len(shown)
 
 
-def test_a_student_changes_nothing_outside_its_folder(sandbox):
+def test_a_student_changes_nothing_outside_its_folder(sandbox: Sandbox) -> None:
     """Neither content nor properties, which need no descriptor; every file of the submission is writable by mode."""
     file = sandbox.submission / "node.py"
     file.chmod(0o666)
@@ -116,7 +118,7 @@ print(json.dumps([name for name, attempt in attempts.items() if works(*attempt)]
     assert file.read_text(encoding="utf-8") == "print('the node')\n"
 
 
-def test_a_student_works_in_a_folder_of_its_own(sandbox):
+def test_a_student_works_in_a_folder_of_its_own(sandbox: Sandbox) -> None:
     """Working directory, home and log folder take files, and are gone with the process."""
     code = """
 import json, os, tempfile
@@ -132,7 +134,7 @@ print(json.dumps(places))
     assert _soon(lambda: not parents.pop().exists() if parents else True)
 
 
-def test_links_lead_out_of_no_wall(sandbox):
+def test_links_lead_out_of_no_wall(sandbox: Sandbox) -> None:
     """A link in the student's own folder is judged by where it leads."""
     code = f"""{TRIES}
 os.symlink("/etc/passwd", "link")
@@ -142,7 +144,7 @@ print(json.dumps([works(open, "link"), works(open, "folder/cli.py"), works(os.li
     assert said(sandbox.run(code)) == [False, False, False]
 
 
-def test_sockets_with_a_path_cannot_be_reached(sandbox):
+def test_sockets_with_a_path_cannot_be_reached(sandbox: Sandbox) -> None:
     """Landlock has no say over them: the services of a desktop listen there."""
     place = sandbox.submission / "socket"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as service:
@@ -162,7 +164,7 @@ print(json.dumps([*made, *sent, other.recv(1).decode()]))
         assert said(sandbox.run(code)) == [False, False, False, False, "x"]
 
 
-def test_other_processes_are_out_of_reach(sandbox):
+def test_other_processes_are_out_of_reach(sandbox: Sandbox) -> None:
     """No signal, no limit, no priority and no scheduling for the worker; nor for this process."""
     code = f"""{TRIES}
 import resource, signal
@@ -183,7 +185,7 @@ print(json.dumps(results))
     assert not any(results)
 
 
-def test_a_student_signals_itself_and_its_children(sandbox):
+def test_a_student_signals_itself_and_its_children(sandbox: Sandbox) -> None:
     """Programs do that in earnest."""
     code = """
 import os, signal, subprocess, sys
@@ -197,7 +199,9 @@ print(heard, child.wait())
     assert sandbox.run(code).stdout == f"[1] {-signal.SIGTERM}\n"
 
 
-def test_where_landlock_has_no_say_over_signals_the_filter_has(ros, submission, monkeypatch):
+def test_where_landlock_has_no_say_over_signals_the_filter_has(
+    ros: RosInstallation, submission: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Older kernels: a process reaches itself and its group, and nobody else."""
     monkeypatch.setattr("grader.execution.sandbox.starting.WITH_SIGNALS", 99)
     found = walls("landlock", ros, submission)
@@ -213,14 +217,14 @@ print(json.dumps([own, [works(os.kill, other, 0) for other in (os.getppid(), -1,
     assert said(found.run(code)) == [[True] * 3, [False] * 3]
 
 
-def test_nobody_leaves_the_group_that_is_ended(sandbox):
+def test_nobody_leaves_the_group_that_is_ended(sandbox: Sandbox) -> None:
     """A session of one's own would outlive the run."""
     code = f"{TRIES}\nchild = os.fork()\n" + "if not child: os._exit(works(os.setsid) + 2 * works(os.setpgid, 0, 0))\n"
     code += "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"
     assert sandbox.run(code).stdout == "0\n"
 
 
-def test_what_a_student_leaves_behind_ends_with_it(sandbox):
+def test_what_a_student_leaves_behind_ends_with_it(sandbox: Sandbox) -> None:
     """Children that ignore every polite signal, in the background."""
     marker = f"left-{secrets.token_hex(8)}"
     code = f"""
@@ -234,7 +238,7 @@ child.stdout.readline()
     assert _soon(lambda: not _living(marker)), _living(marker)
 
 
-def test_a_killed_worker_takes_its_students_with_it(sandbox):
+def test_a_killed_worker_takes_its_students_with_it(sandbox: Sandbox) -> None:
     """And what they started."""
     marker = f"left-{secrets.token_hex(8)}"
     code = f"""
@@ -246,6 +250,7 @@ time.sleep(600)
 """
     student = sandbox.student(code)
     with start(sandbox.around(student)) as process:
+        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         assert _living(marker)
         process.kill()
@@ -253,7 +258,7 @@ time.sleep(600)
     assert _soon(lambda: not _living(marker)), _living(marker)
 
 
-def test_nobody_outlives_a_killed_worker_by_choice(sandbox):
+def test_nobody_outlives_a_killed_worker_by_choice(sandbox: Sandbox) -> None:
     """The system's own signal to orphans can be declined; that is not what it rests on."""
     marker = f"left-{secrets.token_hex(8)}"
     code = (
@@ -262,6 +267,7 @@ def test_nobody_outlives_a_killed_worker_by_choice(sandbox):
     student = sandbox.student(code)
     # The relay's own command line holds the code as well, with quotes around it.
     with start(sandbox.around(student)) as process:
+        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         assert code in _lines(marker)
         process.kill()
@@ -269,7 +275,7 @@ def test_nobody_outlives_a_killed_worker_by_choice(sandbox):
     assert _soon(lambda: not _lines(marker)), _lines(marker)
 
 
-def test_a_scratch_folder_that_outgrows_its_size_ends_its_owner(sandbox):
+def test_a_scratch_folder_that_outgrows_its_size_ends_its_owner(sandbox: Sandbox) -> None:
     """However many files it is spread over, and whatever their names."""
     code = f"""
 import time
@@ -281,7 +287,7 @@ time.sleep(600)
     assert done.returncode in (-OUTGROWN, 128 + OUTGROWN, 256 - OUTGROWN)
 
 
-def test_a_fork_bomb_is_bounded(sandbox):
+def test_a_fork_bomb_is_bounded(sandbox: Sandbox) -> None:
     """What else the user runs is not counted against it, but some room is left for it."""
     code = """
 import os
@@ -301,7 +307,7 @@ print(count)
     assert 0 < int(sandbox.run(code, limits=Limits(processes=20)).stdout) < allowed + 40
 
 
-def test_a_student_has_no_privilege_over_files_that_it_needs_none_for(sandbox):
+def test_a_student_has_no_privilege_over_files_that_it_needs_none_for(sandbox: Sandbox) -> None:
     """At most the one to enter folders that are closed to its user, and only where such a folder is on the way."""
     code = """
 import json, os
@@ -315,13 +321,13 @@ print(json.dumps([os.getuid(), status["NoNewPrivs"].strip(), status["Seccomp"].s
     assert int(privileges, 16) in ((0,) if sandbox.start_as else (0, 1 << 2))
 
 
-def test_on_a_shared_network_a_domain_must_be_given(ros, submission):
+def test_on_a_shared_network_a_domain_must_be_given(ros: RosInstallation, submission: Path) -> None:
     """A default would let the nodes of two runs talk to each other."""
     with pytest.raises(HarnessError, match="ROS_DOMAIN_ID"):
         Landlock(as_root=False).student_command(StudentProcess(ros.runtime, HOST, submission, (), {}, ()), Limits())
 
 
-def test_the_wider_filter_refuses_what_the_other_does():
+def test_the_wider_filter_refuses_what_the_other_does() -> None:
     """It adds calls and rules, and takes none away."""
     from grader.execution.sandbox import seccomp
 
@@ -344,7 +350,7 @@ def _living(marker: str) -> list[str]:
     return [argument for argument in _lines(marker) if argument == marker]
 
 
-def _soon(true, seconds: float = 10.0) -> bool:
+def _soon(true: Callable[[], object], seconds: float = 10.0) -> bool:
     import time
 
     deadline = time.monotonic() + seconds

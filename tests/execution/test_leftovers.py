@@ -17,7 +17,7 @@ from grader.execution.temp_dirs import FRESH_S, PREFIX, scratch_folder, sweep
 
 
 @pytest.fixture(autouse=True)
-def place(tmp_path, monkeypatch):
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder for temporary files of these tests only."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
@@ -32,7 +32,7 @@ def dead(place: Path, name: str = f"{PREFIX}abcd_012", age_s: float = 0.0) -> Pa
     return folder
 
 
-def test_the_folder_is_gone_afterwards(place):
+def test_the_folder_is_gone_afterwards(place: Path) -> None:
     """Also what is in it."""
     with scratch_folder() as folder:
         (folder / "x").write_text("x")
@@ -40,7 +40,7 @@ def test_the_folder_is_gone_afterwards(place):
     assert list(place.iterdir()) == []
 
 
-def test_a_dead_runs_folder_is_removed_by_the_next_run(place):
+def test_a_dead_runs_folder_is_removed_by_the_next_run(place: Path) -> None:
     """Write-protected folders in it are no obstacle."""
     folder = dead(place)
     (folder / "submission" / "pkg").chmod(0o555)
@@ -49,7 +49,7 @@ def test_a_dead_runs_folder_is_removed_by_the_next_run(place):
         assert list(place.iterdir()) == [own]
 
 
-def test_a_run_that_was_killed_leaves_its_folder_to_the_next(place):
+def test_a_run_that_was_killed_leaves_its_folder_to_the_next(place: Path) -> None:
     """The lock goes with the process, however it ends."""
     code = (
         "import sys, tempfile; tempfile.tempdir = sys.argv[1]\n"
@@ -60,6 +60,7 @@ def test_a_run_that_was_killed_leaves_its_folder_to_the_next(place):
     with subprocess.Popen(
         [sys.executable, "-c", code, str(place)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as run:
+        assert run.stdout is not None
         folder = Path(run.stdout.readline().strip())
         assert sweep(place) == []
         assert folder.is_dir()
@@ -69,7 +70,7 @@ def test_a_run_that_was_killed_leaves_its_folder_to_the_next(place):
     assert not folder.exists()
 
 
-def test_what_is_in_use_stays(place):
+def test_what_is_in_use_stays(place: Path) -> None:
     """Two runs of one user at the same time do not see each other's folder as dead."""
     with scratch_folder() as first, scratch_folder() as second:
         assert first.is_dir()
@@ -79,14 +80,14 @@ def test_what_is_in_use_stays(place):
 @pytest.mark.parametrize(
     "name", [f"{PREFIX}short", f"{PREFIX}toolong_12", "grade-abcdefgh", "essays", f"x{PREFIX}abcdefgh"]
 )
-def test_other_names_stay(place, name):
+def test_other_names_stay(place: Path, name: str) -> None:
     """Only what has our name is looked at."""
     folder = dead(place, name)
     assert sweep(place) == []
     assert folder.is_dir()
 
 
-def test_a_link_is_neither_followed_nor_removed(place):
+def test_a_link_is_neither_followed_nor_removed(place: Path) -> None:
     """Somebody else's link with our name leads nowhere."""
     target = place / "target"
     target.mkdir()
@@ -96,7 +97,7 @@ def test_a_link_is_neither_followed_nor_removed(place):
     assert (target / "precious").exists()
 
 
-def test_links_inside_are_removed_but_not_followed(place):
+def test_links_inside_are_removed_but_not_followed(place: Path) -> None:
     """A killed run's folder may hold links that a student's file became."""
     target = place / "target"
     target.mkdir(mode=0o700)
@@ -110,7 +111,7 @@ def test_links_inside_are_removed_but_not_followed(place):
     assert target.stat().st_mode & 0o777 == 0o750
 
 
-def test_another_users_folder_stays(place, monkeypatch):
+def test_another_users_folder_stays(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Even for root, who could remove it."""
     folder = dead(place)
     monkeypatch.setattr(os, "geteuid", lambda: folder.stat().st_uid + 1)
@@ -118,7 +119,7 @@ def test_another_users_folder_stays(place, monkeypatch):
     assert folder.is_dir()
 
 
-def test_a_folder_that_is_just_being_made_stays(place):
+def test_a_folder_that_is_just_being_made_stays(place: Path) -> None:
     """It is empty, and its maker is about to lock it; an old empty one is nobody's."""
     young, old = place / f"{PREFIX}youngone", place / f"{PREFIX}oldone_1"
     young.mkdir()
@@ -128,7 +129,7 @@ def test_a_folder_that_is_just_being_made_stays(place):
     assert young.is_dir()
 
 
-def test_the_lock_is_not_inherited(place):
+def test_the_lock_is_not_inherited(place: Path) -> None:
     """A process that outlives the run must not keep its folder alive."""
     with scratch_folder() as folder:
         child = subprocess.Popen([sys.executable, "-I", "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE)
@@ -137,7 +138,9 @@ def test_the_lock_is_not_inherited(place):
     assert str(folder) not in held
 
 
-def test_files_of_the_tracer_go_unless_they_were_there_or_are_in_use(tmp_path, monkeypatch):
+def test_files_of_the_tracer_go_unless_they_were_there_or_are_in_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A library that ROS loads leaves them in the shared memory of every program of a user."""
     shared = tmp_path / "shm"
     shared.mkdir()
@@ -154,12 +157,12 @@ def test_files_of_the_tracer_go_unless_they_were_there_or_are_in_use(tmp_path, m
     used.close()
 
 
-def test_a_place_that_is_missing_holds_nothing(place):
+def test_a_place_that_is_missing_holds_nothing(place: Path) -> None:
     """Sweeping never fails a run."""
     assert sweep(place / "nowhere") == []
 
 
-def test_a_folder_that_is_locked_stays(place):
+def test_a_folder_that_is_locked_stays(place: Path) -> None:
     """The lock is what tells a live run."""
     folder = dead(place)
     lock = os.open(folder, os.O_RDONLY)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import pytest
+
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -17,14 +23,14 @@ SECOND_NS = 1_000_000_000
 
 
 @pytest.fixture
-def run(studio, tmp_path):
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record a publisher that does something more when it is made, for a second."""
     tmp_path.chmod(0o755)
     return lambda harm, clock: record(studio, tmp_path / "s", hostile(harm), clock=clock, duration_ns=5 * SECOND_NS)
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_what_looks_like_a_record_is_a_line(run, clock):
+def test_what_looks_like_a_record_is_a_line(run: Callable[..., Trace], clock: str) -> None:
     """The format is public; the token is not."""
     fields = {"severity": "INFO", "name": "velocity_publisher", "file_name": "a.py", "line_number": 3, "message": "x"}
     tokens = ("", "0" * 32, "{token}")
@@ -35,7 +41,7 @@ def test_what_looks_like_a_record_is_a_line(run, clock):
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_what_the_logger_writes_is_a_record(run, clock):
+def test_what_the_logger_writes_is_a_record(run: Callable[..., Trace], clock: str) -> None:
     """With its logger, its severity and its place; also after a second start, and whatever a program sets."""
     trace = run(
         "import rclpy.logging\n"
@@ -55,7 +61,7 @@ def test_what_the_logger_writes_is_a_record(run, clock):
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_no_variable_and_no_option_tells_the_token(run, clock):
+def test_no_variable_and_no_option_tells_the_token(run: Callable[..., Trace], clock: str) -> None:
     """Neither to the program nor, on the wall clock where it may start some, to other programs."""
     child = "import os; print(sorted(os.environ)); print(open('/proc/self/environ').read().split(chr(0)))"
     start = f"import subprocess; subprocess.run([sys.executable, '-I', '-S', '-c', {child!r}])\n"

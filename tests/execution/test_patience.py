@@ -1,5 +1,8 @@
 """What never comes is waited for in full a few times, then only briefly, whatever it is."""
 
+from collections.abc import Callable
+from typing import NoReturn
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -9,11 +12,11 @@ from grader.execution.machine import BRIEF_S, LOSSES, MOST_BUSY, SETTLE_S, Patie
 
 
 @pytest.fixture
-def waited(monkeypatch) -> list[float]:
+def waited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Collect how long was to be waited; nothing is waited for."""
     found: list[float] = []
 
-    def wait_until(condition, seconds, *, pause_s):
+    def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float) -> bool:
         found.append(seconds)
         return condition()
 
@@ -22,14 +25,14 @@ def waited(monkeypatch) -> list[float]:
     return found
 
 
-def test_what_comes_costs_no_patience(waited):
+def test_what_comes_costs_no_patience(waited: list[float]) -> None:
     """However often."""
     mine = Patience()
     assert all(mine.wait(lambda: True) for _ in range(10 * LOSSES))
     assert set(waited) == {SETTLE_S}
 
 
-def test_after_some_losses_waits_are_brief(waited):
+def test_after_some_losses_waits_are_brief(waited: list[float]) -> None:
     """Also for what is waited for elsewhere and told here; what then comes still counts."""
     mine = Patience()
     for _ in range(LOSSES - 1):
@@ -41,7 +44,9 @@ def test_after_some_losses_waits_are_brief(waited):
 
 
 @pytest.mark.parametrize(("load", "times"), [(0.1, 1.0), (6.0, 3.0), (100.0, MOST_BUSY)])
-def test_a_busy_machine_gets_more_time(waited, monkeypatch, load, times):
+def test_a_busy_machine_gets_more_time(
+    waited: list[float], monkeypatch: pytest.MonkeyPatch, load: float, times: float
+) -> None:
     """In proportion to how long everything takes there; an impatient recording stays impatient."""
     monkeypatch.setattr("os.getloadavg", lambda: (load, 0.0, 0.0))
     monkeypatch.setattr("os.cpu_count", lambda: 2)
@@ -52,10 +57,10 @@ def test_a_busy_machine_gets_more_time(waited, monkeypatch, load, times):
     assert mine.wait_s == BRIEF_S
 
 
-def test_a_system_that_tells_no_load_is_taken_for_a_quiet_one(monkeypatch):
+def test_a_system_that_tells_no_load_is_taken_for_a_quiet_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not all containers show it."""
 
-    def refuse():
+    def refuse() -> NoReturn:
         raise OSError
 
     monkeypatch.setattr("os.getloadavg", refuse)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -18,6 +19,7 @@ from grader.core.scenario import (
     OdometryStream,
     Scenario,
     Span,
+    Stimulus,
     TimedMessage,
 )
 from grader.core.submission import StudentFile, Submission
@@ -35,16 +37,23 @@ SUBMISSION = Submission(
 )
 
 
-def stream(*values, **fields):
+def stream(*values: Any, **fields: Any) -> NumberStream:
     usual = {"topic": "/temperature", "type": "std_msgs/msg/Float32", "period_ns": 200 * MS, "hold_ns": 2000 * MS}
     return NumberStream(values=values, start_ns=500 * MS, **{**usual, **fields})
 
 
-def scenario(*stimuli, name="alone", **span):
+def scenario(*stimuli: Stimulus, name: str = "alone", **span: Any) -> Scenario:
     return Scenario(name, ("a.py",), Span(**{"duration_ns": 1000 * MS, **span}), stimuli)
 
 
-def plan(*stimuli, seed=1, name="alone", exercise="velocity_publisher", odometry=None, **span):
+def plan(
+    *stimuli: Stimulus,
+    seed: int = 1,
+    name: str = "alone",
+    exercise: str = "velocity_publisher",
+    odometry: Odometry | None = None,
+    **span: Any,
+) -> Plan:
     """Return the plan of a scenario with some stimuli."""
     asked = scenario(*stimuli, name=name, **span)
     return plan_scenario(exercise, asked, SUBMISSION, seed=seed, odometry=odometry, clock="virtual")
@@ -53,13 +62,13 @@ def plan(*stimuli, seed=1, name="alone", exercise="velocity_publisher", odometry
 DRAWN = stream(Between(20.5, 24), Between(0, 10**9), Between(27.25, 30))
 
 
-def test_the_same_seed_draws_the_same_values():
+def test_the_same_seed_draws_the_same_values() -> None:
     """A run can be repeated."""
     assert plan(DRAWN, seed=7) == plan(DRAWN, seed=7)
     assert plan(DRAWN, seed=7).numbers != plan(DRAWN, seed=8).numbers
 
 
-def test_scenarios_and_exercises_draw_for_themselves():
+def test_scenarios_and_exercises_draw_for_themselves() -> None:
     """What is known of one says nothing of another."""
     drawn = {
         plan(DRAWN, name=name, exercise=exercise).numbers[0].numbers
@@ -69,12 +78,12 @@ def test_scenarios_and_exercises_draw_for_themselves():
     assert len(drawn) == 4
 
 
-def test_a_stimulus_more_does_not_change_those_before_it():
+def test_a_stimulus_more_does_not_change_those_before_it() -> None:
     """Draws are made in order."""
     assert plan(DRAWN).numbers[0] == plan(DRAWN, stream(Between(0, 1))).numbers[0]
 
 
-def test_students_cannot_tell_the_stimuli_from_their_seed():
+def test_students_cannot_tell_the_stimuli_from_their_seed() -> None:
     """What seeds their processes is derived by another way, for each scenario anew, and cannot be turned back."""
     plans = [plan(DRAWN, seed=seed, name=name) for seed in (1, 2) for name in ("alone", "together")]
     assert len({p.host_seed for p in plans}) == 4
@@ -85,7 +94,7 @@ def test_students_cannot_tell_the_stimuli_from_their_seed():
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(-50, 50), st.integers(0, 50))
-def test_whole_bounds_draw_whole_numbers_inside_them(seed, low, width):
+def test_whole_bounds_draw_whole_numbers_inside_them(seed: int, low: int, width: int) -> None:
     """A student's whole type carries them without rounding."""
     ((value, side),) = plan(stream(Between(low, low + width)), seed=seed).numbers[0].numbers
     assert low <= value <= low + width
@@ -94,32 +103,32 @@ def test_whole_bounds_draw_whole_numbers_inside_them(seed, low, width):
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_other_bounds_draw_two_decimals_inside_them(seed):
+def test_other_bounds_draw_two_decimals_inside_them(seed: int) -> None:
     """Exactly what two printed decimals show."""
     ((value, _),) = plan(stream(Between(20.5, 24)), seed=seed).numbers[0].numbers
     assert 20.5 <= value <= 24
     assert float(f"{value:.2f}") == value
 
 
-def test_both_ends_of_whole_bounds_can_be_drawn():
+def test_both_ends_of_whole_bounds_can_be_drawn() -> None:
     """The bounds are inside."""
     drawn = {plan(stream(Between(1, 3)), seed=seed).numbers[0].numbers[0][0] for seed in range(50)}
     assert drawn == {1.0, 2.0, 3.0}
 
 
-def test_limits_are_left_to_the_student_s_type():
+def test_limits_are_left_to_the_student_s_type() -> None:
     """How far above is just above depends on it."""
     planned = plan(stream(25, JustAbove(25), JustBelow(25))).numbers[0]
     assert planned.numbers == ((25, 0), (25, 1), (25, -1))
 
 
 @pytest.mark.parametrize(("hold_ms", "repeats"), [(2000, 10), (200, 1), (100, 1), (399, 1), (400, 2)])
-def test_a_number_is_repeated_while_it_is_held(hold_ms, repeats):
+def test_a_number_is_repeated_while_it_is_held(hold_ms: int, repeats: int) -> None:
     """At least once."""
     assert plan(stream(1, hold_ns=hold_ms * MS)).numbers[0].repeats == repeats
 
 
-def test_processes_run_the_files_that_were_found():
+def test_processes_run_the_files_that_were_found() -> None:
     """By the name that was asked for; times are the scenario's."""
     planned = plan(after_first_message_on="/cmd_vel", wait_at_most_ns=5)
     assert planned.processes == (("a.py", "src/a.py"),)
@@ -127,12 +136,12 @@ def test_processes_run_the_files_that_were_found():
     assert plan().first_message_on == ""
 
 
-def drive(count=600, period_ms=33):
+def drive(count: int = 600, period_ms: int = 33) -> Odometry:
     """Return a recording of about 20 s."""
     return Odometry("/odom", tuple(TimedMessage(n * period_ms * MS, bytes([n % 256]), {"n": n}) for n in range(count)))
 
 
-def test_a_recording_is_played_from_its_start_time():
+def test_a_recording_is_played_from_its_start_time() -> None:
     """With its own pace, no longer than asked for, and the publisher goes just after the last message."""
     asked = OdometryStream("/odom", 5000 * MS, 12_000 * MS)
     (recording,) = plan(asked, odometry=drive()).recordings
@@ -144,7 +153,7 @@ def test_a_recording_is_played_from_its_start_time():
     assert recording.stop_ns == times[-1] + 1
 
 
-def test_which_part_of_a_recording_is_played_is_drawn():
+def test_which_part_of_a_recording_is_played_is_drawn() -> None:
     """A position that was written into the code does not help."""
     asked = OdometryStream("/odom", 0, 5000 * MS)
     starts = {plan(asked, seed=seed, odometry=drive()).recordings[0].messages[0][2]["n"] for seed in range(20)}
@@ -154,7 +163,7 @@ def test_which_part_of_a_recording_is_played_is_drawn():
 @pytest.mark.parametrize(
     "stimuli", [(), (DRAWN,), (DRAWN, OdometryStream("/odom", 5, 5000 * MS), stream(25, JustAbove(25)))]
 )
-def test_a_plan_comes_back_as_it_was(stimuli):
+def test_a_plan_comes_back_as_it_was(stimuli: tuple[Stimulus, ...]) -> None:
     """Over the line to the worker, as JSON."""
     planned = plan(*stimuli, odometry=drive())
     assert from_json(Plan, json.loads(json.dumps(to_json(planned)))) == planned

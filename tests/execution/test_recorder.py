@@ -7,18 +7,21 @@ import json
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from grader.core.errors import EnvironmentFault
 from grader.core.limits import Limits
-from grader.core.trace import ClockKind
+from grader.core.trace import ClockKind, Trace
 from grader.execution import supervisor as module
 from grader.execution.plan import Plan
 from grader.execution.ros_installation import PythonRuntime
-from grader.execution.sandbox.protocol import Command
+from grader.execution.sandbox.exposure import View
+from grader.execution.sandbox.protocol import Command, Isolation
 from grader.execution.supervisor import Job, Recorder
 from grader.execution.worker import RealTimeBudget
 
@@ -95,7 +98,9 @@ class Stage:
         self._folder = folder
         (folder / "behaviours.json").write_text(json.dumps(behaviours), encoding="utf-8")
 
-    def worker_command(self, argv, environment, pass_fds, view=None):
+    def worker_command(
+        self, argv: Sequence[str], environment: Mapping[str, str], pass_fds: Sequence[int], view: View | None = None
+    ) -> Command:
         command = (sys.executable, "-I", "-S", "-c", WORKER, str(self._folder), argv[-1])
         return Command(command, dict(environment), tuple(pass_fds))
 
@@ -114,14 +119,14 @@ def jobs(*scenarios: str) -> list[Job]:
 
 
 @pytest.fixture
-def make(tmp_path):
+def make(tmp_path: Path) -> Iterator[Callable[..., tuple[Recorder, Stage]]]:
     """Return a recorder with workers that behave as told; all is ended afterwards."""
     made = []
 
-    def make_one(*behaviours: str, workers: int = 1, domains=None) -> tuple[Recorder, Stage]:
+    def make_one(*behaviours: str, workers: int = 1, domains: Iterator[int] | None = None) -> tuple[Recorder, Stage]:
         stage = Stage(tmp_path, list(behaviours))
         domains = itertools.count(10) if domains is None else domains
-        recorder = Recorder(stage, RUNTIME, domains, scratch=tmp_path, workers=workers)
+        recorder = Recorder(cast("Isolation", stage), RUNTIME, domains, scratch=tmp_path, workers=workers)
         made.append(recorder)
         return recorder, stage
 
@@ -130,7 +135,7 @@ def make(tmp_path):
         recorder.close()
 
 
-def note(trace):
+def note(trace: Trace) -> str:
     """Return what the worker of a trace said of itself."""
     assert trace.harness_problem == ""
     return trace.notes[0]
@@ -140,7 +145,7 @@ def nothing(step: str) -> None:
     """Hear a step, and do nothing."""
 
 
-def test_a_worker_may_take_its_time_to_read_a_plan(make):
+def test_a_worker_may_take_its_time_to_read_a_plan(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """A plan with a recording in it is more than the line holds at once."""
     recorder, stage = make("rests")
     large = replace(plan("large"), root="x" * 4_000_000)
@@ -149,18 +154,18 @@ def test_a_worker_may_take_its_time_to_read_a_plan(make):
     assert len(stage.pids()) == 1
 
 
-def test_traces_come_back_in_the_order_of_the_jobs(make):
+def test_traces_come_back_in_the_order_of_the_jobs(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """However many workers there are; each scenario gets a domain of its own."""
     recorder, _ = make("answers", workers=3)
     names = [f"scenario {n}" for n in range(12)]
-    steps = []
+    steps: list[str] = []
     traces = recorder.record(jobs(*names), steps.append)
     assert [trace.scenario for trace in traces] == names
     assert len({note(trace).split(", ")[1] for trace in traces}) == 12
     assert sorted(steps) == sorted(f"exercise 1: {name}" for name in names)
 
 
-def test_a_warm_worker_is_used_first_and_again(make):
+def test_a_warm_worker_is_used_first_and_again(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """It was started before there was anything to do, and serves one plan after another."""
     recorder, stage = make("answers", workers=2)
     recorder.warm_up(1)
@@ -169,7 +174,7 @@ def test_a_warm_worker_is_used_first_and_again(make):
     assert len(stage.pids()) == 1
 
 
-def test_every_warm_worker_is_used(make):
+def test_every_warm_worker_is_used(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """None is started and forgotten."""
     recorder, stage = make("answers", workers=3)
     recorder.warm_up(2)
@@ -178,7 +183,7 @@ def test_every_warm_worker_is_used(make):
     wait_for(lambda: len(stage.pids()) == 3)
 
 
-def test_workers_outlive_the_call_that_started_them(make):
+def test_workers_outlive_the_call_that_started_them(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """The system ends a process with the thread that started it: that thread must live as long as the recorder."""
     recorder, stage = make("answers", workers=2)
     recorder.record(jobs("a", "b", "c", "d"), nothing)
@@ -203,7 +208,9 @@ def test_workers_outlive_the_call_that_started_them(make):
         "[" * 200_000,
     ],
 )
-def test_a_worker_that_fails_is_replaced_and_the_plan_tried_again(make, behaviour):
+def test_a_worker_that_fails_is_replaced_and_the_plan_tried_again(
+    make: Callable[..., tuple[Recorder, Stage]], behaviour: str
+) -> None:
     """The second try is the one that counts."""
     behaviour = behaviour.encode("utf-8", "replace").decode()
     recorder, stage = make(behaviour, "answers")
@@ -212,7 +219,7 @@ def test_a_worker_that_fails_is_replaced_and_the_plan_tried_again(make, behaviou
     assert not alive(stage.pids()[0])
 
 
-def test_a_second_failure_is_a_problem_of_ours(make):
+def test_a_second_failure_is_a_problem_of_ours(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """The trace says why, and forbids judging; the next plan gets a new worker."""
     recorder, stage = make("says why not", "says why not", "answers")
     failed, fine = recorder.record([Job("one", plan("one", "wall")), *jobs("two")], nothing)
@@ -223,7 +230,7 @@ def test_a_second_failure_is_a_problem_of_ours(make):
 
 
 @pytest.mark.parametrize("behaviour", ["", '{"problem": ""}', '{"problem": 7}', "dies"])
-def test_a_problem_without_words_still_has_some(make, behaviour):
+def test_a_problem_without_words_still_has_some(make: Callable[..., tuple[Recorder, Stage]], behaviour: str) -> None:
     """No line of a report is empty, or shows how Python writes a list."""
     recorder, _ = make(behaviour)
     problem = recorder.record(jobs("alone"), nothing)[0].harness_problem
@@ -232,7 +239,9 @@ def test_a_problem_without_words_still_has_some(make, behaviour):
     assert len(problem) > len("worker: ")
 
 
-def test_a_worker_that_hangs_is_given_up(make, monkeypatch):
+def test_a_worker_that_hangs_is_given_up(
+    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It is ended, whatever it does."""
     monkeypatch.setattr(module, "MARGIN_S", 0.05)
     recorder, stage = make("hangs")
@@ -242,7 +251,9 @@ def test_a_worker_that_hangs_is_given_up(make, monkeypatch):
     assert not any(map(alive, stage.pids()))
 
 
-def test_an_answer_without_end_is_not_read_to_its_end(make, monkeypatch):
+def test_an_answer_without_end_is_not_read_to_its_end(
+    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Memory stays ours."""
     monkeypatch.setattr(module, "ANSWER_BYTES", 1 << 20)
     recorder, stage = make("talks without end")
@@ -251,7 +262,7 @@ def test_an_answer_without_end_is_not_read_to_its_end(make, monkeypatch):
     assert not any(map(alive, stage.pids()))
 
 
-def test_one_lost_scenario_does_not_cost_the_others(make):
+def test_one_lost_scenario_does_not_cost_the_others(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Each plan stands for itself."""
     recorder, _ = make("answers", "dies", "dies", "answers", workers=2)
     traces = recorder.record(jobs(*"abcdef"), nothing)
@@ -259,10 +270,10 @@ def test_one_lost_scenario_does_not_cost_the_others(make):
     assert [trace.scenario for trace in traces] == list("abcdef")
 
 
-def test_any_other_problem_is_raised_and_nothing_hangs(make):
+def test_any_other_problem_is_raised_and_nothing_hangs(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """A machine without a free domain is not the worker's failure; the recorder can be closed all the same."""
 
-    def none_free():
+    def none_free() -> Iterator[int]:
         raise EnvironmentFault("ROS domains: expected a free one, found all in use")
         yield
 
@@ -278,7 +289,7 @@ class Failing:
     def __init__(self, failures: int) -> None:
         self._left = failures
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[int]:
         return self
 
     def __next__(self) -> int:
@@ -288,7 +299,7 @@ class Failing:
         return 10
 
 
-def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make):
+def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """As many plans as there were workers failed; the next one finds a worker."""
     recorder, _ = make("answers", workers=2, domains=Failing(3))
     for _ in range(3):
@@ -297,7 +308,7 @@ def test_a_worker_is_not_lost_with_a_problem_of_another_kind(make):
     assert recorder.record(jobs("alone"), nothing)[0].harness_problem == ""
 
 
-def test_closing_ends_every_worker(make):
+def test_closing_ends_every_worker(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Idle ones too, and closing again does no harm."""
     recorder, stage = make("answers", workers=3)
     recorder.warm_up(3)
@@ -310,12 +321,12 @@ def test_closing_ends_every_worker(make):
         recorder.record(jobs("alone"), nothing)
 
 
-def test_closing_while_scenarios_are_under_way_ends_them(make):
+def test_closing_while_scenarios_are_under_way_ends_them(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """After Ctrl-C nobody waits for what a worker does; nothing is started any more."""
     recorder, stage = make("hangs", workers=2)
-    ended = []
+    ended: list[BaseException | None] = []
 
-    def record():
+    def record() -> None:
         try:
             recorder.record(jobs(*"abcdef"), nothing)
         except BaseException as error:
@@ -333,7 +344,7 @@ def test_closing_while_scenarios_are_under_way_ends_them(make):
     assert not any(map(alive, stage.pids()))
 
 
-def test_a_recorder_closes_with_its_block(make):
+def test_a_recorder_closes_with_its_block(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Also when the block raises."""
     recorder, stage = make("answers")
     recorder.record(jobs("alone"), nothing)
@@ -342,7 +353,9 @@ def test_a_recorder_closes_with_its_block(make):
     assert not any(map(alive, stage.pids()))
 
 
-def test_a_worker_inherits_nothing_of_the_callers_environment(make, monkeypatch):
+def test_a_worker_inherits_nothing_of_the_callers_environment(
+    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Tokens of a build server stay outside."""
     monkeypatch.setenv("GITHUB_TOKEN", "canary")
     recorder, stage = make("answers")
@@ -351,7 +364,7 @@ def test_a_worker_inherits_nothing_of_the_callers_environment(make, monkeypatch)
     assert b"canary" not in Path(f"/proc/{pid}/environ").read_bytes()
 
 
-def test_a_worker_keeps_no_descriptor_of_another(make):
+def test_a_worker_keeps_no_descriptor_of_another(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """Lines between the supervisor and one worker are nobody else's."""
     recorder, stage = make("answers", workers=2)
     recorder.warm_up(2)
@@ -371,7 +384,7 @@ def alive(pid: int) -> bool:
     return stat.rpartition(")")[2].split()[0] not in "ZX"
 
 
-def wait_for(condition, seconds: float = 60) -> None:
+def wait_for(condition: Callable[[], object], seconds: float = 60) -> None:
     """Wait until a condition holds; fail if it never does."""
     deadline = time.monotonic() + seconds
     while not condition():
@@ -389,7 +402,9 @@ def wait_for(condition, seconds: float = 60) -> None:
         ("|ended by SIGABRT", "", 1),
     ],
 )
-def test_a_signal_that_no_limit_explains_has_to_come_twice(make, told, kept, times):
+def test_a_signal_that_no_limit_explains_has_to_come_twice(
+    make: Callable[..., tuple[Recorder, Stage]], told: str, kept: str, times: int
+) -> None:
     """A machine that was out of threads for a moment costs nobody a point; a node that aborts does so again."""
     recorder, _ = make(f"tells of {told}")
     (found,) = recorder.record(jobs("alone"), lambda step: None)
@@ -398,7 +413,7 @@ def test_a_signal_that_no_limit_explains_has_to_come_twice(make, told, kept, tim
     assert found.notes == (f"plan {times - 1}",)
 
 
-def test_a_worn_worker_does_no_more(make):
+def test_a_worn_worker_does_no_more(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """The next scenario gets a fresh one."""
     recorder, stage = make("is worn", "is worn", "answers")
     found = [note(recorder.record(jobs("alone"), nothing)[0]) for _ in range(4)]
@@ -410,14 +425,16 @@ LIMITS = {"reaches its processor time": "120 s of processor time", "grows": "100
 
 
 @pytest.fixture
-def small(monkeypatch):
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers may fill little, and are those of the stage."""
     monkeypatch.setattr(module, "MODULE", b"-c")
     monkeypatch.setattr(module, "FULL_BYTES", 100 << 20)
 
 
 @pytest.mark.parametrize("behaviour", LIMITS)
-def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(make, small, behaviour):
+def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(
+    make: Callable[..., tuple[Recorder, Stage]], small: None, behaviour: str
+) -> None:
     """They do it again and again: a fault of theirs, and no third try."""
     recorder, stage = make(behaviour, behaviour, "answers")
     (trace,) = recorder.record(jobs("alone"), nothing)
@@ -427,14 +444,18 @@ def test_two_workers_at_a_limit_of_theirs_are_the_nodes_doing(make, small, behav
 
 
 @pytest.mark.parametrize("behaviour", LIMITS)
-def test_one_worker_at_a_limit_decides_nothing(make, small, behaviour):
+def test_one_worker_at_a_limit_decides_nothing(
+    make: Callable[..., tuple[Recorder, Stage]], small: None, behaviour: str
+) -> None:
     """The plan is tried again."""
     recorder, _ = make(behaviour, "answers")
     assert note(recorder.record(jobs("alone"), nothing)[0]).startswith("worker 1")
 
 
 @pytest.mark.parametrize("first", [*LIMITS, "dies"])
-def test_different_ends_of_workers_decide_nothing(make, small, first):
+def test_different_ends_of_workers_decide_nothing(
+    make: Callable[..., tuple[Recorder, Stage]], small: None, first: str
+) -> None:
     """A limit and a failure without one, in any order."""
     recorder, _ = make(first, "dies", "answers")
     (trace,) = recorder.record(jobs("alone"), nothing)
@@ -442,7 +463,9 @@ def test_different_ends_of_workers_decide_nothing(make, small, first):
     assert trace.faults() == ()
 
 
-def test_a_worker_that_took_all_its_time_is_not_tried_again(make, monkeypatch):
+def test_a_worker_that_took_all_its_time_is_not_tried_again(
+    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A second try would take as long."""
     monkeypatch.setattr(module, "MARGIN_S", 0.2)
     recorder, stage = make("hangs", "answers")
@@ -452,7 +475,7 @@ def test_a_worker_that_took_all_its_time_is_not_tried_again(make, monkeypatch):
     assert len(stage.pids()) == 1
 
 
-def test_without_time_nothing_is_recorded(make):
+def test_without_time_nothing_is_recorded(make: Callable[..., tuple[Recorder, Stage]]) -> None:
     """It is told as a fault of every process, the same in every run; no worker is even asked."""
     recorder, stage = make("answers")
     job = replace(jobs("alone")[0], budget=RealTimeBudget(0))
@@ -463,7 +486,9 @@ def test_without_time_nothing_is_recorded(make):
 
 
 @pytest.mark.parametrize(("scenario", "undecided"), [("starved", True), ("alone", False)])
-def test_time_that_others_took_is_nobodys_fault(make, monkeypatch, scenario, undecided):
+def test_time_that_others_took_is_nobodys_fault(
+    make: Callable[..., tuple[Recorder, Stage]], monkeypatch: pytest.MonkeyPatch, scenario: str, undecided: bool
+) -> None:
     """Workers say how long nodes waited for a processor; where that is much, what is not recorded is not judged."""
     recorder, _ = make("costs")
     budget = RealTimeBudget(3600)

@@ -1,22 +1,26 @@
 """Which ROS is found, and what children get of it."""
 
 import importlib.machinery
+import platform
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from grader.core.errors import EnvironmentFault
 from grader.execution import ros_installation
-from grader.execution.ros_installation import find_ros
+from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.environment import runtime_environment
 
 HERE = f"python{sys.version_info.major}.{sys.version_info.minor}"
 MESSAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
 
 
-def install(prefix: Path, *, suffix: str = importlib.machinery.EXTENSION_SUFFIXES[0], packages=MESSAGES) -> Path:
+def install(
+    prefix: Path, *, suffix: str = importlib.machinery.EXTENSION_SUFFIXES[0], packages: Sequence[str] = MESSAGES
+) -> Path:
     """Make a folder that looks like an installed ROS, and return its folder of Python packages."""
     folder = prefix / "lib" / HERE / "site-packages"
     for package in ("rclpy", *packages):
@@ -42,14 +46,14 @@ def sourced(prefix: Path, **changes: str) -> dict[str, str]:
 
 
 @pytest.fixture
-def wheels():
+def wheels() -> RosInstallation:
     try:
         return find_ros({})
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
 
 
-def test_a_sourced_installation_is_used_and_nothing_of_the_wheels(tmp_path):
+def test_a_sourced_installation_is_used_and_nothing_of_the_wheels(tmp_path: Path) -> None:
     """Children get its Python folders and its libraries, and no library beside this interpreter."""
     folder = install(tmp_path / "jazzy")
     ros = find_ros(sourced(tmp_path / "jazzy"))
@@ -65,7 +69,7 @@ def test_a_sourced_installation_is_used_and_nothing_of_the_wheels(tmp_path):
     assert not [path for path in ros.runtime.library_paths if path.name.endswith(".libs")]
 
 
-def test_the_version_of_a_sourced_rclpy_is_that_of_its_distribution(tmp_path):
+def test_the_version_of_a_sourced_rclpy_is_that_of_its_distribution(tmp_path: Path) -> None:
     """The metadata beside the package is asked before the manifest."""
     folder = install(tmp_path / "jazzy")
     metadata = folder / "rclpy-7.1.9.dist-info"
@@ -74,7 +78,7 @@ def test_the_version_of_a_sourced_rclpy_is_that_of_its_distribution(tmp_path):
     assert find_ros(sourced(tmp_path / "jazzy")).rclpy_version == "7.1.9"
 
 
-def test_workspaces_beside_a_sourced_installation_stay_out_of_sight(tmp_path):
+def test_workspaces_beside_a_sourced_installation_stay_out_of_sight(tmp_path: Path) -> None:
     """An overlay may hold solutions; a source build's packages, one prefix each, are all needed."""
     built, overlay = tmp_path / "ros2_jazzy" / "install", tmp_path / "my_workspace" / "install" / "solutions"
     install(built / "rclpy", packages=())
@@ -95,7 +99,9 @@ def test_workspaces_beside_a_sourced_installation_stay_out_of_sight(tmp_path):
     assert str(overlay) not in "".join(runtime.environment.values())
 
 
-def test_an_empty_entry_of_a_search_path_is_not_the_working_directory(tmp_path, monkeypatch):
+def test_an_empty_entry_of_a_search_path_is_not_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Shell set-ups often leave a colon at the end."""
     install(tmp_path / "jazzy")
     monkeypatch.chdir(tmp_path)
@@ -105,7 +111,7 @@ def test_an_empty_entry_of_a_search_path_is_not_the_working_directory(tmp_path, 
     assert tmp_path not in (*runtime.read_paths, *runtime.library_paths)
 
 
-def test_a_sourced_installation_for_another_python_is_a_fault(tmp_path):
+def test_a_sourced_installation_for_another_python_is_a_fault(tmp_path: Path) -> None:
     """Neither mixed with the wheels nor silently left aside."""
     install(tmp_path / "humble", suffix=".cpython-38-x86_64-linux-gnu.so")
     with pytest.raises(EnvironmentFault, match=rf"expected rclpy for {HERE}, .*found rclpy for python3\.8") as caught:
@@ -114,7 +120,7 @@ def test_a_sourced_installation_for_another_python_is_a_fault(tmp_path):
 
 
 @pytest.mark.parametrize("lack", ["lib/librmw_fastrtps_cpp.so", f"lib/{HERE}/site-packages/nav_msgs"])
-def test_an_incomplete_installation_is_a_fault_with_the_command_that_mends_it(tmp_path, lack):
+def test_an_incomplete_installation_is_a_fault_with_the_command_that_mends_it(tmp_path: Path, lack: str) -> None:
     """Fast DDS and the messages of the exercises are asked for before anything is run."""
     install(tmp_path / "jazzy")
     (tmp_path / "jazzy" / lack).rename(tmp_path / "elsewhere")
@@ -125,7 +131,7 @@ def test_an_incomplete_installation_is_a_fault_with_the_command_that_mends_it(tm
     assert caught.value.hint.startswith("sudo apt install ros-jazzy-")
 
 
-def test_variables_without_an_rclpy_under_them_are_not_a_sourced_ros(tmp_path, wheels):
+def test_variables_without_an_rclpy_under_them_are_not_a_sourced_ros(tmp_path: Path, wheels: RosInstallation) -> None:
     """An overlay alone, or leftovers of an installation that is gone, leave the wheels."""
     (tmp_path / "lib").mkdir()
     assert find_ros(sourced(tmp_path)) == wheels
@@ -136,7 +142,7 @@ def test_variables_without_an_rclpy_under_them_are_not_a_sourced_ros(tmp_path, w
     assert find_ros(variables) == wheels
 
 
-def test_the_wheels_of_this_interpreter_are_found(wheels):
+def test_the_wheels_of_this_interpreter_are_found(wheels: RosInstallation) -> None:
     """Every folder of bundled libraries is named, so that Python need not start twice."""
     libraries = wheels.runtime.library_paths
     assert wheels.source == "wheels"
@@ -149,7 +155,7 @@ def test_the_wheels_of_this_interpreter_are_found(wheels):
 
 
 @pytest.mark.ros
-def test_a_child_needs_only_what_was_found(wheels):
+def test_a_child_needs_only_what_was_found(wheels: RosInstallation) -> None:
     """With exactly this environment rclpy, its libraries and the messages load."""
     code = """
 import rclpy.node, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg
@@ -162,7 +168,7 @@ print(rclpy.utilities.get_rmw_implementation_identifier())
     assert done.stdout == "rmw_fastrtps_cpp\n", done.stderr
 
 
-def test_no_home_folder_is_shown_as_a_whole(wheels, monkeypatch):
+def test_no_home_folder_is_shown_as_a_whole(wheels: RosInstallation, monkeypatch: pytest.MonkeyPatch) -> None:
     """An environment made right in a home folder shows its parts, not the home."""
     prefix = wheels.prefix
     monkeypatch.setenv("HOME", str(prefix))
@@ -171,20 +177,20 @@ def test_no_home_folder_is_shown_as_a_whole(wheels, monkeypatch):
     assert not [path for path in paths if path in (prefix, *prefix.parents)]
 
 
-def test_read_paths_are_absolute_and_exist(wheels):
+def test_read_paths_are_absolute_and_exist(wheels: RosInstallation) -> None:
     """They are bound into sandboxes as they are."""
     assert [path for path in wheels.runtime.read_paths if not path.is_absolute() or not path.exists()] == []
 
 
-def test_without_any_ros_the_command_that_installs_it_is_told(monkeypatch, tmp_path):
+def test_without_any_ros_the_command_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The wheels where they exist, an installation to source where one lies ready."""
     monkeypatch.setattr(ros_installation, "_site_packages", lambda: (tmp_path,))
     monkeypatch.setattr(ros_installation, "INSTALLED_HERE", tmp_path)
-    monkeypatch.setattr(ros_installation.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
     with pytest.raises(EnvironmentFault, match="expected rclpy, found none") as caught:
         find_ros({})
     assert caught.value.hint.endswith('-m pip install "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces')
-    monkeypatch.setattr(ros_installation.platform, "machine", lambda: "riscv64")
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
     with pytest.raises(EnvironmentFault) as caught:
         find_ros({})
     assert caught.value.hint.startswith("install ROS 2 jazzy")
@@ -196,7 +202,7 @@ def test_without_any_ros_the_command_that_installs_it_is_told(monkeypatch, tmp_p
     assert caught.value.hint == f"source {tmp_path / 'rolling' / 'setup.bash'}"
 
 
-def test_finding_ros_imports_none_of_it():
+def test_finding_ros_imports_none_of_it() -> None:
     """The supervisor must not load rclpy: its libraries need variables that only children have."""
     code = (
         "import sys; from grader.execution.ros_installation import find_ros\n"

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from sandboxes import close, make_submission, start, walls
@@ -22,7 +24,7 @@ time.sleep(60)
 
 
 @pytest.fixture
-def submission():
+def submission() -> Iterator[Path]:
     folder = make_submission()
     yield folder
     shutil.rmtree(folder)
@@ -30,7 +32,7 @@ def submission():
 
 @pytest.mark.parametrize("folder", ["/tmp", "/tmp/work", "/dev/shm"])
 @pytest.mark.parametrize("tier", ["bubblewrap-root", "bubblewrap"])
-def test_names_are_counted_wherever_a_student_may_make_them(tier, folder, submission):
+def test_names_are_counted_wherever_a_student_may_make_them(tier: str, folder: str, submission: Path) -> None:
     """From outside, in the file systems that the student's processes see."""
     try:
         sandbox = walls(tier, find_ros(), submission)
@@ -40,6 +42,7 @@ def test_names_are_counted_wherever_a_student_may_make_them(tier, folder, submis
         pytest.skip(sandbox)
     student = sandbox.student(CODE.format(folder=folder))
     with start(sandbox.around(student)) as process:
+        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         found = scratch_names(families([process.pid])[process.pid])
         process.kill()
@@ -47,7 +50,7 @@ def test_names_are_counted_wherever_a_student_may_make_them(tier, folder, submis
     assert 700 <= found < 800
 
 
-def test_names_in_the_machines_own_folders_are_nobodys():
+def test_names_in_the_machines_own_folders_are_nobodys() -> None:
     """A process outside of a sandbox has none, and neither has one that is gone."""
     assert scratch_names([os.getpid(), 2**22 + 1]) == 0
     assert scratch_names([]) == 0

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from grader.core.scenario import FieldSpec
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -21,16 +27,18 @@ pytestmark = pytest.mark.ros
 
 NODES = Path(__file__).with_name("service_nodes")
 BATTERY, RELAY, TRIGGER = "/battery/get_status", "/relay", "std_srvs/srv/Trigger"
-ANSWERS = tuple({"success": True, "message": f"n{number}"} for number in range(3))
+ANSWERS: tuple[Mapping[str, FieldSpec], ...] = tuple({"success": True, "message": f"n{number}"} for number in range(3))
 TEXT = "std_msgs/msg/String"
 
 
 @pytest.fixture
-def run(studio, tmp_path):
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record some of the nodes beside this file, for so many seconds."""
     tmp_path.chmod(0o755)
 
-    def run_one(files, *stimuli, seconds=4, clock="virtual", times=1, **fields):
+    def run_one(
+        files: tuple[str, ...], *stimuli: Any, seconds: int = 4, clock: str = "virtual", times: int = 1, **fields: Any
+    ) -> Trace:
         (tmp_path / "s").mkdir()
         submission = stage_submission(str(NODES), files, tmp_path / "s")
         asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
@@ -43,7 +51,7 @@ def run(studio, tmp_path):
     return run_one
 
 
-def short(trace) -> list[str]:
+def short(trace: Trace) -> list[str]:
     """Return what was asked, answered, logged and marked, in short, with its milliseconds."""
     found = []
     for o in trace.observations:
@@ -57,7 +65,7 @@ def short(trace) -> list[str]:
     return found
 
 
-def test_a_server_is_called_by_several_clients(run):
+def test_a_server_is_called_by_several_clients(run: Callable[..., Trace]) -> None:
     """Calls of one instant come one after the other, always in the same order; the graph shows the server."""
     trace = run(("server.py",), ServiceCalls(BATTERY, TRIGGER, ({},), calls=2, clients=2), times=2)
     percentages = ["85.0", "84.5", "84.0", "83.5"]
@@ -72,7 +80,7 @@ def test_a_server_is_called_by_several_clients(run):
     assert [(e.kind, e.service, e.node) for e in trace.graphs()[-1].services] == [("service", BATTERY, "/battery")]
 
 
-def test_a_client_waits_for_a_late_server_that_disappears(run):
+def test_a_client_waits_for_a_late_server_that_disappears(run: Callable[..., Trace]) -> None:
     """It polls in virtual time; the last request stays unanswered; then it ends, which it is free to do."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 1300 * NS_PER_MS, delay_ns=100 * NS_PER_MS, answers=2)
     trace = run(("client_loop.py",), server, seconds=20, may_exit=("client_loop.py",), times=2)
@@ -103,7 +111,7 @@ def test_a_client_waits_for_a_late_server_that_disappears(run):
         ("client_two.py", [500, 1000, 1500, 2000, 2500, 3000, 3500]),
     ],
 )
-def test_every_way_to_ask_is_served(run, file, asked_ms):
+def test_every_way_to_ask_is_served(run: Callable[..., Trace], file: str, asked_ms: list[int]) -> None:
     """Callbacks, await, the call that blocks in a thread, and a second client that hears what is not for it."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=250 * NS_PER_MS, cycle=True)
     trace = run((file,), server)
@@ -112,7 +120,7 @@ def test_every_way_to_ask_is_served(run, file, asked_ms):
     assert logged == [at + 250 for at in asked_ms]
 
 
-def test_a_server_asks_another_one_while_it_answers(run):
+def test_a_server_asks_another_one_while_it_answers(run: Callable[..., Trace]) -> None:
     """Two callbacks of one node wait for each other, in threads."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=100 * NS_PER_MS)
     trace = run(("relay.py",), server, ServiceCalls(RELAY, TRIGGER, ({},), start_ns=NS_PER_S))
@@ -124,7 +132,7 @@ def test_a_server_asks_another_one_while_it_answers(run):
     ]
 
 
-def test_two_processes_meet_when_one_starts_late_and_one_ends(run):
+def test_two_processes_meet_when_one_starts_late_and_one_ends(run: Callable[..., Trace]) -> None:
     """And the one that is left ends at the stop signal."""
     files = ("server.py", "client_loop.py")
     late, free = (("server.py", 2500 * NS_PER_MS),), ("client_loop.py",)
@@ -136,9 +144,9 @@ def test_two_processes_meet_when_one_starts_late_and_one_ends(run):
     assert (trace.faults(), trace.stop_ns) == ((), 10 * NS_PER_S)
 
 
-def test_parameters_and_messages_of_fixed_types_reach_a_node(run):
+def test_parameters_and_messages_of_fixed_types_reach_a_node(run: Callable[..., Trace]) -> None:
     """The parameter takes effect at its instant; the messages come as often as they are repeated."""
-    asked = {"parameters": [{"name": "word", "value": {"type": 4, "string_value": "bye"}}]}
+    asked: Any = {"parameters": [{"name": "word", "value": {"type": 4, "string_value": "bye"}}]}
     changed = ServiceCalls("~/set_parameters", "rcl_interfaces/srv/SetParameters", (asked,), start_ns=1200 * NS_PER_MS)
     heard = MessageStream("/heard", TEXT, ({"data": "a"}, {"data": "b"}), 500 * NS_PER_MS, NS_PER_S, repeats=2)
     trace = run(("parrot.py",), changed, heard, times=2)
@@ -148,9 +156,11 @@ def test_parameters_and_messages_of_fixed_types_reach_a_node(run):
     assert said == [(1000, "a hello"), (1500, "a bye"), (2000, "b bye"), (2500, "b bye")]
 
 
-def test_a_lifecycle_node_is_led_through_its_states(run):
+def test_a_lifecycle_node_is_led_through_its_states(run: Callable[..., Trace]) -> None:
     """It publishes while it is active; what its state machine tells has its instant too."""
-    asked = [({"transition": {"id": 0, "label": to}}, at) for to, at in (("configure", 600), ("activate", 1200))]
+    asked: list[tuple[Any, int]] = [
+        ({"transition": {"id": 0, "label": to}}, at) for to, at in (("configure", 600), ("activate", 1200))
+    ]
     kind = "lifecycle_msgs/srv/ChangeState"
     calls = [ServiceCalls("~/change_state", kind, (value,), start_ns=at * NS_PER_MS) for value, at in asked]
     state = ServiceCalls("/living/get_state", "lifecycle_msgs/srv/GetState", ({},), start_ns=1300 * NS_PER_MS)
@@ -165,7 +175,7 @@ def test_a_lifecycle_node_is_led_through_its_states(run):
 FIBONACCI, COUNT = "test_msgs/action/Fibonacci", "/count/_action"
 
 
-def test_goals_are_refused_cancelled_and_followed(run):
+def test_goals_are_refused_cancelled_and_followed(run: Callable[..., Trace]) -> None:
     """An action server with threads that sleeps while it works: requests, feedback and results have their instants."""
     pytest.importorskip("test_msgs")
     refused = ActionGoal("/count", FIBONACCI, {"order": 80}, 500 * NS_PER_MS)
@@ -183,7 +193,7 @@ def test_goals_are_refused_cancelled_and_followed(run):
     assert states == [1, 2, 3, 5]  # accepted, executing, cancelling, cancelled
 
 
-def test_the_client_of_an_action_waits_for_its_server(run):
+def test_the_client_of_an_action_waits_for_its_server(run: Callable[..., Trace]) -> None:
     """Both are students; the server starts late."""
     pytest.importorskip("test_msgs")
     trace = run(("counting.py", "goal_client.py"), starts_ns=(("counting.py", NS_PER_S),), may_exit=("goal_client.py",))
@@ -204,13 +214,13 @@ def test_the_client_of_an_action_waits_for_its_server(run):
         ("deaf.py", "3000 did not end within 2 s after Ctrl-C"),
     ],
 )
-def test_how_a_program_ends_after_ctrl_c_is_told(run, file, end):
+def test_how_a_program_ends_after_ctrl_c_is_told(run: Callable[..., Trace], file: str, end: str) -> None:
     """A second shutdown is normal; an exception of its own is not, and neither is to go on."""
     trace = run((file,), seconds=1, shutdown_ns=2 * NS_PER_S)
     assert [line for line in short(trace) if line.startswith(("1000", "3000"))] == [f"1000 stop_signal {file}", end]
 
 
-def test_the_wall_clock_sees_the_same(run):
+def test_the_wall_clock_sees_the_same(run: Callable[..., Trace]) -> None:
     """Only later by what the machine needs."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 600 * NS_PER_MS, answers=1)
     trace = run(("client_callbacks.py",), server, seconds=3, clock="wall", shutdown_ns=2 * NS_PER_S)

@@ -20,7 +20,7 @@ from grader.execution.stimuli import (
 )
 
 
-def test_numbers_follow_each_other_in_their_period():
+def test_numbers_follow_each_other_in_their_period() -> None:
     """Each as often as it is held; the publisher is there from the start and stays."""
     due = schedule(plan(numbers=(numbers((20.0, 0), (30.0, 0), start_ms=500, period_ms=200, repeats=2),)))
     assert due == [
@@ -32,7 +32,7 @@ def test_numbers_follow_each_other_in_their_period():
     ]
 
 
-def test_streams_are_merged_by_time_and_keep_their_order():
+def test_streams_are_merged_by_time_and_keep_their_order() -> None:
     """At one instant, the one named first goes first; a publisher appears before it publishes."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 500 * MS, 501 * MS, ((500 * MS, b"", {}),))
     streams = (numbers((1.0, 0), topic="/a", start_ms=500), numbers((2.0, 0), topic="/b", start_ms=500))
@@ -72,7 +72,7 @@ def test_streams_are_merged_by_time_and_keep_their_order():
         ("", None),
     ],
 )
-def test_types_that_carry_a_number(interface, field):
+def test_types_that_carry_a_number(interface: str, field: tuple[str, bool] | None) -> None:
     """Any numeric type of std_msgs and a temperature; nothing else, and nothing outside message packages."""
     assert numeric_field(interface) == field
 
@@ -89,14 +89,14 @@ def test_types_that_carry_a_number(interface, field):
         ("std_msgs/msg/Int64", (27.6, 0), 28),
     ],
 )
-def test_a_number_in_a_type(interface, number, value):
+def test_a_number_in_a_type(interface: str, number: tuple[float, int], value: float) -> None:
     """Exactly the limit where it is asked for, and just beside it in the type's own steps."""
     message, fields = number_message(interface, number)
     assert fields == {"data": value}
     assert message.data == value
 
 
-def test_a_step_above_the_limit_is_above_it_in_every_type():
+def test_a_step_above_the_limit_is_above_it_in_every_type() -> None:
     """Also in single precision, where a thousandth must not round away."""
     for interface in (FLOAT, "std_msgs/msg/Float64", "sensor_msgs/msg/Temperature"):
         (above,) = number_message(interface, (25.0, 1))[1].values()
@@ -104,7 +104,7 @@ def test_a_step_above_the_limit_is_above_it_in_every_type():
         assert below < 25.0 < above
 
 
-def test_a_type_without_a_number_cannot_carry_one():
+def test_a_type_without_a_number_cannot_carry_one() -> None:
     """The caller asks first."""
     with pytest.raises(ValueError, match="String"):
         number_message("std_msgs/msg/String", (1.0, 0))

@@ -7,6 +7,8 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -21,6 +23,8 @@ from grader.execution.student_process import NodeProcess
 
 ROOT = "/submission"
 TOKEN = "0123456789abcdef" * 2
+#: The process and the line of a student that only writes.
+NOBODY: Any = None
 
 
 class OneFile(Places):
@@ -35,10 +39,10 @@ class OneFile(Places):
 
 def silent() -> NodeProcess:
     """Return a student whose output a test makes up."""
-    return NodeProcess("a.py", ROOT, None, None, log_token=TOKEN, file="pkg/a.py", places=OneFile())
+    return NodeProcess("a.py", ROOT, NOBODY, NOBODY, log_token=TOKEN, file="pkg/a.py", places=OneFile())
 
 
-def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> list:
+def read(stderr: bytes = b"", stdout: bytes = b"", *, final: bool = False) -> list[LogRecord | OutputLine]:
     """Return what a single piece of output comes to."""
     student = silent()
     student._streams["stdout"] += stdout
@@ -61,7 +65,7 @@ def printed(text: str, stream: str = "stderr") -> OutputLine:
     return OutputLine(7, "a.py", stream, text)
 
 
-def test_records_and_lines_are_told_apart():
+def test_records_and_lines_are_told_apart() -> None:
     """What went through the logger has its severity, its logger and its place; the rest are lines."""
     assert read(b"before\n" + record() + b"after\n", b"print\n") == [
         printed("print", "stdout"),
@@ -71,17 +75,17 @@ def test_records_and_lines_are_told_apart():
     ]
 
 
-def test_standard_output_comes_before_standard_error():
+def test_standard_output_comes_before_standard_error() -> None:
     """Within one instant the order between the two streams is not known, so it is fixed."""
     assert [type(o) for o in read(record(), b"one\ntwo\n")] == [OutputLine, OutputLine, LogRecord]
 
 
-def test_a_record_keeps_its_line_breaks():
+def test_a_record_keeps_its_line_breaks() -> None:
     """Three lines in one call of the logger are one record."""
     assert read(record("x: 1\ny: 2\r\nz: 3")) == [logged("x: 1\ny: 2\r\nz: 3")]
 
 
-def test_a_place_outside_the_submission_is_none():
+def test_a_place_outside_the_submission_is_none() -> None:
     """Only the student's own files are named."""
     assert read(record(file="/usr/lib/x.py")) == [logged("hello", file="", line=0)]
     assert read(record(file=f"{ROOT}-other/a.py")) == [logged("hello", file="", line=0)]
@@ -93,7 +97,7 @@ def test_a_place_outside_the_submission_is_none():
 
 
 @given(st.integers(min_value=0, max_value=len(record("one\ntwo") + b"and a line\n" + record("three"))))
-def test_output_split_anywhere_reads_the_same(cut):
+def test_output_split_anywhere_reads_the_same(cut: int) -> None:
     """A pipe delivers in pieces of its own choosing."""
     whole = record("one\ntwo") + b"and a line\n" + record("three")
     student = silent()
@@ -104,7 +108,7 @@ def test_output_split_anywhere_reads_the_same(cut):
     assert found == [logged("one\ntwo"), printed("and a line"), logged("three")]
 
 
-def test_an_unfinished_line_waits_for_its_end():
+def test_an_unfinished_line_waits_for_its_end() -> None:
     """It gets the instant at which it was finished, or that of the end."""
     student = silent()
     student._streams["stdout"] += b"half"
@@ -115,12 +119,12 @@ def test_an_unfinished_line_waits_for_its_end():
     assert student.output(4, final=True) == []
 
 
-def test_empty_lines_are_nothing():
+def test_empty_lines_are_nothing() -> None:
     """Only what can be read is written down."""
     assert read(b"\n\r\n", b"\n\na\r\n\n") == [printed("a", "stdout")]
 
 
-def test_bytes_that_are_not_utf8_stay_visible():
+def test_bytes_that_are_not_utf8_stay_visible() -> None:
     """Nothing is lost and nothing raises."""
     assert read(b"", b"\xff\xfe\xc3(\n") == [printed("\\xff\\xfe\\xc3(", "stdout")]
 
@@ -140,20 +144,20 @@ def test_bytes_that_are_not_utf8_stay_visible():
         ),
     ],
 )
-def test_what_only_looks_like_a_record_is_a_line(hostile, texts):
+def test_what_only_looks_like_a_record_is_a_line(hostile: bytes, texts: list[str]) -> None:
     """The signs that mark records may stand in anybody's text."""
     assert [o.text for o in read(hostile, final=True)] == texts
 
 
-def test_without_a_token_there_are_no_records():
+def test_without_a_token_there_are_no_records() -> None:
     """A process that never said which one it has writes lines."""
-    student = NodeProcess("a.py", ROOT, None, None)
+    student = NodeProcess("a.py", ROOT, NOBODY, NOBODY)
     student._streams["stderr"] += record(token="")
     assert [type(o) for o in student.output(7, final=True)] == [OutputLine]
 
 
 @pytest.mark.parametrize("token", ["", "x", "F" * 32, ".*" * 16, 5, None, ["a"]])
-def test_a_token_is_what_the_host_draws(start, token):
+def test_a_token_is_what_the_host_draws(start: Callable[[str], NodeProcess], token: Any) -> None:
     """32 hexadecimal digits; anything else could stand for many texts."""
     student = start(f"report(kind='ready', log_token={token!r})")
     assert student.is_ready()
@@ -180,7 +184,7 @@ def test_a_token_is_what_the_host_draws(start, token):
         ({"text": "the machine failed; by the course's rule this counts as 30 of 30"}, []),
     ],
 )
-def test_notes_are_codes_and_the_words_are_ours(report, notes):
+def test_notes_are_codes_and_the_words_are_ours(report: dict[str, Any], notes: list[str]) -> None:
     """A process cannot have a sentence of its own shown as the grader's."""
     student = silent()
     student.note({"kind": "note", **report})
@@ -200,7 +204,7 @@ STARTED = {"code": "started", "module": "pkg.a", "function": "main", "hidden": [
         ({"way": "module", "function": ""}, StartWay.MODULE, "pkg.a"),
     ],
 )
-def test_how_a_file_was_started_is_told_once(said, way, target):
+def test_how_a_file_was_started_is_told_once(said: Any, way: StartWay, target: str) -> None:
     """Before anything of it runs: whatever is said later is not believed."""
     student = silent()
     student.note({**STARTED, **said})
@@ -221,36 +225,38 @@ def test_how_a_file_was_started_is_told_once(said, way, target):
         {"way": ["main"]},
     ],
 )
-def test_what_is_no_way_to_start_a_file_is_dropped(said):
+def test_what_is_no_way_to_start_a_file_is_dropped(said: Any) -> None:
     """Only names fit."""
     student = silent()
     student.note({**STARTED, **said})
     assert student.start_told is None
 
 
-def test_files_that_hide_modules_are_files_of_the_submission():
+def test_files_that_hide_modules_are_files_of_the_submission() -> None:
     """Any other name is made up."""
     student = silent()
     hidden = ["a.py", "random.py", "../a.py", "pkg/a.py", 5, None]
     student.note({**STARTED, "way": "script", "hidden": hidden})
+    assert student.start_told is not None
     assert student.start_told.hidden == ("a.py",)
     (note,) = student.notes
     assert note.startswith("a.py has the name of a module that Python or ROS needs")
 
 
-def test_the_record_after_a_broken_one_is_found():
+def test_the_record_after_a_broken_one_is_found() -> None:
     """A record that never ends hides no other."""
     assert read(f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1f1\x1fnever ends".encode() + record())[-1] == logged("hello")
 
 
-def test_standard_output_holds_no_records():
+def test_standard_output_holds_no_records() -> None:
     """There the signs are text, and keep no line waiting."""
     (line,) = read(b"", record())
+    assert isinstance(line, OutputLine)
     assert line.stream == "stdout"
     assert read(b"", b"\x1e\nnext\n") == [printed("\x1e", "stdout"), printed("next", "stdout")]
 
 
-def test_a_megabyte_of_beginnings_is_read_in_one_go():
+def test_a_megabyte_of_beginnings_is_read_in_one_go() -> None:
     """A hostile stream costs the worker no more than its length; quadratic reading would take minutes."""
     text = f"\x1e{TOKEN}\x1fINFO\x1fa\x1fb\x1f1\x1f".encode() * 30_000
     found = read(text + b"\n", final=True)
@@ -258,7 +264,7 @@ def test_a_megabyte_of_beginnings_is_read_in_one_go():
     assert len(found[0].text) == module.TEXT_CHARACTERS
 
 
-def test_long_texts_are_cut():
+def test_long_texts_are_cut() -> None:
     """One line may not fill a report."""
     assert len(read(record("x" * 10_000))[0].text) == module.TEXT_CHARACTERS
     assert len(read(b"", b"x" * 10_000 + b"\n")[0].text) == module.TEXT_CHARACTERS
@@ -266,14 +272,14 @@ def test_long_texts_are_cut():
 
 @settings(deadline=None)
 @given(st.lists(st.sampled_from([b"\x1e", b"\x1d", b"\x1f", b"\n", b"INFO", b"1", b"\xff", b"text"]), max_size=30))
-def test_no_bytes_raise(pieces):
+def test_no_bytes_raise(pieces: list[bytes]) -> None:
     """Whatever a process writes, it is read, and every sign of it is somewhere."""
     data = b"".join(pieces)
     found = read(data, data, final=True)
     assert "text" not in data.decode("utf-8", "replace") or any("text" in str(vars_of(o)) for o in found)
 
 
-def vars_of(observation):
+def vars_of(observation: Any) -> list[Any]:
     return [getattr(observation, name) for name in observation.__slots__]
 
 
@@ -287,7 +293,7 @@ def report(**fields): line.sendall(json.dumps(fields).encode() + b"\\n")
 
 
 @pytest.fixture
-def start():
+def start() -> Iterator[Callable[[str], NodeProcess]]:
     """Start a process that talks as a test says, and end it afterwards."""
     started = []
 
@@ -307,14 +313,14 @@ def start():
         student.close()
 
 
-def test_a_report_is_read_with_what_was_written_before_it(start):
+def test_a_report_is_read_with_what_was_written_before_it(start: Callable[[str], NodeProcess]) -> None:
     """Output is there when the report is."""
     student = start("print('one'); print('two', file=sys.stderr); report(kind='idle', wake_ns=5)")
     assert student.report() == {"kind": "idle", "wake_ns": 5}
     assert student.output(7) == [printed("one", "stdout"), printed("two")]
 
 
-def test_answers_arrive(start):
+def test_answers_arrive(start: Callable[[str], NodeProcess]) -> None:
     """The line goes both ways, one JSON object a line."""
     student = start("report(kind='idle'); report(kind='heard', said=json.loads(line.makefile().readline()))")
     student.report()
@@ -322,7 +328,7 @@ def test_answers_arrive(start):
     assert student.report() == {"kind": "heard", "said": {"now_ns": 3}}
 
 
-def test_two_reports_in_one_piece_are_two(start):
+def test_two_reports_in_one_piece_are_two(start: Callable[[str], NodeProcess]) -> None:
     """What is there is not lost until it is asked for."""
     student = start('line.sendall(b\'{"kind": "note"}\\n{"kind": "idle"}\\n\'); signal.pause()')
     assert [student.report(), student.report()] == [{"kind": "note"}, {"kind": "idle"}]
@@ -341,20 +347,22 @@ def test_two_reports_in_one_piece_are_two(start):
         "b'9' * 10000 + b'\\n'",
     ],
 )
-def test_what_is_no_report_is_none(start, said):
+def test_what_is_no_report_is_none(start: Callable[[str], NodeProcess], said: Any) -> None:
     """Not JSON, not an object, nested or long beyond reading: not the host's voice."""
     student = start(f"line.sendall({said}); signal.pause()")
     assert student.report() is None
 
 
-def test_a_report_without_end_is_none(start):
+def test_a_report_without_end_is_none(start: Callable[[str], NodeProcess]) -> None:
     """It is not read to its end."""
     student = start("while True: line.sendall(b'x' * 65536)")
     assert student.report() is None
     assert len(student._pending) < module.REPORT_BYTES + (1 << 20)
 
 
-def test_a_process_that_never_reports_is_given_up(start, monkeypatch):
+def test_a_process_that_never_reports_is_given_up(
+    start: Callable[[str], NodeProcess], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its host's own watchdog should have been faster."""
     monkeypatch.setattr(module, "SILENCE_S", 0.0)
     assert start("signal.pause()").report() is None
@@ -371,7 +379,9 @@ def test_a_process_that_never_reports_is_given_up(start, monkeypatch):
         ("os._exit(3)", FaultKind.EXITED, "exited with code 3"),
     ],
 )
-def test_an_end_without_a_word_has_its_reason(start, end, kind, text):
+def test_an_end_without_a_word_has_its_reason(
+    start: Callable[[str], NodeProcess], end: str, kind: FaultKind, text: str
+) -> None:
     """A signal, also one that a sandbox passes on as a code, or an exit."""
     student = start(f"print('last words', end=''); {end}")
     assert student.report() is None
@@ -381,7 +391,7 @@ def test_an_end_without_a_word_has_its_reason(start, end, kind, text):
     assert [line.text for line in student.output(9, final=True)] == ["last words"]
 
 
-def test_a_dead_process_can_be_told_anything(start):
+def test_a_dead_process_can_be_told_anything(start: Callable[[str], NodeProcess]) -> None:
     """It is noticed at its next report."""
     student = start("os._exit(0)")
     student.process.wait()
@@ -390,14 +400,16 @@ def test_a_dead_process_can_be_told_anything(start):
     assert student.report() is None
 
 
-def test_killing_ends_what_the_process_started(start):
+def test_killing_ends_what_the_process_started(start: Callable[[str], NodeProcess]) -> None:
     """Its whole session goes, grandchildren too."""
     student = start(
         "child = os.fork()\n"
         "if child == 0: signal.pause()\n"
         "signal.signal(signal.SIGTERM, signal.SIG_IGN); report(kind='idle', child=child); signal.pause()"
     )
-    child = student.report()["child"]
+    report = student.report()
+    assert report is not None
+    child = report["child"]
     student.kill()
     assert student.process.returncode == -signal.SIGKILL
     while alive(child):  # killed, but its end may take a moment; were it not, this test would hang
@@ -415,7 +427,9 @@ def alive(pid: int) -> bool:
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 @pytest.mark.parametrize("more", [0, 1, 65536, 300_001])
-def test_output_beyond_the_cap_is_read_but_not_kept(start, stream, more):
+def test_output_beyond_the_cap_is_read_but_not_kept(
+    start: Callable[[str], NodeProcess], stream: str, more: int
+) -> None:
     """The process goes on, the trace stays small, and one note says so; exactly the cap is not beyond it."""
     most = Limits().output_bytes
     length = most + more
@@ -427,7 +441,7 @@ def test_output_beyond_the_cap_is_read_but_not_kept(start, stream, more):
     assert student.notes == ([f"a.py: more than 4 MiB on {stream}: the rest was not looked at"] if more else [])
 
 
-def test_endless_output_does_not_keep_the_report_away(start):
+def test_endless_output_does_not_keep_the_report_away(start: Callable[[str], NodeProcess]) -> None:
     """Both are read side by side."""
     student = start(
         "import threading\n"
@@ -442,10 +456,10 @@ def test_endless_output_does_not_keep_the_report_away(start):
     assert len(student._streams["stdout"]) <= Limits().output_bytes
 
 
-def test_reports_that_are_there_are_taken_without_waiting(start):
+def test_reports_that_are_there_are_taken_without_waiting(start: Callable[[str], NodeProcess]) -> None:
     """For the wall clock: what has come, then None if the process is gone without a word."""
     student = start("report(kind='note'); report(kind='fault'); line.recv(1)")
-    found = []
+    found: list[Any] = []
     while len(found) < 2:
         found += student.reports()
     assert found == [{"kind": "note"}, {"kind": "fault"}]
@@ -456,16 +470,16 @@ def test_reports_that_are_there_are_taken_without_waiting(start):
     assert found == [None]
 
 
-def test_a_process_that_said_goodbye_is_not_lost(start):
+def test_a_process_that_said_goodbye_is_not_lost(start: Callable[[str], NodeProcess]) -> None:
     """Its last report is its end; the closed line adds nothing."""
     student = start("report(kind='exited', code=0)")
-    found = []
+    found: list[Any] = []
     while not found:
         found += student.reports()
     assert found == [{"kind": "exited", "code": 0}]
 
 
-def test_a_closed_stream_is_no_end(start):
+def test_a_closed_stream_is_no_end(start: Callable[[str], NodeProcess]) -> None:
     """A program may close its own output and live on."""
     student = start("os.close(1); os.close(2); report(kind='idle'); line.recv(1); report(kind='idle')")
     assert student.report() == {"kind": "idle"}

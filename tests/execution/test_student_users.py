@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 from grader.execution.sandbox import exposure
 
@@ -16,11 +19,12 @@ sys.stdin.read()
 """
 
 
-def test_no_two_graders_take_one_user(tmp_path, monkeypatch):
+def test_no_two_graders_take_one_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fork bomb of one student would take the threads of another's node, whose loss would look like its own fault."""
     monkeypatch.setattr(exposure, "TRIES", 10**6)
     argv = [sys.executable, "-I", "-c", TAKES_ALL_BUT_ONE, str(tmp_path / "users")]
     with subprocess.Popen(argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
         assert other.stdout.readline() == b"taken\n"
         users = exposure.StudentUsers(tmp_path / "users")
         assert users.next() == 61777
@@ -28,7 +32,7 @@ def test_no_two_graders_take_one_user(tmp_path, monkeypatch):
     assert len({61777, *(users.next() for _ in range(1000))}) == 1001
 
 
-def test_without_a_place_for_locks_users_are_still_handed_out(tmp_path):
+def test_without_a_place_for_locks_users_are_still_handed_out(tmp_path: Path) -> None:
     """A read-only machine grades too; two students of one grader then still differ."""
     users = exposure.StudentUsers(tmp_path / "missing" / "users")
     assert len({users.next() for _ in range(1000)}) == 1000

@@ -35,7 +35,7 @@ def marks(recorder: TraceRecorder) -> list[tuple[int, str]]:
     return [(o.t_ns, o.detail) for o in recorder.observations if isinstance(o, Mark)]
 
 
-def test_messages_are_counted_on_each_topic():
+def test_messages_are_counted_on_each_topic() -> None:
     """Two topics below the limit together exceed nothing."""
     recorder = TraceRecorder(Limits(messages=3))
     for n in range(3):
@@ -47,7 +47,7 @@ def test_messages_are_counted_on_each_topic():
     assert len([o for o in recorder.observations if isinstance(o, Message)]) == 6
 
 
-def test_the_size_of_all_messages_is_bounded():
+def test_the_size_of_all_messages_is_bounded() -> None:
     """Few large messages fill a trace as well."""
     recorder = TraceRecorder(Limits(traffic_bytes=2 * MIB))
     for n in range(3):
@@ -55,7 +55,7 @@ def test_the_size_of_all_messages_is_bounded():
     assert marks(recorder) == [(2, f"more than 2 MiB of messages: {REST}")]
 
 
-def test_nothing_follows_the_first_limit():
+def test_nothing_follows_the_first_limit() -> None:
     """One mark, and no message after it."""
     recorder = TraceRecorder(Limits(messages=1))
     for n in range(10):
@@ -65,7 +65,7 @@ def test_nothing_follows_the_first_limit():
     assert len(marks(recorder)) == 1
 
 
-def test_participants_are_bounded():
+def test_participants_are_bounded() -> None:
     """Each costs the grader's own node as much as a process."""
     recorder = TraceRecorder(Limits(participants=2))
     assert recorder.look(graph(1), participants=2)
@@ -74,7 +74,7 @@ def test_participants_are_bounded():
 
 
 @pytest.mark.parametrize("size", [{"nodes": module.ENDPOINTS + 1}, {"ends": module.ENDPOINTS + 1}])
-def test_a_graph_beyond_all_measure_ends_the_recording(size):
+def test_a_graph_beyond_all_measure_ends_the_recording(size: dict[str, int]) -> None:
     """It is not even kept."""
     recorder = TraceRecorder(Limits())
     assert not recorder.look(graph(5, **size), participants=1)
@@ -82,7 +82,7 @@ def test_a_graph_beyond_all_measure_ends_the_recording(size):
     assert recorder.graph == GraphSnapshot(0, (), ())
 
 
-def test_a_graph_that_never_rests_ends_the_recording(monkeypatch):
+def test_a_graph_that_never_rests_ends_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     """Snapshots add up."""
     monkeypatch.setattr(module, "GRAPH_PARTS", 20)
     recorder = TraceRecorder(Limits())
@@ -92,13 +92,13 @@ def test_a_graph_that_never_rests_ends_the_recording(monkeypatch):
     assert len([o for o in recorder.observations if isinstance(o, GraphSnapshot)]) < 10
 
 
-def test_a_graph_that_stays_the_same_is_taken_down_once():
+def test_a_graph_that_stays_the_same_is_taken_down_once() -> None:
     """Only changes are evidence."""
     recorder = TraceRecorder(Limits())
     assert [recorder.look(graph(n), participants=1) for n in range(3)] == [True, False, False]
 
 
-def test_of_faults_and_offers_only_the_first_are_kept():
+def test_of_faults_and_offers_only_the_first_are_kept() -> None:
     """A thread that raises for ever fills no trace."""
     recorder = TraceRecorder(Limits())
     for n in range(5000):
@@ -108,7 +108,7 @@ def test_of_faults_and_offers_only_the_first_are_kept():
 
 
 @given(st.lists(st.text(max_size=2000), max_size=300), st.lists(st.text(max_size=2000), max_size=100))
-def test_notes_are_few_short_and_told_once(own, others):
+def test_notes_are_few_short_and_told_once(own: list[str], others: list[str]) -> None:
     """The limit that ended the recording comes first."""
     recorder = TraceRecorder(Limits())
     recorder.note(*own)
@@ -120,7 +120,7 @@ def test_notes_are_few_short_and_told_once(own, others):
 
 
 @pytest.mark.parametrize(("count", "at_ns", "floods"), [(101, 0, True), (100, 0, False), (1100, 10**9, False)])
-def test_a_flood_is_told_by_the_time_it_is(count, at_ns, floods):
+def test_a_flood_is_told_by_the_time_it_is(count: int, at_ns: int, floods: bool) -> None:
     """A burst is none, and neither is a thousand a second; topics are counted each for itself."""
     recorder = TraceRecorder(Limits())
     for _ in range(count):

@@ -6,10 +6,15 @@ import contextlib
 import os
 import signal
 import threading
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -76,11 +81,11 @@ class Listener(Node):
 
 
 @pytest.fixture
-def run(studio, tmp_path):
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     """Record programs together; whatever they do, the grader does not fail."""
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, **fields):
+    def run_all(*programs: str, **fields: Any) -> Trace:
         trace = record(studio, tmp_path / "s", *programs, **fields)
         assert trace.harness_problem == ""
         return trace
@@ -99,7 +104,7 @@ JUNK = ["send(b'x' * 100 + b'\\n')", "send(b'[' * 100000 + b'\\n')", "send(b'\\x
 @pytest.mark.parametrize(
     ("said", "clock"), [*((said, "virtual") for said in (*FLOODS, *JUNK)), *((said, "wall") for said in FLOODS)]
 )
-def test_junk_on_the_line_ends_the_process_that_sent_it(run, said, clock):
+def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace], said: str, clock: str) -> None:
     """Not JSON, too deep, too much: its process is ended, and everybody else goes on."""
     later = f"if self.count == 40:\n    send = line().sendall\n    {said}"
     trace = run(hostile(before=LINE, later=later), clock=clock, duration_ns=4 * NS_PER_S)
@@ -118,14 +123,14 @@ def test_junk_on_the_line_ends_the_process_that_sent_it(run, said, clock):
         '{"kind": "fault", "text": "' + "x" * 100_000 + '", "line": 999999999999999999999}',
     ],
 )
-def test_absurd_reports_change_nothing_that_counts(run, report):
+def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], report: str) -> None:
     """Times, counts and places of a report are bounded before they are used; messages are those that came."""
     trace = run(hostile(before=LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')"))
     assert len(trace.messages("/cmd_vel")) == 199
     assert all(len(o.text) <= 500 and 0 <= o.t_ns <= 10 * NS_PER_S for o in trace.faults())
 
 
-def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run):
+def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable[..., Trace]) -> None:
     """Its process sleeps for ever, as it asked; the other one is stepped as before."""
     report = (
         '{"kind": "idle", "wake_ns": 99999999999999999999999999, "sent": {"topic /cmd_vel": 3, "topic /y": -5}, '
@@ -138,7 +143,7 @@ def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run):
     assert len(trace.messages("/cmd_vel")) <= 199
 
 
-def test_hidden_work_is_charged(run):
+def test_hidden_work_is_charged(run: Callable[..., Trace]) -> None:
     """A program that has its host say that it computes nothing is for the wall clock all the same."""
     lie = "import _grader_host.virtual as virtual\nvirtual.VirtualTime._charge = lambda self: None"
     work = (
@@ -148,7 +153,7 @@ def test_hidden_work_is_charged(run):
     assert "processor time" in trace.clock_reason
 
 
-def test_bytes_that_are_no_message_have_no_content(run):
+def test_bytes_that_are_no_message_have_no_content(run: Callable[..., Trace]) -> None:
     """They came, and that is all: no check finds a right value in them."""
     trace = run(hostile(later="self.publisher.publish(b'\\x00\\x01\\x00\\x00\\xff')"))
     values = [m.value for m in trace.messages("/cmd_vel")]
@@ -158,7 +163,7 @@ def test_bytes_that_are_no_message_have_no_content(run):
     )
 
 
-def test_garbage_on_the_ports_disturbs_nobody(run):
+def test_garbage_on_the_ports_disturbs_nobody(run: Callable[..., Trace]) -> None:
     """Random bytes, some with the beginning of RTPS, as fast as a process can send them."""
     harm = """
         import ctypes
@@ -183,7 +188,7 @@ while True:
     assert len(run(hostile(harm=harm)).messages("/cmd_vel")) == 199
 
 
-def test_a_clock_and_events_of_somebody_else_change_nothing(run):
+def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., Trace]) -> None:
     """The grader's node follows no /clock, and believes no parameter event."""
     harm = """
         from rosgraph_msgs.msg import Clock
@@ -204,7 +209,7 @@ def test_a_clock_and_events_of_somebody_else_change_nothing(run):
     assert {b - a for a, b in pairwise(times)} == {50 * MS}
 
 
-def test_the_graders_node_offers_nothing_to_call(run):
+def test_the_graders_node_offers_nothing_to_call(run: Callable[..., Trace]) -> None:
     """No parameters, no log levels, no descriptions of types: what is not there cannot be called."""
     later = """
         if self.count == 40:
@@ -215,7 +220,7 @@ def test_the_graders_node_offers_nothing_to_call(run):
     assert [line.text for line in run(hostile(later=later)).lines()] == ["_ros2cli_ []"]
 
 
-def test_the_graders_name_gives_no_power(run):
+def test_the_graders_name_gives_no_power(run: Callable[..., Trace]) -> None:
     """A node of the same name hides from the graph, which helps nobody; its messages count as everybody's."""
     later = """
         if self.count == 20:
@@ -241,7 +246,7 @@ def listener(tick: str) -> str:
 STREAM = PlannedNumbers("/temperature", "std_msgs/msg/Float32", 500 * MS, 200 * MS, 1, ((21.0, 0), (26.0, 0)) * 5)
 
 
-def test_forged_stimuli_are_no_evidence(run):
+def test_forged_stimuli_are_no_evidence(run: Callable[..., Trace]) -> None:
     """What the trace calls delivered is what the grader published, not what came in its writer's name."""
     forged = listener("""
 for info in self.get_publishers_info_by_topic("/temperature"):
@@ -252,7 +257,7 @@ for info in self.get_publishers_info_by_topic("/temperature"):
     assert [d.value["data"] for d in trace.deliveries("/temperature")] == [21.0, 26.0] * 5
 
 
-def test_a_forged_farewell_of_the_grader_ends_no_grading(run):
+def test_a_forged_farewell_of_the_grader_ends_no_grading(run: Callable[..., Trace]) -> None:
     """A student who has other nodes believe that the grader left loses what they would have been heard to say."""
     farewell = listener("""
 for info in self.get_publishers_info_by_topic("/temperature"):
@@ -269,7 +274,7 @@ print(len(self.get_node_names()), flush=True)
     assert len(trace.messages("/cmd_vel")) <= 59
 
 
-def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run):
+def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run: Callable[..., Trace]) -> None:
     """The reference beside the nodes is not held up by what they send."""
     flood = hostile(
         harm="""
@@ -284,7 +289,7 @@ def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run)
     ]
 
 
-def test_a_flood_of_giants_leaves_the_grader_standing(run):
+def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., Trace]) -> None:
     """Six megabytes at a time; each is counted, none is kept."""
     harm = (
         "from std_msgs.msg import String\nself.big = self.create_publisher(String, '/big', 100); self.String = String"
@@ -297,7 +302,7 @@ def test_a_flood_of_giants_leaves_the_grader_standing(run):
     assert len(trace.messages("/cmd_vel")) == 39
 
 
-def test_nobody_is_waited_for_in_another_domain(studio, tmp_path):
+def test_nobody_is_waited_for_in_another_domain(studio: RecordingSession, tmp_path: Path) -> None:
     """On the wall clock a first message waits for its subscription; where the grader is not, there will be none."""
     tmp_path.chmod(0o755)
     elsewhere = """
@@ -322,7 +327,7 @@ if self.count == 20:
 """
 
 
-def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run):
+def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[..., Trace]) -> None:
     """The middleware would note each of them: the worker is ended, and what brings two of them there is the node."""
     most_bytes = 0
     done = threading.Event()
@@ -365,7 +370,7 @@ ledger.Ledger.claims = lambda it: [
 
 
 @pytest.mark.parametrize("kind", ["publisher", "client"])
-def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run, kind):
+def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Callable[..., Trace], kind: str) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
     ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.ledger.changed = True")
     trace = run(ghosts, duration_ns=4 * NS_PER_S, limits=Limits(wall_ns=60 * NS_PER_S))
@@ -399,7 +404,7 @@ def ancestors(pid: int) -> list[int]:
     return above
 
 
-def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
+def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path: Path) -> None:
     """Its scenario is recorded again by another worker; what a killed one had is gone with it."""
     tmp_path.chmod(0o755)
     with open_session("auto") as opened:
@@ -421,7 +426,7 @@ def test_a_worker_that_is_killed_costs_nobody_a_point(tmp_path):
     assert len(trace.messages("/cmd_vel")) == 199
 
 
-def test_a_worker_that_is_always_killed_decides_nothing(tmp_path):
+def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
     """No trace, no marks: a problem of ours."""
     tmp_path.chmod(0o755)
     with open_session("auto") as opened:
@@ -443,7 +448,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path):
     assert trace.observations == ()
 
 
-def test_scenarios_leave_no_descriptor_and_no_process(run, studio):
+def test_scenarios_leave_no_descriptor_and_no_process(run: Callable[..., Trace], studio: RecordingSession) -> None:
     """After ten more, this process and its workers hold what they held before."""
     hogs = [hostile(), hostile(later="if self.count == 9: os.kill(os.getpid(), 9)")]
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -33,7 +37,7 @@ for report in (
 
 
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
-def test_no_sentence_of_a_process_becomes_the_graders(studio, tmp_path, clock):
+def test_no_sentence_of_a_process_becomes_the_graders(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
     """Neither as a note nor as a fault; places that the submission does not have are left out."""
     tmp_path.chmod(0o755)
     trace = record(studio, tmp_path / "s", hostile(SAYS), clock=clock, duration_ns=5 * SECOND_NS)
@@ -47,7 +51,7 @@ def test_no_sentence_of_a_process_becomes_the_graders(studio, tmp_path, clock):
 
 
 @pytest.mark.parametrize("clock", ["virtual", "wall"])
-def test_a_thread_that_raises_ends_no_node(studio, tmp_path, clock):
+def test_a_thread_that_raises_ends_no_node(studio: RecordingSession, tmp_path: Path, clock: str) -> None:
     """Its exception is a fault in its own words, and the node goes on."""
     tmp_path.chmod(0o755)
     harm = "threading.Thread(target=lambda: [].pop()).start()"

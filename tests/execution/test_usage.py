@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -16,7 +17,7 @@ WAIT = "import sys; sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
 
 
 @pytest.fixture
-def run():
+def run() -> Iterator[Callable[[str], subprocess.Popen[bytes]]]:
     """Start a program that waits when it is done, and end it afterwards."""
     running = []
 
@@ -24,6 +25,7 @@ def run():
         argv = [sys.executable, "-I", "-S", "-c", f"{code}\n{WAIT}"]
         process = subprocess.Popen(argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
         running.append(process)
+        assert process.stdout is not None
         process.stdout.read(1)
         return process
 
@@ -33,7 +35,7 @@ def run():
         process.communicate()
 
 
-def test_memory_is_what_is_filled_not_what_is_mapped(run):
+def test_memory_is_what_is_filled_not_what_is_mapped(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """A large empty mapping costs nothing; filled memory, also shared with nobody yet, counts."""
     nothing = usage([run("").pid]).memory_bytes
     mapped = usage([run("import mmap; m = mmap.mmap(-1, 1 << 30)").pid]).memory_bytes
@@ -44,20 +46,20 @@ def test_memory_is_what_is_filled_not_what_is_mapped(run):
     assert shared > nothing + 60 * MIB
 
 
-def test_processor_time_includes_ended_children(run):
+def test_processor_time_includes_ended_children(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """A program cannot hide its work in children that it has waited for."""
     work = "import time; t = time.process_time()\nwhile time.process_time() < t + 0.3: pass"
     parent = run(f"import subprocess, sys; subprocess.run([sys.executable, '-I', '-S', '-c', {work!r}])")
     assert usage([parent.pid]).processor_ns >= 0.25 * NS_PER_S
 
 
-def test_threads_are_counted(run):
+def test_threads_are_counted(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """Every one of them."""
     code = "import threading, time\nsleepers = [threading.Timer(99, print) for _ in range(5)]"
     assert usage([run(f"{code}\nfor s in sleepers: s.start()").pid]).threads == 6
 
 
-def test_a_halted_process_is_told(run):
+def test_a_halted_process_is_told(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """A signal that halts is not an end: nobody would ever hear of it again."""
     process = run("")
     assert not usage([process.pid]).halted
@@ -67,7 +69,7 @@ def test_a_halted_process_is_told(run):
     os.kill(process.pid, 18)
 
 
-def test_a_process_that_is_gone_uses_nothing():
+def test_a_process_that_is_gone_uses_nothing() -> None:
     """Between a search and a look anything may end."""
     with subprocess.Popen([sys.executable, "-I", "-S", "-c", ""]) as process:
         pass
@@ -75,7 +77,7 @@ def test_a_process_that_is_gone_uses_nothing():
     assert starved_ns([process.pid]) == 0
 
 
-def test_a_family_is_a_process_with_all_below_it(run):
+def test_a_family_is_a_process_with_all_below_it(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """Children of children belong to it, its siblings do not."""
     child = "import os, time; os.fork(); time.sleep(99)"
     code = f"import subprocess, sys\nc = subprocess.Popen([sys.executable, '-c', {child!r}])"
@@ -86,7 +88,7 @@ def test_a_family_is_a_process_with_all_below_it(run):
     assert families([first.pid, second.pid])[second.pid] == {second.pid}
 
 
-def test_waiting_for_a_processor_is_seen(run):
+def test_waiting_for_a_processor_is_seen(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
     """Two programs that want the same processor wait for each other."""
     work = "import os, time; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nwhile True: pass"
     code = f"import subprocess, sys\nc = [subprocess.Popen([sys.executable, '-c', {work!r}]) for _ in range(2)]"

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import pytest
 
 pytest.importorskip("rclpy")
 
-from scripted import FLOAT, INT, MS, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
+from scripted import FLOAT, INT, MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, numbers, plan
 
 from grader.core.limits import Limits
 from grader.core.trace import ClockKind, FaultKind
 from grader.execution import wall_runner as module
+from grader.execution.observer import Observer
 from grader.execution.plan import PlannedRecording
+from grader.execution.student_process import NodeProcess
 from grader.execution.wall_runner import WallRunner
 
 SILENT = {"kind": "silent"}
@@ -20,20 +24,20 @@ SILENT = {"kind": "silent"}
 class Clock:
     """Stands for the module `time`: each pause takes a millisecond, and holds up where a test says so."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.now_ns = 10**12
-        self.held_up = {}
+        self.held_up: dict[int, int] = {}
 
-    def monotonic_ns(self):
+    def monotonic_ns(self) -> int:
         return self.now_ns
 
-    def sleep(self, seconds):
+    def sleep(self, seconds: float) -> None:
         elapsed_ms = (self.now_ns - 10**12) // MS
         self.now_ns += self.held_up.pop(elapsed_ms, 1) * MS
 
 
 @pytest.fixture
-def clock(monkeypatch):
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
     monkeypatch.setattr(module, "time", made)
     return made
@@ -42,17 +46,19 @@ def clock(monkeypatch):
 class Run:
     """One run of some programs: its trace, and everybody who took part."""
 
-    def __init__(self, *programs, **fields):
+    def __init__(self, *programs: Behaviour, **fields: Any) -> None:
         self.world = World()
         self.students = [ScriptedStudent(n, p, self.world) for n, p in zip(("a.py", "b.py"), programs, strict=False)]
         self.observer = ScriptedObserver(self.world)
-        self.trace = WallRunner(plan(clock="wall", **fields), self.students, self.observer).run()
+        self.trace = WallRunner(
+            plan(clock="wall", **fields), cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
+        ).run()
 
 
-def publisher(topic, *, every_ms, first_ms=0, interface=FLOAT):
+def publisher(topic: str, *, every_ms: int, first_ms: int = 0, interface: str = FLOAT) -> Behaviour:
     """A program that publishes on a topic in the loops of the conductor, one a millisecond."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         world.have(me.name, claim("publisher", topic, interface))
         ms = 0
         while True:
@@ -64,20 +70,20 @@ def publisher(topic, *, every_ms, first_ms=0, interface=FLOAT):
     return program
 
 
-def quiet(me, world):
+def quiet(me: ScriptedStudent, world: World) -> Program:
     """A program that does nothing."""
     while True:
         yield SILENT
 
 
-def test_messages_get_the_time_at_which_they_came(clock):
+def test_messages_get_the_time_at_which_they_came(clock: Clock) -> None:
     """To the millisecond in which the conductor looks."""
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert [m.t_ns // MS for m in run.trace.messages("/cmd_vel")] == list(range(0, 1000, 50))
     assert (run.trace.clock, run.trace.stop_ns, run.trace.harness_problem) == (ClockKind.WALL, 1000 * MS, "")
 
 
-def test_the_span_begins_with_the_first_message(clock):
+def test_the_span_begins_with_the_first_message(clock: Clock) -> None:
     """A node that starts late is observed as long as one that starts at once."""
     run = Run(publisher("/cmd_vel", every_ms=50, first_ms=700), first_message_on="/cmd_vel")
     messages = run.trace.messages("/cmd_vel")
@@ -85,7 +91,7 @@ def test_the_span_begins_with_the_first_message(clock):
     assert len(messages) == 20
 
 
-def test_a_first_message_is_waited_for_as_long_as_virtually(clock):
+def test_a_first_message_is_waited_for_as_long_as_virtually(clock: Clock) -> None:
     """A timer of a long period shows its publisher's rate on either clock."""
     run = Run(
         publisher("/cmd_vel", every_ms=50, first_ms=5000), first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS
@@ -94,13 +100,13 @@ def test_a_first_message_is_waited_for_as_long_as_virtually(clock):
     assert Run(quiet, first_message_on="/cmd_vel", wait_at_most_ns=60_000 * MS).trace.stop_ns == 60_000 * MS
 
 
-def test_every_process_is_told_to_start(clock):
+def test_every_process_is_told_to_start(clock: Clock) -> None:
     """Once, and nothing more until the stop signal."""
     run = Run(quiet, quiet)
     assert [len(student.heard) for student in run.students] == [1, 1]
 
 
-def test_a_machine_that_did_not_keep_up_is_no_judge(clock):
+def test_a_machine_that_did_not_keep_up_is_no_judge(clock: Clock) -> None:
     """The reference is the loop itself: held up for long, it says nothing about the nodes."""
     clock.held_up = {300: 151}
     assert Run(quiet).trace.harness_problem.startswith("the machine was too busy")
@@ -108,10 +114,10 @@ def test_a_machine_that_did_not_keep_up_is_no_judge(clock):
     assert Run(quiet).trace.harness_problem == ""
 
 
-def test_numbers_are_published_when_they_are_due(clock):
+def test_numbers_are_published_when_they_are_due(clock: Clock) -> None:
     """In the type that the student's subscription asks for, as soon as it is seen."""
 
-    def program(me, world):
+    def program(me: ScriptedStudent, world: World) -> Program:
         world.have(me.name, claim("subscription", "/temperature", INT))
         yield from quiet(me, world)
 
@@ -122,7 +128,7 @@ def test_numbers_are_published_when_they_are_due(clock):
     assert [message.data for _, message in run.observer.published] == [26, 20]
 
 
-def test_a_recording_appears_plays_and_disappears(clock):
+def test_a_recording_appears_plays_and_disappears(clock: Clock) -> None:
     """The publisher is there exactly while it plays."""
     messages = tuple((t * MS, b"cdr", {"data": t}) for t in (200, 233, 266))
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, messages)
@@ -134,7 +140,7 @@ def test_a_recording_appears_plays_and_disappears(clock):
     ]
 
 
-def test_too_many_messages_end_the_run_with_a_mark(clock):
+def test_too_many_messages_end_the_run_with_a_mark(clock: Clock) -> None:
     """A flood is evidence enough."""
     trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=5)).trace
     assert len(trace.messages()) == 5
@@ -143,15 +149,15 @@ def test_too_many_messages_end_the_run_with_a_mark(clock):
     assert trace.stop_ns == mark.t_ns
 
 
-def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
+def test_ends_are_faults_and_the_run_ends_with_the_last(clock: Clock) -> None:
     """An exit with a fault, a death without a word, and what was written before."""
 
-    def leaves(me, world):
+    def leaves(me: ScriptedStudent, world: World) -> Program:
         yield {"kind": "note", "code": "main_not_called"}
         me.write("bye")
         yield {"kind": "exited", "code": 1, "fault": {"code": "exception", "type": "ValueError", "message": "x"}}
 
-    def dies(me, world):
+    def dies(me: ScriptedStudent, world: World) -> Program:
         yield {"kind": "fault", "fault": {"code": "exception", "type": "KeyError", "message": "in a thread"}}
         me.write("last words")
         yield None
@@ -167,14 +173,14 @@ def test_ends_are_faults_and_the_run_ends_with_the_last(clock):
     assert trace.stop_ns == 1000 * MS
 
 
-def test_the_graph_is_written_down_when_it_changed(clock):
+def test_the_graph_is_written_down_when_it_changed(clock: Clock) -> None:
     """Looked at now and then, since looking costs much."""
     run = Run(publisher("/cmd_vel", every_ms=50))
     assert len(run.trace.graphs()) == 1
     assert [e.topic for e in run.trace.graphs()[0].endpoints] == ["/cmd_vel"]
 
 
-def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock):
+def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock: Clock) -> None:
     """A publisher that goes at once takes with it what is still on its way."""
     recording = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 266 * MS + 1, ((200 * MS, b"cdr", {}),))
     gone = ("/odom", "", False)
@@ -182,14 +188,14 @@ def test_a_recording_s_publisher_stays_until_its_last_message_has_arrived(clock)
     assert Run(quiet, recordings=(recording,), duration_ns=700 * MS).observer.advertised[-1] == gone
 
 
-def test_a_node_that_floods_is_no_excuse(clock):
+def test_a_node_that_floods_is_no_excuse(clock: Clock) -> None:
     """What holds the machine up is then the node itself: it is judged, not let off."""
     clock.held_up = {300: 400}
     trace = Run(publisher("/cmd_vel", every_ms=1), limits=Limits(messages=500)).trace
     assert (trace.harness_problem, len(trace.messages("/cmd_vel"))) == ("", 500)
 
 
-def test_two_recordings_on_one_topic_do_not_end_each_other(clock):
+def test_two_recordings_on_one_topic_do_not_end_each_other(clock: Clock) -> None:
     """The first one's publisher, which stays for its last message, goes before the second one's comes."""
     first = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 200 * MS, 300 * MS, ((200 * MS, b"cdr", {}),))
     second = PlannedRecording("/odom", "nav_msgs/msg/Odometry", 400 * MS, 900 * MS, ((800 * MS, b"cdr", {}),))

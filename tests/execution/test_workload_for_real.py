@@ -1,6 +1,13 @@
 """Whatever holds a node up in reality sends it to the wall clock, and nothing else does; on real nodes."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import pytest
+
+from grader.core.trace import Trace
+from grader.execution.recording_session import RecordingSession
 
 pytest.importorskip("rclpy")
 
@@ -51,10 +58,10 @@ WORK = {
 
 
 @pytest.fixture
-def run(studio, tmp_path):
+def run(studio: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     tmp_path.chmod(0o755)
 
-    def run_one(harm, later, **fields):
+    def run_one(harm: str, later: str, **fields: Any) -> Trace:
         program = hostile(harm=harm, later=later)
         return record(
             studio, tmp_path / "s", program, **{"duration_ns": 3 * NS_PER_S, "stop_when_unfit": True, **fields}
@@ -64,16 +71,18 @@ def run(studio, tmp_path):
 
 
 @pytest.mark.parametrize(("once", "later"), WAITS.values(), ids=WAITS)
-def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(run, once, later):
+def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
+    run: Callable[..., Trace], once: str, later: str
+) -> None:
     assert run(once, later).clock_reason == OUTSIDE
 
 
 @pytest.mark.parametrize(("once", "later"), WORK.values(), ids=WORK)
-def test_long_computing_is_for_the_wall_clock(run, once, later):
+def test_long_computing_is_for_the_wall_clock(run: Callable[..., Trace], once: str, later: str) -> None:
     assert run(once, later).clock_reason == BUSY
 
 
-def test_a_rare_block_that_delays_other_timers_is_noticed(run):
+def test_a_rare_block_that_delays_other_timers_is_noticed(run: Callable[..., Trace]) -> None:
     """200 ms once a second: three of twenty messages a second would come late."""
     assert run("", "if self.count % 20 == 0: __import__('ctypes').CDLL(None).usleep(200_000)").clock_reason == OUTSIDE
 
@@ -92,12 +101,14 @@ COMPUTING = "import hashlib\nhashlib.pbkdf2_hmac('sha256', b'x', b'y', 20_000)"
 
 
 @pytest.mark.parametrize(("once", "later"), [(LOOP, COMPUTING), ("", AGAIN.format(COMPUTING))], ids=["loop", "again"])
-def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(run, once, later):
+def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(
+    run: Callable[..., Trace], once: str, later: str
+) -> None:
     """Ten milliseconds fit between two ticks of a timer; a pause is counted from their end."""
     assert run(once, later).clock_reason == BUSY
 
 
-def test_work_before_a_deadline_puts_off_nothing(run):
+def test_work_before_a_deadline_puts_off_nothing(run: Callable[..., Trace]) -> None:
     """A loop that sleeps until its next moment makes up for its work, on either clock."""
     until = LOOP.replace("def run():\n", "def run():\n    due = time.monotonic()\n")
     until = until.replace("time.sleep(0.05)", "due += 0.05\n        time.sleep(max(0.0, due - time.monotonic()))")
@@ -120,12 +131,14 @@ threading.Thread(target=run, daemon=True).start()
 
 
 @pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(3_000_000))", BUSY)], ids=["polls", "works"])
-def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(run, later, reason):
+def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(
+    run: Callable[..., Trace], later: str, reason: str
+) -> None:
     """On a real clock a busy loop polls as often as there is time for, and is late by what it computes only."""
     assert run(POLLS, later).clock_reason == reason
 
 
-def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
+def test_a_loop_that_only_publishes_stays_in_virtual_time(run: Callable[..., Trace]) -> None:
     assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
 
 
@@ -139,12 +152,12 @@ def test_a_loop_that_only_publishes_stays_in_virtual_time(run):
         "open(__file__).read()",
     ],
 )
-def test_ordinary_nodes_stay_in_virtual_time(run, later):
+def test_ordinary_nodes_stay_in_virtual_time(run: Callable[..., Trace], later: str) -> None:
     trace = run("", later)
     assert trace.clock_reason == ""
     assert len(trace.messages("/cmd_vel")) >= 59
 
 
-def test_a_slow_start_delays_nothing(run):
+def test_a_slow_start_delays_nothing(run: Callable[..., Trace]) -> None:
     """What a node does before it first waits is no lateness."""
     assert run("end = os.times().user + 1.5\nwhile os.times().user < end: pass", "").clock_reason == ""
