@@ -20,10 +20,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from grader.core.errors import EnvironmentFault
-from grader.execution.ros_installation import RosInstallation, find_ros
+from grader.execution.codec import from_json, to_json
+from grader.execution.ros_installation import PythonRuntime, RosInstallation, find_ros
 from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.environment import quick_discovery, runtime_environment
-from grader.execution.sandbox.protocol import Limits, StudentProcess, runtime_from_json, runtime_to_json
+from grader.execution.sandbox.protocol import Limits, StudentProcess
 from grader.execution.sandbox.starting import HOST
 from grader.execution.sandbox.tiers import WALLED, isolation_from_name
 
@@ -39,7 +40,7 @@ os._exit(0)
 def inside(request: dict[str, object]) -> None:
     """Start one node for every line on standard input, as the worker of a tier, and print the seconds it took."""
     isolation = isolation_from_name(str(request["isolation"]))
-    runtime = runtime_from_json(request["runtime"])
+    runtime = from_json(PythonRuntime, request["runtime"])
     for _ in sys.stdin:
         begun = time.perf_counter()
         process = StudentProcess(
@@ -68,7 +69,7 @@ def inside(request: dict[str, object]) -> None:
 @contextlib.contextmanager
 def worker(name: str, ros: RosInstallation, submission: str) -> Iterator[subprocess.Popen[str]]:
     """Start the worker of a tier."""
-    request = {"isolation": name, "runtime": runtime_to_json(ros.runtime), "submission": submission}
+    request = {"isolation": name, "runtime": to_json(ros.runtime), "submission": submission}
     argv = (str(ros.runtime.executable), "-s", "-B", str(Path(__file__).resolve()), "inside", json.dumps(request))
     paths = [*map(str, ros.runtime.python_paths), str(HOST.parents[1])]
     environment = {**runtime_environment(ros.runtime), "PYTHONPATH": ":".join(paths), "HOME": submission}

@@ -54,8 +54,8 @@ def main() -> None:
             several = folders * count
             for folder, found in zip(several, pool.map(outcome, several), strict=True):
                 seen[folder.name][found] += 1
-    for name, found in seen.items():
-        print(f"{name:28} {'identical' if len(found) == 1 else 'DIFFERENT'} {dict(found)}", flush=True)
+    for name, reports in seen.items():
+        print(f"{name:28} {'identical' if len(reports) == 1 else 'DIFFERENT'} {dict(reports)}", flush=True)
 
 
 if __name__ == "__main__":
