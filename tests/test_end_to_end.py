@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
+from grading import grade_until_decided, say_nothing
 
 from grader.app.grade import grade
 from grader.app.request import GradeRequest
@@ -21,10 +22,6 @@ UNSTEADY = ("broken/loops_in_callback", "broken/loops_in_constructor", "broken/e
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 pytestmark = pytest.mark.ros
-
-
-def say_nothing(step):
-    del step
 
 
 def reasons(report):
@@ -53,7 +50,7 @@ def live():
 def test_a_submission_gets_what_it_is_worth(folder):
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = expected()[folder]
-    report = grade(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
+    report = grade_until_decided(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED))
     assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.
@@ -71,7 +68,7 @@ def test_the_reference_solutions_score_full_on_the_virtual_clock():
 
 def test_the_template_runs_and_earns_nothing_yet():
     """The baseline of the skeletons: no crash, no point, nothing undecided."""
-    report = grade(GradeRequest(str(ROOT / "student_template")), say_nothing)
+    report = grade_until_decided(GradeRequest(str(ROOT / "student_template")))
     assert (report.score, report.final) == (0, True)
     assert [fault for exercise in report.exercises for fault in exercise.faults] == []
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from grading import grade_until_decided, say_nothing
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
 from grader.core.report import Report
@@ -145,7 +145,7 @@ def test_the_draw_repeats_and_has_the_share_asked_for():
 # --- for real ---
 
 
-def graded(tmp_path: Path, file: Path, hear=lambda step: None, **options: object) -> Report:
+def graded(tmp_path: Path, file: Path, hear=say_nothing, **options: object) -> Report:
     """Grade a file as a velocity publisher that is watched for three seconds."""
     folder = tmp_path / "submission"
     folder.mkdir(exist_ok=True)
@@ -153,7 +153,7 @@ def graded(tmp_path: Path, file: Path, hear=lambda step: None, **options: object
     rubric = tmp_path / "rubric.yaml"
     text = (HERE.parents[1] / "rubrics" / "exercise_1.yaml").read_text(encoding="utf-8")
     rubric.write_text(text.replace("10 s", "3 s").replace("60 s", "3 s"), encoding="utf-8")
-    return grade(GradeRequest(str(folder), rubrics=(rubric,), **options), hear, pictures=False)
+    return grade_until_decided(GradeRequest(str(folder), rubrics=(rubric,), **options), hear)
 
 
 @pytest.mark.ros
