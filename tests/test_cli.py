@@ -321,7 +321,8 @@ CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
 from cli_samples import a_report
-from grader import cli, session
+from grader.app import grade as session
+from grader.cli import main
 def grade(request, progress, hear=None, early=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
@@ -396,7 +397,7 @@ def test_a_terminal_sees_progress_and_colours() -> None:
 def test_help_starts_light() -> None:
     """Neither rich nor pydantic nor ROS is imported before they are needed."""
     code = (
-        "import sys\nfrom grader import cli\n"
+        "import sys\nfrom grader.cli import main\n"
         "try: main.app(['--help'])\nexcept SystemExit: pass\n"
         "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy'}\n"
         "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from _pytest.mark import ParameterSet
 from archive import SEED, SUBMISSIONS, expected, golden, outcomes, told
+from grading import grade_until_decided, say_nothing
 
 from grader.app.grade import grade
 from grader.app.request import GradeRequest
@@ -25,10 +26,6 @@ UNSTEADY = ("broken/loops_in_callback", "broken/loops_in_constructor", "broken/e
 GRADE = str(Path(sys.executable).with_name("grade"))
 
 pytestmark = pytest.mark.ros
-
-
-def say_nothing(step: str) -> None:
-    del step
 
 
 def reasons(report: Report) -> dict[str, str]:
@@ -57,7 +54,7 @@ def live() -> Iterator[ParameterSet]:
 def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""
     wanted = expected()[folder]
-    report = grade(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED), say_nothing)
+    report = grade_until_decided(GradeRequest(str(SUBMISSIONS / folder), exercises=tuple(wanted["graded"]), seed=SEED))
     assert outcomes(report) == wanted["expected"], reasons(report)
     steady = folder not in UNSTEADY and all(exercise.clock.value == "virtual" for exercise in report.exercises)
     # The exception of this one is raised inside rclpy, in the words of the release.
@@ -75,7 +72,7 @@ def test_the_reference_solutions_score_full_on_the_virtual_clock() -> None:
 
 def test_the_template_runs_and_earns_nothing_yet() -> None:
     """The baseline of the skeletons: no crash, no point, nothing undecided."""
-    report = grade(GradeRequest(str(ROOT / "student_template")), say_nothing)
+    report = grade_until_decided(GradeRequest(str(ROOT / "student_template")))
     assert (report.score, report.final) == (0, True)
     assert [fault for exercise in report.exercises for fault in exercise.faults] == []
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from grading import grade_until_decided, say_nothing
 
-from grader.app.grade import Progress, grade
+from grader.app.grade import Progress
 from grader.app.request import GradeRequest
 from grader.app.spot_checks import SpotChecks, check, is_drawn, shortened
 from grader.core.report import Report
@@ -154,7 +155,7 @@ def test_the_draw_repeats_and_has_the_share_asked_for() -> None:
 # --- for real ---
 
 
-def graded(tmp_path: Path, file: Path, hear: Progress = lambda step: None, **options: Any) -> Report:
+def graded(tmp_path: Path, file: Path, hear: Progress = say_nothing, **options: Any) -> Report:
     """Grade a file as a velocity publisher that is watched for three seconds."""
     folder = tmp_path / "submission"
     folder.mkdir(exist_ok=True)
@@ -162,7 +163,7 @@ def graded(tmp_path: Path, file: Path, hear: Progress = lambda step: None, **opt
     rubric = tmp_path / "rubric.yaml"
     text = (HERE.parents[1] / "rubrics" / "exercise_1.yaml").read_text(encoding="utf-8")
     rubric.write_text(text.replace("10 s", "3 s").replace("60 s", "3 s"), encoding="utf-8")
-    return grade(GradeRequest(str(folder), rubrics=(rubric,), **options), hear, pictures=False)
+    return grade_until_decided(GradeRequest(str(folder), rubrics=(rubric,), **options), hear)
 
 
 @pytest.mark.ros

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from grading import grade_until_decided
 from ruamel.yaml import YAML
 
-from grader.app.grade import grade
 from grader.app.request import GradeRequest
 from grader.app.seeds import SeedKey
 from grader.classroom.intake import take_in
@@ -53,7 +53,7 @@ def test_a_program_gets_what_it_is_worth(program: Mapping[str, Any]) -> None:
     """What a process says about itself is no evidence, and nothing that it did is lost."""
     clock = program.get("decided", "auto")
     request = GradeRequest(str(HERE / program["folder"]), exercises=(program["exercise"],), seed_key=KEY, clock=clock)
-    report = grade(request, lambda _step: None, pictures=False)
+    report = grade_until_decided(request)
     verdicts = [v for exercise in report.exercises for v in exercise.verdicts]
     found = {v.id: v.outcome.value for v in verdicts if v.outcome.value != "met"}
     assert found == program["expected"], {v.id: v.reason for v in verdicts}

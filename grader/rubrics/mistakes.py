@@ -80,7 +80,8 @@ def _mistake(one: Any, tree: YamlTree, model: type[BaseModel]) -> Mistake:
         return where.mistake(f"expected the key `{name}`{_inside(path)}, found none")
     if kind == "extra_forbidden":
         keys = _keys(model, path[:-1])
-        text = f"expected {listed([f'`{key}`' for key in keys])}{_inside(path[:-1])}, found `{shown(name)}`"
+        expected = listed([f"`{key}`" for key in keys]) if keys else "no such key"
+        text = f"expected {expected}{_inside(path[:-1])}, found `{shown(name)}`"
         return tree.keys.get(path, where).mistake(text, nearest(name, keys))
     if kind == "literal_error":
         options = str(one["ctx"]["expected"]).replace("'", "`")
@@ -124,4 +125,5 @@ def _first(annotation: Any, wanted: Callable[[Any], bool]) -> Any:
     """Return the first part of an annotation that is wanted, outside in."""
     if wanted(annotation):
         return annotation
+    annotation = getattr(annotation, "__value__", annotation)  # an alias of a type
     return next((hit for inner in get_args(annotation) if (hit := _first(inner, wanted))), None)

@@ -109,7 +109,7 @@ def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch
         pytest.skip(fault.message)
     assert byte_code(ros.runtime).value == "up to date", "in the environment that .ci/setup made"
     monkeypatch.setattr(byte_code_module, "compile_own", lambda: None)
-    stale = Path(importlib.util.cache_from_source(str(PACKAGE / "core" / "errors.py")))
+    stale = Path(importlib.util.cache_from_source(str(PACKAGE / "student_host" / "launcher.py")))
     kept = stale.read_bytes()
     try:
         stale.write_bytes(b"")

@@ -122,6 +122,7 @@ CUT = "so that every case comes whatever is drawn, found"
         (CALLS % "calls: |{between: [0, 2]}", "expected two whole numbers from 1 to 1,000", ""),
         (CALLS % "start: |{between: [1 s, 20 s]}", "expected a start before the end of `observe`", ""),
         (SERVER % "responses: [|{any_ordr: [{success: true}]}]", "expected a case, `any_order`", "`any_order`?"),
+        (SERVER % "responses: [{message: {choose: [x], |txt: {}}}]", "expected `between`, `choose`, `text`", "`text`?"),
         (
             (NUMBERS % "values: [{any_order: [1, 2, 3]}], hold: {between: [5 s, 7 s]}, start: 1 s").replace(
                 "20", "|20"
