@@ -21,8 +21,7 @@ from grader.execution.sandbox import properties as remedies
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
 from grader.execution.sandbox.memory import Memory
-from grader.execution.sandbox.plain import Plain
-from grader.execution.sandbox.tiers import isolation_from_name
+from grader.execution.sandbox.tiers import Plain, isolation_from_name
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "from grader.cli.main import main; main()"
@@ -88,7 +87,7 @@ def test_the_strongest_tier_that_holds_is_taken(tested, ros):
 @pytest.mark.parametrize("name", REQUIRED)
 def test_without_a_required_property_auto_refuses(tested, ros, name):
     """Whichever it is; the tiers, what they lack and what to do are told."""
-    for tier in choose.WALLED:
+    for tier in choose.ISOLATING:
         tested[1][tier] = report(tier, without(name), usable=False, why=f"{name} NOT CONTAINED")
     with pytest.raises(EnvironmentFault, match=f"landlock: not contained: {name}") as refused:
         choose_isolation("auto", ros)
@@ -105,7 +104,7 @@ def test_what_is_not_required_is_told_and_not_refused(tested, ros, name):
 
 def test_a_tier_asked_for_by_name_must_keep_its_promises(tested, ros, cache):
     """Landlock promises nothing about the network that it was given; every other tier does."""
-    for tier in choose.WALLED:
+    for tier in choose.ISOLATING:
         tested[1][tier] = report(tier, without("net_egress"), usable=False, why="net_egress NOT CONTAINED")
     assert choose_isolation("landlock", ros).isolation == "landlock"
     with pytest.raises(EnvironmentFault, match=r"bubblewrap-flat: .*net_egress"):
@@ -135,7 +134,7 @@ def test_a_self_test_is_made_once(tested, ros):
     assert choose_isolation("auto", ros) == choose_isolation("auto", ros)
     assert asked == ["bubblewrap-root"]
     assert [found.name for found in inspect_tiers(ros)] == list(TIERS)
-    assert asked == ["bubblewrap-root", *choose.WALLED]
+    assert asked == ["bubblewrap-root", *choose.ISOLATING]
 
 
 def test_a_failed_self_test_is_made_again(tested, ros):
@@ -408,7 +407,7 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", choose.WALLED)
+@pytest.mark.parametrize("name", choose.ISOLATING)
 def test_right_solutions_score_full_under_every_tier(ros, tmp_path, name):
     """In virtual time, with the same verdicts; the report names the tier and what it contains."""
     found = walls(name, ros, tmp_path)

@@ -33,7 +33,7 @@ from grader.core.trace import (
     Start,
     Trace,
 )
-from grader.execution.codec import FORMAT, WORDS, trace_to_json
+from grader.execution.codec import FORMAT, TAGS, trace_to_json
 
 #: Shorter values take less as the dict they are; a longer one may hold a number that no decoder takes.
 _SHORTEST, _LONGEST = 64, 4_000
@@ -123,8 +123,8 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
         [*fields_, *([last] if last else [])],
         array_like=True,
         forbid_unknown_fields=True,
-        tag=WORDS.get(kind),
-        tag_field="is" if kind in WORDS else None,
+        tag=TAGS.get(kind),
+        tag_field="is" if kind in TAGS else None,
     )
 
 
