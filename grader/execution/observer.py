@@ -219,9 +219,11 @@ class Observer:
         for (topic, interface, _), reader in sorted(self._readers.items()):
             with reader.handle:
                 for _ in range(at_once):
-                    if left_bytes <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa:
-                    FBT003 break left_bytes -= len(found[0]) taken.append(self._decoded(topic, interface,
-                    reader.msg_type, found[0])) return taken
+                    if left_bytes <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
+                        break
+                    left_bytes -= len(found[0])
+                    taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
+        return taken
 
     def take_rest(self) -> list[Taken]:
         """Take the messages that are still in transit from a process that died."""
@@ -247,10 +249,12 @@ class Observer:
         """Take the log records that have been published since the last call, without malformed ones."""
         found: list[Logged] = []
         with self._logs.handle:
-            while len(found) < AT_ONCE and (taken := self._logs.handle.take_message(self._logs.msg_type, True)):  #
-            noqa: FBT003 with contextlib.suppress(Exception):  # whatever bytes a student's node sends log =
-            deserialize_message(taken[0], self._logs.msg_type) at = log.stamp.sec, log.stamp.nanosec
-            found.append(Logged(*at, log.name, log.msg[:TEXT_CHARACTERS], log.file, log.line)) return found
+            while len(found) < AT_ONCE and (taken := self._logs.handle.take_message(self._logs.msg_type, True)):  # noqa: FBT003
+                with contextlib.suppress(Exception):  # whatever bytes a student's node sends
+                    log = deserialize_message(taken[0], self._logs.msg_type)
+                    at = log.stamp.sec, log.stamp.nanosec
+                    found.append(Logged(*at, log.name, log.msg[:TEXT_CHARACTERS], log.file, log.line))
+        return found
 
     def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:
         if len(cdr) > self._limits.message_bytes:

@@ -1,4 +1,4 @@
-"""The line to the grader: one JSON object a line over an inherited socket, the host's report first, then an answer."""
+"""The connection to the grader: JSON lines over an inherited socket; the host sends a report, the grader answers."""
 
 import json
 import socket
@@ -8,7 +8,7 @@ from . import originals
 
 
 class Link:
-    """The host's end of the line.
+    """The host's end of the connection.
 
     Args:
         descriptor: Number of the inherited socket.
@@ -22,18 +22,18 @@ class Link:
         self._cut = False
 
     def send(self, report: dict[str, Any]) -> None:
-        """Send one report; a lost line ends the process, as there is nobody left to run for."""
+        """Send one report; raises OSError if the grader is gone, which ends the process."""
         line = json.dumps(report).encode() + b"\n"
         with self._sending:
             if not self._cut:
                 self._socket.sendall(line)
 
     def is_free(self) -> bool:
-        """Return whether nobody is sending at this moment."""
+        """Return whether no thread is sending at this moment."""
         return not self._sending.locked()
 
     def cut(self) -> None:
-        """Say nothing any more: a forked process is none that the grader knows."""
+        """Close the connection in a forked process, which the grader does not know."""
         self._cut = True
         self._lines.close()
         self._socket.close()
@@ -44,7 +44,7 @@ class Link:
         return self.next_answer()
 
     def next_answer(self) -> dict[str, Any]:
-        """Wait for what the grader says next; raises ConnectionError if it is gone."""
+        """Wait for the grader's next answer; raises ConnectionError if the grader is gone."""
         line = self._lines.readline()
         if not line:
             raise ConnectionError("the grader is gone")
