@@ -1,4 +1,4 @@
-"""Nanoseconds and comparisons: how time is counted and how numbers are compared everywhere."""
+"""Units of time and size, comparisons of numbers, and the kinds of values that rubrics write in their own forms."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -60,3 +60,24 @@ Bytes = Annotated[int, Unit("B")]
 DurationNs = Annotated[int, Unit("s")]
 #: A frequency; written in rubrics as `20 Hz`.
 Hertz = Annotated[float, Unit("Hz")]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Marks an annotated value whose form in rubrics has rules of its own."""
+
+    name: str
+
+
+#: An absolute topic, service or node name.
+Topic = Annotated[str, Kind("topic")]
+#: A message type such as `std_msgs/msg/Float32`.
+MessageType = Annotated[str, Kind("message type")]
+#: A service type such as `std_srvs/srv/Trigger`.
+ServiceType = Annotated[str, Kind("service type")]
+#: An action type such as `example_interfaces/action/Fibonacci`.
+ActionType = Annotated[str, Kind("action type")]
+#: A formula of `n` and `t` such as `sin(0.1 * n)`.
+Formula = Annotated[str, Kind("formula")]
+#: A regular expression.
+Pattern = Annotated[str, Kind("pattern")]

@@ -1,4 +1,4 @@
-"""Reports: the judged result of a submission, ready to be shown; version 1 of the report format."""
+"""Everything that is shown to people: reports (format version 1), summaries of what nodes did, and explanations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from grader.core.chart import Excerpt, Figure
 from grader.core.checkup import Property
 from grader.core.exercise import Feedback, Location, Outcome, Problem, Variant
-from grader.core.trace import ClockKind, GraphSnapshot, Start
+from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 
 SCHEMA = "grader/report/v1"
 #: How the reason of a criterion begins that waits for another one.
@@ -204,3 +204,151 @@ class Report:
     def all_met(self) -> bool:
         """Whether every criterion is fully met."""
         return all(v.outcome is Outcome.MET for e in self.exercises for v in e.verdicts)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How often messages came, as `ros2 topic hz` says it; times in seconds.
+
+    Attributes:
+        rate_hz: (n - 1) / (t_last - t_first).
+        min_s: Shortest interval.
+        max_s: Longest interval.
+        std_dev_s: Standard deviation of the intervals.
+    """
+
+    rate_hz: float
+    min_s: float
+    max_s: float
+    std_dev_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TopicSummary:
+    """One topic of the students' nodes.
+
+    Attributes:
+        name: Absolute name.
+        types: Message types seen on it.
+        publishers: Its publishers, in order of appearance.
+        subscriptions: Its subscriptions, in order of appearance.
+        messages: How many messages the nodes published on it.
+        first_s: When the first one came; None if none came.
+        pace: None for fewer than two messages at different times.
+        ranges: Numeric field, dotted -> least and greatest value.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    publishers: tuple[Endpoint, ...]
+    subscriptions: tuple[Endpoint, ...]
+    messages: int
+    first_s: float | None
+    pace: Pace | None
+    ranges: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What nodes did.
+
+    Attributes:
+        processes: Names of the files that ran.
+        clock: Which clock they ran on.
+        clock_reason: Why virtual time does not do them justice; empty if it does.
+        duration_s: How long they were observed.
+        nodes: Node names, sorted.
+        topics: Sorted by name.
+        offers: Services, clients and parameters, as the processes say.
+        records: Log records, in order.
+        lines: Other output, in order.
+        faults: In order.
+        notes: Sentences a reader must know.
+        graph: The richest snapshot of the graph, if there is any.
+        isolation: The sandbox tier.
+        starts: How each file was started.
+    """
+
+    processes: tuple[str, ...]
+    clock: ClockKind
+    clock_reason: str
+    duration_s: float
+    nodes: tuple[str, ...]
+    topics: tuple[TopicSummary, ...]
+    offers: tuple[Offer, ...]
+    records: tuple[LogRecord, ...]
+    lines: tuple[OutputLine, ...]
+    faults: tuple[Fault, ...]
+    notes: tuple[str, ...]
+    graph: GraphSnapshot | None
+    isolation: str
+    starts: tuple[Start, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a check.
+
+    Attributes:
+        name: As in rubrics.
+        value: As a rubric writes it; empty where there is none.
+        meaning: What the manual says of it.
+        required: Whether a rubric has to give it.
+    """
+
+    name: str
+    value: str
+    meaning: str
+    required: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CheckExplanation:
+    """What a check asks of a recording, whatever rubric uses it.
+
+    Attributes:
+        name: As in rubrics.
+        asks: What it asks, in one sentence or two.
+        details: How it measures that; may be empty.
+        parameters: In order, with their defaults.
+        used_by: Criteria that ask it, as `exercise/criterion`.
+    """
+
+    name: str
+    asks: str
+    details: str
+    parameters: tuple[Parameter, ...]
+    used_by: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionExplanation:
+    """What a criterion asks of a submission.
+
+    Attributes:
+        id: Criterion id.
+        title: Criterion title.
+        exercise: Number, title and id of its exercise.
+        points: Points to be had.
+        chapter: Which part of the chapter asks for it; empty if none does.
+        needs: Criteria that must be met first.
+        hint: What its rubric tells a student who did not meet it.
+        situation: What runs, for how long, and what is published meanwhile.
+        check: Name of the check.
+        asks: What the check asks.
+        details: How the check measures that.
+        parameters: With the values of the rubric.
+    """
+
+    id: str
+    title: str
+    exercise: str
+    points: Fraction
+    chapter: str
+    needs: tuple[str, ...]
+    hint: str
+    situation: str
+    check: str
+    asks: str
+    details: str
+    parameters: tuple[Parameter, ...]
