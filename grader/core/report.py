@@ -13,28 +13,28 @@ from grader.core.exercise import Feedback, Location, Outcome, Problem, Variant
 from grader.core.trace import ClockKind, Endpoint, Fault, GraphSnapshot, LogRecord, Offer, OutputLine, Start
 
 SCHEMA = "grader/report/v1"
-#: How the reason of a criterion begins that waits for another one.
+#: Prefix of the reason of a criterion that is blocked by another one.
 NOT_JUDGED = "not judged: "
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What one criterion came to.
+    """The result of one criterion.
 
     Attributes:
         id: Criterion id.
         title: Criterion title.
         outcome: See Outcome.
         score: Points earned.
-        max_score: Points to be had.
+        max_score: Maximum points.
         reason: One sentence, no markup.
         hint: One thing to do; empty if there is none.
         location: Place in the student's file.
         evidence: Plain JSON values.
         blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
-        missing_file: The missing file that both need, where that is why; empty otherwise.
+        missing_file: The missing file that both need, if that is the reason; empty otherwise.
         same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
-        problem: What its check found wrong, for diagnosis; no report shows this.
+        problem: The problem that its check found, for diagnosis; not shown in reports.
     """
 
     id: str
@@ -67,7 +67,7 @@ class ReportedFault:
 
 @dataclass(frozen=True, slots=True)
 class ExerciseReport:
-    """One exercise's part of a report.
+    """The part of a report on one exercise.
 
     Attributes:
         id: Exercise id.
@@ -75,18 +75,18 @@ class ExerciseReport:
         title: Exercise title.
         required: Whether the chapter requires it.
         clock: The wall clock if any of its scenarios ran on it.
-        clock_reason: Why it was not the virtual one; empty if it was.
+        clock_reason: Why it was not the virtual clock; empty if it was.
         verdicts: In rubric order.
         faults: In order of scenario and time.
-        notes: Sentences a reader must know.
-        graph: The live graph that the exercise is about, if one was recorded with all its processes.
-        figures: Pictures of what the nodes did; reports of plain text and data leave them out.
+        notes: Sentences that readers must know.
+        graph: The ROS graph of the exercise, if one was recorded with all its processes.
+        figures: Charts of what the nodes did; left out in plain-text and data formats.
         excerpts: The source around the places that verdicts and faults name.
-        expected: Criterion id -> what it asks for, in one phrase.
-        feedback: Criterion id -> how much of its result a student is shown; no report shows this.
-        situations: Criterion id -> scenario that it is judged on; no report shows this.
-        variant: The values that were this student's own; None if there are none.
-        starts: How each file was started; empty in reports on kept evidence of earlier versions.
+        expected: Criterion id -> what it requires, in one phrase.
+        feedback: Criterion id -> how much of its result a student sees; not shown in reports.
+        situations: Criterion id -> scenario that it is judged on; not shown in reports.
+        variant: The values of this student's variant; None if there are none.
+        starts: How each file was started; empty in reports on evidence of earlier versions.
     """
 
     id: str
@@ -120,7 +120,7 @@ class ExerciseReport:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What a report was made with.
+    """The software that a report was made with.
 
     Attributes:
         grader: Version of the grader.
@@ -128,8 +128,8 @@ class Environment:
         rclpy: Version of rclpy.
         rmw: The middleware.
         python: Version of Python.
-        isolation: Name of the sandbox tier; `none` without walls.
-        containment: What the tier held back, as the self-test found it; empty without walls.
+        isolation: Name of the sandbox tier; `none` without a sandbox.
+        containment: What the self-test found the tier to prevent; empty without a sandbox.
     """
 
     grader: str
@@ -143,10 +143,10 @@ class Environment:
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What gives a report again, with the versions of its environment and its seed.
+    """What is needed to reproduce a report, besides the versions of its environment and its seed.
 
     Attributes:
-        command: Its words, before a shell's quoting; empty if the report came from no command.
+        command: The arguments of the command, before shell quoting; empty if no command made the report.
         rubrics: Exercise id and digest of its rubric, in the order graded.
         recording: Digest of the /odom recording that was played; empty if none was.
     """
@@ -165,13 +165,13 @@ class Report:
         path: Where it came from, as the user typed it.
         digest: Submission digest.
         environment: What it was made with.
-        seed: The seed of every drawn value, printed so that a run can be repeated; None where a reader is not told.
+        seed: The seed of every drawn value, printed so that a run can be repeated; None if it is not shown.
         exercises: In the order graded.
-        duration_s: Wall time of the run; the only figure that differs between two runs.
-        notes: Sentences about the intake.
-        reproduce: What gives this report again.
-        pending: Ids of the exercises that were still to be graded when the report was made; their criteria are
-            undecided. Empty for a whole report.
+        duration_s: Wall time of the run; the only value that differs between two runs.
+        notes: Sentences about the submission's files.
+        reproduce: How to reproduce this report.
+        pending: Ids of the exercises that were not graded yet when the report was made; their criteria are undecided.
+            Empty for a complete report.
     """
 
     name: str
@@ -208,7 +208,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How often messages came, as `ros2 topic hz` says it; times in seconds.
+    """The rate of messages, as `ros2 topic hz` prints it; times in seconds.
 
     Attributes:
         rate_hz: (n - 1) / (t_last - t_first).
@@ -250,12 +250,12 @@ class TopicSummary:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What nodes did.
+    """What nodes did in one scenario, without a rubric and without a mark.
 
     Attributes:
         processes: Names of the files that ran.
         clock: Which clock they ran on.
-        clock_reason: Why virtual time does not do them justice; empty if it does.
+        clock_reason: Why virtual time is not suitable for them; empty if it is.
         duration_s: How long they were observed.
         nodes: Node names, sorted.
         topics: Sorted by name.
