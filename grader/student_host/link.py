@@ -1,10 +1,18 @@
-"""The connection to the grader: JSON lines over an inherited socket; the host sends a report, the grader answers."""
+"""The channels to the grader: JSON lines over an inherited socket, and log records marked by a token.
+
+On the socket the host sends a report, and the grader answers.
+"""
+
+from __future__ import annotations
 
 import json
+import os
 import socket
 from typing import Any
 
 from . import originals
+
+_LOG_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 
 
 class Link:
@@ -50,3 +58,37 @@ class Link:
             raise ConnectionError("the grader is gone")
         answer: dict[str, Any] = json.loads(line)
         return answer
+
+
+class Log:
+    """The logging library of this process, set up so that a token marks its records.
+
+    A program cannot write records itself, because it does not know the token.
+
+    Args:
+        log_format: The format of records; `{token}` stands for the token.
+
+    Attributes:
+        token: Random for each process; empty once the library has it.
+    """
+
+    def __init__(self, log_format: str) -> None:
+        self.token = originals.urandom(16).hex()
+        self._format = log_format
+
+    def open(self) -> None:
+        """Make the library read the format, once.
+
+        The environment variable is removed afterwards: neither the student's program nor its children can read it.
+        """
+        import rclpy.logging
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+
+        os.putenv(_LOG_FORMAT_VARIABLE, self._format.replace("{token}", self.token))
+        try:
+            rclpy.logging.initialize()
+        finally:
+            os.unsetenv(_LOG_FORMAT_VARIABLE)
+            self.token = ""
+        # Logging continues after a shutdown, but would read the environment again.
+        rclpy_implementation.rclpy_logging_shutdown = lambda: None

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import entry, originals
 from .faults import Describer
-from .link import Link
+from .link import Link, Log
 from .outside import install_alarms, install_processes
 from .shadows import install_stand_ins
 from .virtual import VirtualTime
@@ -26,8 +26,6 @@ from .watchdog import Watchdog
 
 if TYPE_CHECKING:
     from .wall import WallTime
-
-_LOG_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 
 
 def run(request: dict[str, Any]) -> None:
@@ -73,40 +71,6 @@ def run(request: dict[str, Any]) -> None:
     flush()
     link.send({"kind": "exited", "left": left, **ending, **time.summary()})
     originals.exit_now(0)
-
-
-class Log:
-    """The logging library of this process, set up so that a token marks its records.
-
-    A program cannot write records itself, because it does not know the token.
-
-    Args:
-        log_format: The format of records; `{token}` stands for the token.
-
-    Attributes:
-        token: Random for each process; empty once the library has it.
-    """
-
-    def __init__(self, log_format: str) -> None:
-        self.token = originals.urandom(16).hex()
-        self._format = log_format
-
-    def open(self) -> None:
-        """Make the library read the format, once.
-
-        The environment variable is removed afterwards: neither the student's program nor its children can read it.
-        """
-        import rclpy.logging
-        from rclpy.impl.implementation_singleton import rclpy_implementation
-
-        os.putenv(_LOG_FORMAT_VARIABLE, self._format.replace("{token}", self.token))
-        try:
-            rclpy.logging.initialize()
-        finally:
-            os.unsetenv(_LOG_FORMAT_VARIABLE)
-            self.token = ""
-        # Logging continues after a shutdown, but would read the environment again.
-        rclpy_implementation.rclpy_logging_shutdown = lambda: None
 
 
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
