@@ -26,7 +26,7 @@ from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.environment import quick_discovery, runtime_environment
 from grader.execution.sandbox.protocol import Limits, StudentProcess
 from grader.execution.sandbox.starting import HOST
-from grader.execution.sandbox.tiers import WALLED, isolation_from_name
+from grader.execution.sandbox.tiers import ISOLATING, isolation_from_name
 
 NODE = """
 import rclpy, os
@@ -100,7 +100,7 @@ def started(process: subprocess.Popen[str]) -> float:
 def holding(ros: RosInstallation) -> list[str]:
     """Return the tiers that hold here, and none."""
     names = []
-    for name in (*WALLED, "none"):
+    for name in (*ISOLATING, "none"):
         with contextlib.suppress(EnvironmentFault):
             choose_isolation(name, ros)
             names.append(name)

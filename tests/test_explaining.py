@@ -16,7 +16,7 @@ from grader.app.request import GradeRequest
 from grader.cli import main
 from grader.core.errors import GraderError
 from grader.core.exercise import Exercise
-from grader.core.explanation import CheckExplanation, CriterionExplanation
+from grader.core.report import CheckExplanation, CriterionExplanation
 from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric

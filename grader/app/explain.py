@@ -12,8 +12,8 @@ from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
 from grader.core.errors import GraderError
 from grader.core.exercise import Criterion, Exercise
-from grader.core.explanation import CheckExplanation, CriterionExplanation, Parameter
 from grader.core.quantities import Unit, duration
+from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
 from grader.core.scenario import (
     ActionGoal,
     AnyOrder,

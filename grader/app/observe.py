@@ -10,9 +10,9 @@ from grader.app.grade import Progress
 from grader.app.seeds import PRACTICE
 from grader.core.errors import HarnessError, SubmissionError
 from grader.core.quantities import NS_PER_S
+from grader.core.report import Summary
 from grader.core.scenario import OdometryStream, Scenario, Span
 from grader.core.submission import Submission
-from grader.core.summary import Summary
 from grader.core.trace import Trace
 from grader.execution.bag import read_odometry
 from grader.execution.plan import plan_scenario

@@ -10,7 +10,7 @@ from typing import Any
 
 from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id
 from grader.core.quantities import NS_PER_S, seconds
-from grader.core.summary import TopicSummary
+from grader.core.report import TopicSummary
 from grader.core.trace import Delivery, Message, Offer, Trace
 from grader.judging.judge_run import summarise
 from grader.judging.values import carries_number, leaves, student_endpoints

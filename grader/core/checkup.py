@@ -1,4 +1,4 @@
-"""What this machine can do for grading: properties of sandboxes, and what fixes what is missing."""
+"""Results of checking this machine: the properties of its sandboxes, and fixes for what is missing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from grader.core.limits import Limits
 
-#: Property names, in the order of reports, and what each one says of a student's process.
+#: Property names, in the order of reports, and what each one means for a student's process.
 PROPERTIES = {
     "fs_read": "reads no file but its own and what Python and ROS need",
     "fs_write": "writes to its scratch folders only",
@@ -21,23 +21,23 @@ PROPERTIES = {
     "cpu": "is stopped at its limit of processor time",
     "dds_private": "exchanges ROS messages with the grader and nobody else",
 }
-#: What a tier must contain before `auto` runs anybody's code in it.
+#: The properties that a tier must have before `auto` runs code in it.
 REQUIRED = ("fs_read", "fs_write", "procs", "net_egress", "shm")
 #: Tier names, strongest first, and the letter of each.
 TIERS = {"bubblewrap-root": "A2", "bubblewrap": "A1", "bubblewrap-flat": "B", "landlock": "C", "none": "D"}
-#: The name of the tier without walls.
+#: The name of the tier without isolation.
 NO_WALLS = "none"
 
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """One thing that a tier holds back, or does not.
+    """One property of a tier.
 
     Attributes:
         name: One of `PROPERTIES`.
-        holds: Whether the self-test saw it hold.
-        mechanism: What gives it, e.g. `mount namespace`; `none` if nothing does.
-        found: What the self-test saw where it does not hold, or what qualifies it; one line, may be empty.
+        holds: Whether the self-test confirmed it.
+        mechanism: What provides it, e.g. `mount namespace`; `none` if nothing does.
+        found: What the self-test found instead, or a qualification; one line, may be empty.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Property:
     found: str = ""
 
     def __str__(self) -> str:
-        """Return the property as a report names it."""
+        """Return the property as reports show it."""
         if self.holds:
             return f"{self.name} by {self.mechanism}"
         return f"{self.name} NOT CONTAINED" + (f" ({self.found})" if self.found else "")
@@ -54,15 +54,15 @@ class Property:
 
 @dataclass(frozen=True, slots=True)
 class TierReport:
-    """What one tier of isolation is worth on this machine, for this user.
+    """The result of testing one tier on this machine, for this user.
 
     Attributes:
         name: Tier name, a key of `TIERS`.
         tier: Its letter: `A2`, `A1`, `B`, `C` or `D`.
-        usable: Whether a student's node runs in it and everything `REQUIRED` is contained.
+        usable: Whether a student's node runs in it and it has all `REQUIRED` properties.
         why: Why it is not usable, one line; empty if it is.
         properties: In the order of `PROPERTIES`; empty if no process could be started in it.
-        remedy: The one command or action that mends what is missing; empty if there is none.
+        remedy: The one command or action that fixes the problem; empty if there is none.
     """
 
     name: str
@@ -74,12 +74,12 @@ class TierReport:
 
 
 def missing(properties: Sequence[Property]) -> tuple[Property, ...]:
-    """Return what is required and does not hold."""
+    """Return the required properties that do not hold."""
     return tuple(found for found in properties if found.name in REQUIRED and not found.holds)
 
 
 def described(isolation: str, properties: Sequence[Property]) -> str:
-    """Return the tier and each property with its mechanism in one line; exactly `none` without walls."""
+    """Format the tier and each property with its mechanism on one line; exactly `none` without a sandbox."""
     if isolation == NO_WALLS or not properties:
         return isolation
     letter = TIERS.get(isolation)
@@ -87,7 +87,7 @@ def described(isolation: str, properties: Sequence[Property]) -> str:
 
 
 def summarised(isolation: str, properties: Sequence[Property]) -> str:
-    """Return the tier and how much it contains, short enough for a line of a terminal."""
+    """Format the tier and how much it contains, short enough for one line of a terminal."""
     if isolation == NO_WALLS:
         return "NONE: no walls around the student's code"
     open_ones = [found.name for found in properties if not found.holds]
@@ -100,13 +100,13 @@ def summarised(isolation: str, properties: Sequence[Property]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One thing about this machine.
+    """One fact about this machine.
 
     Attributes:
-        name: What it is, e.g. `kernel`.
-        value: What was found, one line.
-        fits: Whether grading can do with it.
-        remedy: The command or action that mends it; empty if nothing has to be mended or none is known.
+        name: Its name, e.g. `kernel`.
+        value: Its value, one line.
+        fits: Whether it is sufficient for grading.
+        remedy: The command or action that fixes it; empty if no fix is needed or known.
     """
 
     name: str
@@ -123,7 +123,7 @@ class Exchange:
         tier: The tier of isolation it ran in.
         expected: Messages it published.
         arrived: Messages that the grader received.
-        took_s: Seconds from nothing to the result.
+        took_s: Seconds from the start to the result.
         problem: Why it could not be tried; empty if it could.
     """
 
@@ -135,21 +135,21 @@ class Exchange:
 
     @property
     def succeeded(self) -> bool:
-        """Whether everything arrived."""
+        """Whether all messages arrived."""
         return not self.problem and self.arrived == self.expected
 
 
 @dataclass(frozen=True, slots=True)
 class Checkup:
-    """What this machine can do.
+    """The result of checking this machine.
 
     Attributes:
         facts: Software and hardware.
-        exchange: One exchange of messages, or None if there is no ROS to try it with.
-        tiers: Every tier of isolation, strongest first; empty if there is no ROS to try them with.
+        exchange: A test exchange of messages, or None without ROS.
+        tiers: Every tier, strongest first; empty without ROS.
         used: The tier that grading would use; empty if it would refuse.
-        remedy: The one command or action that makes a tier hold; empty if one does, or none is known.
-        limits: What a student's processes may use where a rubric says nothing else.
+        remedy: The one command or action that makes a tier work; empty if one does, or none is known.
+        limits: The default limits of students' processes.
     """
 
     facts: tuple[Fact, ...]
@@ -161,12 +161,12 @@ class Checkup:
 
     @property
     def safe(self) -> bool:
-        """Whether strangers' programs can be graded here."""
+        """Whether untrusted programs can be graded here."""
         return bool(self.used) and not self.problems
 
     @property
     def problems(self) -> tuple[Fact, ...]:
-        """What keeps grading from being safe, each with what mends it, the most urgent first."""
+        """The problems that make grading unsafe, each with its fix, the most urgent first."""
         found = [fact for fact in self.facts if not fact.fits]
         if self.tiers and not self.used:
             found.append(Fact("sandbox", "none holds on this machine", fits=False, remedy=self.remedy))

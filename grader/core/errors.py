@@ -1,22 +1,22 @@
-"""The errors of the grader, drawn by who must act.
+"""The errors of the grader, grouped by who has to act.
 
     GraderError
       ├─ RubricError       the author of the rubric
-      ├─ SubmissionError   the student, or whoever named the path
-      ├─ RecordingError    whoever named the /odom recording
-      ├─ EvidenceError     whoever named the evidence
-      ├─ ClassError        whoever describes a class: its submissions, roster, late days, places for results
-      ├─ VariantError      whoever names the student whose variant is meant
-      ├─ KeyFileError      whoever names the course key or the seed key
-      ├─ EnvironmentFault  whoever set up this machine (ROS, sandbox)
-      └─ HarnessError      us or the machine, during a run
+      ├─ SubmissionError   the student, or the user who gave the path
+      ├─ RecordingError    the user who gave the /odom recording
+      ├─ EvidenceError     the user who gave the evidence
+      ├─ ClassError        the user who gave the submissions, roster, late days or result folder of a class
+      ├─ VariantError      the user who named a student to get the variant of
+      ├─ KeyFileError      the user who gave the course key or the seed key
+      ├─ EnvironmentFault  the administrator of this machine (ROS, sandbox)
+      └─ HarnessError      the developers or the machine, during a run
 
-A student's crash is none of these: it is a Fault in the trace.
+A crash of a student's program is not an error but a Fault in the trace.
 """
 
 
 class GraderError(Exception):
-    """A problem with a place and a remedy.
+    """A problem with a place and a fix.
 
     Args:
         message: `where: what was expected, what was found`, one line.
@@ -30,36 +30,36 @@ class GraderError(Exception):
 
 
 class RubricError(GraderError):
-    """A rubric cannot be used; its author must act."""
+    """A rubric cannot be used; its author has to fix it."""
 
 
 class SubmissionError(GraderError):
-    """A submission cannot be used; the student, or whoever named the path, must act."""
+    """A submission cannot be used; the student, or the user who gave the path, has to act."""
 
 
 class RecordingError(GraderError):
-    """An /odom recording cannot be used; whoever named it must act."""
+    """An /odom recording cannot be used; the user who gave it has to act."""
 
 
 class EvidenceError(GraderError):
-    """Kept evidence cannot be used; whoever named it must act."""
+    """Evidence cannot be used; the user who gave it has to act."""
 
 
 class ClassError(GraderError):
-    """What describes a class, or the place for its results, cannot be used; whoever named it must act."""
+    """An input of a class, or its result folder, cannot be used; the user who gave it has to act."""
 
 
 class VariantError(GraderError):
-    """A student's variant cannot be drawn; whoever named the student must act."""
+    """A student's variant cannot be drawn; the user who named the student has to act."""
 
 
 class KeyFileError(GraderError):
-    """A key cannot be used; whoever named it must act."""
+    """A key cannot be used; the user who gave it has to act."""
 
 
 class EnvironmentFault(GraderError):  # noqa: N818 - named after what it is, like the others of its kind here
-    """This machine lacks something that grading needs; whoever set it up must act."""
+    """This machine lacks something that grading needs; its administrator has to act."""
 
 
 class HarnessError(GraderError):
-    """The grader or the machine failed during a run; never the student's fault."""
+    """The grader or the machine failed during a run, which is never the student's fault."""

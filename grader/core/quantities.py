@@ -1,4 +1,4 @@
-"""Nanoseconds and comparisons: how time is counted and how numbers are compared everywhere."""
+"""Units of time and size, comparisons of numbers, and the kinds of values that rubrics write in their own forms."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -12,17 +12,17 @@ SLACK = 1e-9
 
 
 def seconds(t_ns: int) -> float:
-    """Return nanoseconds as seconds, for text and arithmetic on rates."""
+    """Convert nanoseconds to seconds, for text and rates."""
     return t_ns / NS_PER_S
 
 
 def nanoseconds(seconds_: float) -> int:
-    """Return seconds as whole nanoseconds."""
+    """Convert seconds to whole nanoseconds."""
     return round(seconds_ * NS_PER_S)
 
 
 def size(bytes_: int) -> str:
-    """Return a number of bytes for text, in the largest unit that leaves a whole number: `512 MiB`, `1,500 bytes`."""
+    """Format a number of bytes in the largest unit that gives a whole number: `512 MiB`, `1,500 bytes`."""
     for factor, unit in ((GIB, "GiB"), (MIB, "MiB"), (KIB, "KiB")):
         if bytes_ >= factor and bytes_ % factor == 0:
             return f"{bytes_ // factor:,} {unit}"
@@ -30,12 +30,12 @@ def size(bytes_: int) -> str:
 
 
 def duration(duration_ns: int) -> str:
-    """Return a duration for text, without a needless fraction: `60 s`, `0.5 s`."""
+    """Format a duration in seconds, without trailing zeros: `60 s`, `0.5 s`."""
     return f"{seconds(duration_ns):g} s"
 
 
 def within(got: float, want: float, tolerance: float) -> bool:
-    """Return whether `got` lies in `want ± tolerance`, the edges inside; NaN never does."""
+    """Return whether `got` is in `want ± tolerance`, including the edges; NaN never is."""
     difference = abs(got - want)
     return difference <= tolerance or difference <= tolerance + SLACK * max(1.0, abs(want), abs(tolerance))
 
@@ -49,7 +49,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Least:
-    """Marks an annotated number with the least that a rubric may set it to."""
+    """Marks an annotated number with the minimum that a rubric may set."""
 
     value: int
 
@@ -60,3 +60,24 @@ Bytes = Annotated[int, Unit("B")]
 DurationNs = Annotated[int, Unit("s")]
 #: A frequency; written in rubrics as `20 Hz`.
 Hertz = Annotated[float, Unit("Hz")]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Marks an annotated value whose form in rubrics has rules of its own."""
+
+    name: str
+
+
+#: An absolute topic, service or node name.
+Topic = Annotated[str, Kind("topic")]
+#: A message type such as `std_msgs/msg/Float32`.
+MessageType = Annotated[str, Kind("message type")]
+#: A service type such as `std_srvs/srv/Trigger`.
+ServiceType = Annotated[str, Kind("service type")]
+#: An action type such as `example_interfaces/action/Fibonacci`.
+ActionType = Annotated[str, Kind("action type")]
+#: A formula of `n` and `t` such as `sin(0.1 * n)`.
+Formula = Annotated[str, Kind("formula")]
+#: A regular expression.
+Pattern = Annotated[str, Kind("pattern")]

@@ -1,4 +1,4 @@
-"""What differs between releases of ROS 2, one row each."""
+"""The differences between releases of ROS 2."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class Release:
     Attributes:
         name: As in `ROS_DISTRO`.
         fast_dds: Major version of Fast DDS, which decides the names in its profiles.
-        messages: What `rosbags` calls the release's message types.
-        tried: Whether the tests of this project pass on it; others are named in a warning.
+        messages: The name of its message types in `rosbags`.
+        tried: Whether this project is tested on it; other releases cause a warning.
     """
 
     name: str
@@ -31,11 +31,11 @@ RELEASES = {
         Release("kilted", 3, "ROS2_KILTED", tried=True),
     )
 }
-#: The release that comes as wheels, and is assumed where nothing is said.
+#: The release that is available as wheels, and the default.
 DEFAULT = RELEASES["jazzy"]
 TRIED = tuple(release.name for release in RELEASES.values() if release.tried)
 
 
 def release_of(name: str) -> Release:
-    """Return a release by its name; an unknown one is taken for a new one, with the default's common messages."""
+    """Return a release by name; an unknown one is assumed to be new, with the message types of the default."""
     return RELEASES.get(name) or Release(name, 3, DEFAULT.messages)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from grader.core.limits import Limits
-from grader.core.names import ActionType, Kind, MessageType, ServiceType, Topic
-from grader.core.quantities import NS_PER_S
+from grader.core.quantities import NS_PER_S, ActionType, Kind, MessageType, ServiceType, Topic
 
 
 @dataclass(frozen=True, slots=True)

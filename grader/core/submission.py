@@ -1,4 +1,4 @@
-"""Submissions, and runs: one submission as it was recorded, which is everything that judging reads."""
+"""Submissions, and runs: a recorded submission, which is the only input of judging."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class StudentFile:
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """What a student handed in, staged where it can be run.
+    """A student's files, staged so that they can be run.
 
     Attributes:
         name: Name shown in reports.
         path: Where it came from, as the user typed it.
-        root: Staged copy, read-only by convention; what runs.
+        root: The staged copy that runs, read-only by convention.
         digest: `sha256:` and 64 hex digits over relative names and contents of all staged files.
-        files: Wanted file name -> what was found for it.
-        notes: Sentences about the intake that a reader must know.
+        files: Wanted file name -> the file that was found for it.
+        notes: Sentences about the files that readers must know.
     """
 
     name: str
@@ -50,17 +50,17 @@ class Submission:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What recording one submission left behind.
+    """A submission with its recordings.
 
     Attributes:
-        submission: What was handed in; judging never looks into its `root`.
-        traces: (exercise id, scenario id) -> what was observed; a scenario with a missing file has none.
-        sources: Wanted file name -> its text, to find the causes of lost points in.
-        environment: What it was recorded with.
-        seed: Every drawn value follows from it.
+        submission: The submission; judging never reads files in its `root`.
+        traces: (exercise id, scenario id) -> trace; a scenario with a missing file has none.
+        sources: Wanted file name -> its text, for finding the causes of lost points.
+        environment: The software that it was recorded with.
+        seed: Determines every drawn value.
         duration_s: Wall time of the run.
-        notes: Sentences about the intake and the machine that a reader must know.
-        reproduce: What gives the same recording and the same report again.
+        notes: Sentences about the files and the machine that readers must know.
+        reproduce: How to reproduce the recording and the report.
     """
 
     submission: Submission

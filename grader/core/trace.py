@@ -1,7 +1,7 @@
-"""Traces: everything observed in one run, in order; the only thing that judging reads.
+"""Traces: everything observed in one run, in order; the only input of judging.
 
-Times are integer nanoseconds since the scenario started. Within one instant observations are in the order
-`(t_ns, phase, source, seq)`, stimuli before what the student's nodes did.
+Times are integer nanoseconds since the scenario started. Within one instant, observations are in the order
+`(t_ns, phase, source, seq)`, with stimuli before the actions of students' nodes.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class Start:
     Attributes:
         process: File name of the student process.
         file: The file that ran, relative to the submission.
-        way: How.
+        way: The way of starting.
         target: `MODULE` or `MODULE:FUNCTION`; empty for a script.
-        hidden: Files and folders of the submission that are imported in place of a module of Python's or of ROS.
+        hidden: Files and folders of the submission that are imported instead of a module of Python or ROS.
     """
 
     process: str
@@ -59,7 +59,7 @@ class Start:
 
     @property
     def words(self) -> str:
-        """How, in a phrase that follows `run`."""
+        """The way of starting, as a phrase that follows `run`."""
         return {
             StartWay.SCRIPT: f"as `python3 {self.file}`",
             StartWay.MODULE: f"as `python3 -m {self.target}`",
@@ -74,7 +74,7 @@ class Message:
 
     Attributes:
         t_ns: When it was published.
-        topic: As on the wire, absolute.
+        topic: Absolute name.
         type: e.g. `geometry_msgs/msg/Twist`.
         value: Fields as plain JSON values, nested by name; NaN and infinities are floats.
         cdr: The bytes as they came over the wire.
@@ -103,14 +103,14 @@ class Request:
     """One request of a service call between the grader and a student's node.
 
     Attributes:
-        t_ns: When the grader sent it, or took it.
+        t_ns: When the grader sent or received it.
         service: Absolute name.
         type: e.g. `std_srvs/srv/Trigger`.
         number: Pairs it with its response; counts from 1 within a service and a sender.
-        sender: `grader` where a student's server is asked, `student` where a student's client asks.
-        client: Which of the grader's clients asked, from 1; 0 is a student's.
+        sender: `grader` for a call to a student's server, `student` for a call of a student's client.
+        client: Number of the grader's client, from 1; 0 for a student's client.
         value: Fields as plain JSON values, as for Message.
-        cdr: The bytes, where they are known.
+        cdr: The bytes, if they are known.
     """
 
     t_ns: int
@@ -125,9 +125,9 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """One response of a service call; attributes as for Request, whose number it has.
+    """One response of a service call; attributes as for Request, with the same number as its request.
 
-    The sender is whoever answers: `student` where a student's server was asked.
+    The sender is the server: `student` for a response of a student's server.
     """
 
     t_ns: int
@@ -186,7 +186,7 @@ class Endpoint:
         reliability: `reliable` or `best_effort`.
         durability: `volatile` or `transient_local`.
         depth: History depth, 0 if unknown.
-        deadline_ns: Deadline offered or asked for, 0 for none.
+        deadline_ns: Offered or requested deadline, 0 for none.
         liveliness: `automatic` or `manual_by_topic`.
     """
 
@@ -231,10 +231,10 @@ class GraphSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A student's process raised, hung or exited; after the stop signal only where a scenario looks at that.
+    """A student's process raised, hung or exited; after the stop signal only if the scenario checks the shutdown.
 
     Attributes:
-        t_ns: When.
+        t_ns: Time of the fault.
         process: File name of the student process.
         kind: What happened.
         text: One line, e.g. `AttributeError: 'NoneType' object has no attribute 'pose'` or `exited with code 0`.
@@ -259,20 +259,20 @@ class Fault:
     python: tuple[int, int] | None = None
 
     def said(self, pattern: str) -> re.Match[str] | None:
-        """Return how Python's own words for an exception or a syntax error match a pattern; None for other faults."""
+        """Search Python's text of an exception or syntax error for a pattern; None for other faults."""
         by_python = self.kind in (FaultKind.EXCEPTION, FaultKind.SYNTAX_ERROR)
         return re.search(pattern, self.text) if by_python else None
 
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What a process says that it offers or uses beside topics; shown to people, never judged.
+    """What a process reports to offer or use besides topics; shown in reports, but never judged.
 
     Attributes:
-        t_ns: When it said so.
+        t_ns: When it reported this.
         process: File name of the student process.
         kind: `service`, `client` or `parameter`.
-        name: Absolute name; of a parameter `/node:name`.
+        name: Absolute name; for a parameter `/node:name`.
         detail: Service type, or the parameter's value.
     """
 
@@ -285,13 +285,12 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A moment of the scenario itself.
+    """An event of the scenario itself.
 
     Names: `stream_starts` and `stream_stops` (detail: the topic of the stimulus), `server_starts` and `server_stops`
     (detail: the service of the grader's server), `process_starts` (detail: a process that starts late), `exited`
-    (detail: a process that was free to end, and did with code 0), `stop_signal` (detail: the process that was sent
-    one), `stopped` (detail: a process that ended with code 0 or by that very signal after it), `limit` (detail: a
-    sentence).
+    (detail: a process that was allowed to exit, and did with code 0), `stop_signal` (detail: the process that received
+    it), `stopped` (detail: a process that ended with code 0 or by that signal after it), `limit` (detail: a sentence).
     """
 
     t_ns: int
@@ -307,18 +306,18 @@ Observation = Message | Delivery | Request | Response | LogRecord | OutputLine |
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What one scenario's run left behind.
+    """The recording of one scenario.
 
     Attributes:
         scenario: Scenario id.
         clock: Which clock the nodes ran on.
-        clock_reason: Why virtual time does not do these nodes justice; empty if it does.
-        stop_ns: When observation ended; the window is [0, stop_ns). What comes after it followed the stop signal.
+        clock_reason: Why virtual time is not suitable for these nodes; empty if it is.
+        stop_ns: When observation ended; the window is [0, stop_ns). Later observations followed the stop signal.
         observations: In order.
-        notes: Sentences a reader must know (entry without a guard, a limit reached, lost messages).
-        harness_problem: What failed on our side or the machine's, and forbids judging; empty if nothing did.
+        notes: Sentences that readers must know (entry without a guard, a limit reached, lost messages).
+        harness_problem: A failure of the grader or the machine that prevents judging; empty if there was none.
         starts: How each process was started; empty in traces of earlier versions.
-        reached: What of their own insides the processes reached for, as these say: a reason to look twice, no evidence.
+        reached: Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence.
     """
 
     scenario: str
@@ -333,11 +332,11 @@ class Trace:
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:
-        """Return what follows from this trace alone: worked out when first asked for, then kept as long as the trace.
+        """Cache a value that is computed from this trace, for the lifetime of the trace.
 
         Args:
-            key: Says what is worked out, and from which parameters.
-            work: Pure, and does not hold on to the trace in what it returns.
+            key: Identifies the computation and its parameters.
+            work: Computes the value; a pure function whose result does not refer to the trace.
         """
         if key not in self._known:
             self._known[key] = work()
@@ -360,7 +359,7 @@ class Trace:
         return self._on(Message, topic)
 
     def deliveries(self, topic: str) -> tuple[Delivery, ...]:
-        """Return what the grader published on a topic."""
+        """Return the messages that the grader published on a topic."""
         return self._on(Delivery, topic)
 
     def _on(self, kind: type[Carried], topic: str | None) -> tuple[Carried, ...]:
@@ -389,11 +388,11 @@ class Trace:
         return tuple(o for o in self.of(Fault) if process in (None, o.process))
 
     def graphs(self) -> tuple[GraphSnapshot, ...]:
-        """Return the snapshots of the live graph; a new one is there whenever the graph had changed."""
+        """Return the snapshots of the live graph, one for each change."""
         return self.of(GraphSnapshot)
 
     def marks(self, name: str, detail: str | None = None) -> tuple[Mark, ...]:
-        """Return the marks of a name, with one detail or with any."""
+        """Return the marks with a name, and with a detail if one is given."""
         return tuple(o for o in self.of(Mark) if o.name == name and detail in (None, o.detail))
 
     def endpoints(self, kind: str, topic: str | None = None) -> tuple[Endpoint, ...]:

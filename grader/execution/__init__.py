@@ -1,1 +1,1 @@
-"""Runs scenarios and writes traces; the only room that touches ROS, processes and clocks."""
+"""Runs scenarios and records traces; the only package that uses ROS, processes and clocks."""

@@ -1,4 +1,4 @@
-"""Reads a rosbag2 recording of wheel odometry, our own or an instructor's, into messages that can be played."""
+"""Reads wheel odometry from a rosbag2 recording, the built-in one or an instructor's."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _CDR_LITTLE_ENDIAN = b"\x00\x01"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _ROS_1_MAGIC = b"#ROSBAG V"
 _SQLITE_MAGIC = b"SQLite format 3\x00"
-_SQLITE_HEAD = 18  # the magic, then the page size as two bytes, of which 1 stands for 65536
-#: Characters that mean something in an SQLite address, into which rosbags puts the path as it is.
+_SQLITE_HEAD = 18  # the magic, then the page size in two bytes, where 1 means 65536
+#: Characters with a meaning in an SQLite URI. rosbags puts the path into one without escaping it.
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
 _HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record /odom` writes it"
@@ -44,8 +44,8 @@ class Odometry:
     """A recording of odometry.
 
     Attributes:
-        topic: The topic it was recorded on, absolute.
-        messages: In order of receive time, which is 0 for the first one and strictly increasing.
+        topic: Absolute name of the recorded topic.
+        messages: In order of receive time, which starts at 0 and strictly increases.
     """
 
     topic: str
@@ -53,13 +53,13 @@ class Odometry:
 
 
 def read_odometry(path: Path) -> Odometry:
-    """Return the odometry of a recording; nothing is written beside it.
+    """Read the odometry in a recording, without writing any file next to it.
 
     Args:
-        path: A rosbag2 folder, a folder with one storage file and no metadata, or a bare .mcap or .db3 file.
+        path: A rosbag2 folder, a folder with one storage file and no metadata, or a single .mcap or .db3 file.
 
     Raises:
-        RecordingError: It is not there, cannot be read, is damaged, or holds no odometry worth playing.
+        RecordingError: The recording is missing, unreadable or damaged, or has too little odometry to play.
     """
     source = _source(path)
     with _plainly_named(source) as plain:
@@ -74,12 +74,12 @@ def read_odometry(path: Path) -> Odometry:
 
 
 def window(odometry: Odometry, *, duration_ns: int, seed: int) -> tuple[TimedMessage, ...]:
-    """Return a part of a recording, with its times counted from its own first message.
+    """Cut a window out of a recording, with times counted from its first message.
 
     Args:
         odometry: The recording.
-        duration_ns: Least time from the first to the last message of the part; a shorter recording is returned whole.
-        seed: Draws where the part starts; the same seed, the same part.
+        duration_ns: Minimum time from first to last message of the window; a shorter recording is returned whole.
+        seed: Determines where the window starts.
     """
     messages = odometry.messages
     latest_ns = messages[-1].t_ns - duration_ns
@@ -92,7 +92,7 @@ def window(odometry: Odometry, *, duration_ns: int, seed: int) -> tuple[TimedMes
 
 
 def _source(path: Path) -> Path:
-    """Return what rosbags is to open for a path that a person named."""
+    """Find the folder or file that rosbags should open for the path that was given."""
     try:
         return _source_in(path) if stat.S_ISDIR(path.stat().st_mode) else _source_file(path)
     except (FileNotFoundError, NotADirectoryError) as error:
@@ -148,11 +148,11 @@ def _source_file(path: Path) -> Path:
 
 
 def _probe(path: Path) -> bytes:
-    """Return the first bytes of a file, once it is known to be readable and whole pages if it has any.
+    """Return the first bytes of a file after checking that it is readable and, for SQLite, not truncated.
 
     Raises:
-        OSError: It cannot be read.
-        RecordingError: It is an SQLite file whose last page is cut; SQLite itself would read zeros there.
+        OSError: The file cannot be read.
+        RecordingError: The last page of an SQLite file is cut off; SQLite itself would read zeros there.
     """
     with path.open("rb") as file:
         head = file.read(_SQLITE_HEAD)
@@ -168,7 +168,7 @@ def _probe(path: Path) -> bytes:
 
 @contextmanager
 def _plainly_named(source: Path) -> Iterator[Path]:
-    """Yield the source, or a link to it where its own path would be misread as an address with parameters."""
+    """Yield the source, or a symlink to it if SQLite would take its path for a URI with parameters."""
     if not _ADDRESS_CHARACTERS & set(str(source)):
         yield source
         return
@@ -180,7 +180,7 @@ def _plainly_named(source: Path) -> Iterator[Path]:
 
 def _read(path: Path, source: Path) -> tuple[str, list[_Raw]]:
     """Return the odometry topic of a source, and its messages as (receive time, bytes)."""
-    from rosbags.rosbag2 import Reader  # 60 ms at start-up, for runs that play no odometry  # noqa: PLC0415
+    from rosbags.rosbag2 import Reader  # takes 60 ms, which runs without odometry save  # noqa: PLC0415
 
     try:
         with Reader(source) as reader:
@@ -202,7 +202,7 @@ def _read(path: Path, source: Path) -> tuple[str, list[_Raw]]:
 
 
 def _odometry_topic(topics: Iterable[tuple[str, str, int]]) -> str | None:
-    """Return the topic to play: /odom if it has messages, else that with most, else the first by name."""
+    """Choose the topic to play: /odom if it has messages, else the one with most messages, else the first by name."""
     counts: dict[str, int] = {}
     for topic, msgtype, count in topics:
         if msgtype == TYPE:
@@ -213,7 +213,7 @@ def _odometry_topic(topics: Iterable[tuple[str, str, int]]) -> str | None:
 
 
 def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessage]:
-    """Yield the messages, times from the first one on, two at the same time 1 ns apart."""
+    """Yield the messages, with times counted from the first one; equal times are moved 1 ns apart."""
     from rosbags.typesys import Stores, get_typestore  # as heavy as the reader  # noqa: PLC0415
 
     store = get_typestore(Stores[DEFAULT.messages])
@@ -243,7 +243,7 @@ def _decoded(path: Path, topic: str, raw: Sequence[_Raw]) -> Iterator[TimedMessa
 
 
 def _fields(message: object) -> dict[str, Any]:
-    """Return what judging reads of an odometry message, under the names of the message definition."""
+    """Return the fields of an odometry message that checks read, named as in the message definition."""
     position = _numbers(message, "pose.pose.position", "xyz")
     orientation = _numbers(message, "pose.pose.orientation", "xyzw")
     linear = _numbers(message, "twist.twist.linear", "xyz")
@@ -273,7 +273,7 @@ def _unfit(path: Path, topic: str, what: str) -> RecordingError:
 
 
 def _line(text: object, *, source: Path | None = None, limit: int = 5000) -> str:
-    """Return foreign text as one printable line; the name of a temporary source is left out."""
+    """Turn foreign text into one printable line, without the path of a temporary source."""
     plain = str(text)
     if source is not None:
         plain = plain.replace(str(source), source.name)

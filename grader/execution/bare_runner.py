@@ -1,4 +1,4 @@
-"""Runs a plan on the wall clock with nothing of the grader in the students' processes."""
+"""Runs a plan on the wall clock, without the grader's code in the students' processes."""
 
 from __future__ import annotations
 
@@ -23,37 +23,37 @@ from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
 from grader.execution.wall_runner import LOOK_S, WallRunner
 
-#: The sandbox's own program, which starts the student's.
+#: Name of the sandbox process, which starts the student's.
 SANDBOX = "bwrap"
-#: How many processes deep the student's is in its sandbox at most.
+#: Maximum number of sandbox processes around the student's.
 DEEP = 8
 INTERRUPTED = 128 + signal.SIGINT
 
 
 class BareProcess(NodeProcess):
-    """A process that has no line to the grader: it is started at once, watched, and stopped by a signal."""
+    """A process without a connection to the grader: it runs at once, is watched, and is stopped by a signal."""
 
     @classmethod
     def begin(cls, name: str, root: str, command: Command, limits: Limits) -> BareProcess:
         """Start the process."""
-        ours, nobodys = socket.socketpair()
+        ours, unused_end = socket.socketpair()
         student = cls.start(name, root, command, ours, limits)
         assert isinstance(student, cls)
-        student.nobodys = nobodys
+        student.unused_end = unused_end
         return student
 
-    #: The other end of the line, which nobody has.
-    nobodys: socket.socket | None = None
+    #: The other end of the socket pair, which no process uses.
+    unused_end: socket.socket | None = None
     _told_end = False
 
     def tell(self, answer: Mapping[str, Any]) -> None:
-        """Send the stop signal, if that is what it is to be told; there is nobody to tell anything else."""
+        """Send SIGINT if the answer is to stop; drop any other answer, since no host would read it."""
         if answer.get("stop") and not self._has_ended():
             with contextlib.suppress(OSError):
                 os.kill(self._program(), signal.SIGINT)
 
     def reports(self) -> list[dict[str, Any] | None]:
-        """Return how it ended, once it has; None for the end by a signal or a limit."""
+        """Report the end of the process once; None stands for an end by a signal or a limit."""
         if self._told_end or not self._has_ended():
             return []
         self._told_end = True
@@ -66,20 +66,20 @@ class BareProcess(NodeProcess):
         return [{**report, "fault": fault} if fault else report]
 
     def close(self) -> None:
-        """Free the descriptors of a process that has ended."""
+        """Close the file descriptors of a process that has ended."""
         super().close()
-        if self.nobodys is not None:
-            self.nobodys.close()
+        if self.unused_end is not None:
+            self.unused_end.close()
 
     def _has_ended(self) -> bool:
         return self.process.poll() is not None
 
     def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
-        """Return what it wrote as lines; records are found in them at the end."""
+        """Return the output as lines; log records are parsed from them at the end of the run."""
         return [*self._lines(t_ns, stream, text)]
 
     def _program(self) -> int:
-        """Return the process of the student's program, which the sandbox's own processes are around."""
+        """Return the pid of the student's program, inside of the sandbox's own processes."""
         pid = self.process.pid
         for _ in range(DEEP):
             children = _children(pid)
@@ -103,22 +103,22 @@ def _name(pid: int) -> str:
         return ""
 
 
-#: How long, in real time, the first node is waited for.
+#: How long, in real time, to wait for the first node.
 FIRST_NODE_NS = 15 * NS_PER_S
-#: A program whose first node comes later than this after its start does something else before: then time begins when
-#: its imports should be done.
+#: A program that creates its first node later than PROMPT_NS after its start does something else first. For such a
+#: program time starts after IMPORTS_NS, when its imports should be done.
 PROMPT_NS, IMPORTS_NS = NS_PER_S // 5, NS_PER_S // 2
-#: How often the graph is looked at until the first node has been seen.
+#: How often to check the graph until the first node appears.
 FIRST_LOOK_NS = 10_000_000
 
 
 class BareRunner(WallRunner):
-    """Runs one plan on the real clock, with programs that know nothing of it; see `WallRunner`."""
+    """Runs one plan on the real clock, with bare processes; see `WallRunner`."""
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
         self._logs: list[Logged] = []
-        observer.hear_logs()
+        observer.subscribe_to_logs()
 
     def _begin(self) -> None:
         """Wait for the first node, and start the clock."""
@@ -136,15 +136,15 @@ class BareRunner(WallRunner):
 
     def _look(self, now_ns: int) -> None:
         super()._look(now_ns)
-        room = self._plan.limits.lines - len(self._logs)
-        self._logs += self._observer.logs()[: max(0, room)]
+        remaining = self._plan.limits.lines - len(self._logs)
+        self._logs += self._observer.logs()[: max(0, remaining)]
 
     def _observations(self) -> tuple[Observation, ...]:
         self._logs += self._observer.logs()
         return tuple(self._read())
 
     def _read(self) -> Iterator[Observation]:
-        """Yield what was observed, with log records and the faults of threads as lines tell of them."""
+        """Yield the observations, with the log records and thread faults that are found in the output."""
         seen = self._recorder.observations
         read: dict[int, list[Observation]] = {}
         for student in self._students:

@@ -1,4 +1,4 @@
-"""The command line by which a file is started with nothing of the grader: as a script, a module, or by its main()."""
+"""Builds the command line of a bare process: a file run as a script, as a module, or through its main()."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path, PurePosixPath
 
 from grader.student_host.packages import ENTRY_POINT, layout_of, never_true, package_folders, start_of
 
-#: A longer file is run as a script: nobody writes one.
+#: A larger file is not parsed but run as a script: nobody writes one by hand.
 MOST_BYTES = 1 << 20
-#: Modules whose functions only set something up when a file calls them outside of its functions.
+#: Modules whose functions only prepare the program when a file calls them at the top level.
 _SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "numpy", "signal", "math"})
-#: A package that every full ROS installation has, but no wheel.
+#: A package that every full ROS installation has, but that no wheel provides.
 STAND_IN = "example_interfaces"
 _MAKE_STAND_IN = f"""
 import sys, types
@@ -29,15 +29,15 @@ _NODES = frozenset({"Node", "LifecycleNode"})
 
 
 def bare_arguments(here: Path, root: str, file: str) -> tuple[str, ...]:
-    """Return the arguments with which Python runs a file as its author would.
+    """Return the Python arguments that run a file as its author would.
 
-    A file in a package is started as `ros2 run` starts it. One that starts nothing by itself is helped to its main(),
-    or to its only node, as in virtual time.
+    A file in a package is started as `ros2 run` starts it. If a file starts nothing by itself, the command calls its
+    main() or spins its only node, as in virtual time.
 
     Args:
         here: The staged submission.
-        root: Where the process sees it.
-        file: The file, relative to it.
+        root: The path at which the process sees the submission.
+        file: The file, relative to `root`.
     """
     path = f"{root}/{file}"
     missing = _missing(here)
@@ -65,7 +65,7 @@ def bare_arguments(here: Path, root: str, file: str) -> tuple[str, ...]:
 
 
 def _help(tree: ast.Module, module: str) -> str:
-    """Return what starts a file that starts nothing by itself; empty if it does, or offers nothing to start."""
+    """Return code that starts a file which starts nothing by itself; empty if that is not needed or not possible."""
     if any(map(_starts, tree.body)):
         return ""
     if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
@@ -83,9 +83,9 @@ def _by_import(run: str, folders: Sequence[str], path: str, missing: str) -> tup
 
 
 def _missing(here: Path) -> str:
-    """Return what makes example_interfaces known where a file names it and it is not installed; usually nothing.
+    """Return code that provides example_interfaces if a file names it and it is not installed; usually empty.
 
-    Tutorials import it without using it. In virtual time the host stands in for it.
+    Tutorials import it without using it. In virtual time the host provides a stand-in.
     """
     if find_spec(STAND_IN) is not None or (here / STAND_IN).exists():
         return ""
@@ -110,7 +110,7 @@ def _parsed(path: Path) -> ast.Module | None:
 
 
 def _starts(statement: ast.stmt) -> bool:
-    """Return whether a statement outside of functions may run the program, and does not only prepare it."""
+    """Return whether a top-level statement may run the program, as opposed to only preparing it."""
     if isinstance(statement, ast.Expr):
         return isinstance(statement.value, ast.Call) and _root(statement.value.func) not in _SETTING_UP
     if isinstance(statement, ast.If) and never_true(statement):

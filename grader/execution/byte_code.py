@@ -1,6 +1,6 @@
-"""Whether what every start of a student's process loads has been compiled: where not, it is compiled at each start.
+"""Checks whether the modules that every student process loads have up-to-date byte code.
 
-Neither workers nor students' processes write byte code, so what is missing or stale stays so.
+Neither workers nor student processes write byte code: a missing or stale file would be compiled at every start.
 
 Usage: python -m grader.execution.byte_code, with the interpreter and environment of a worker; prints JSON.
 """
@@ -24,9 +24,9 @@ from grader.core.checkup import Fact
 from grader.execution.ros_installation import MESSAGE_PACKAGES, PythonRuntime
 from grader.execution.sandbox.environment import PACKAGE, worker_environment
 
-#: What a node and the process around it import; what these import in turn comes with them.
+#: The modules that a node and the host import directly; their own imports are found through sys.modules.
 LOADED = ("rclpy", "rclpy.action", "rclpy.executors", "time_machine", *(f"{name}.msg" for name in MESSAGE_PACKAGES))
-#: Folders of this package that workers and students' processes load from.
+#: Folders of this package that workers and student processes load modules from.
 OWN = tuple(PACKAGE / name for name in ("student_host", "core", "execution", "execution/sandbox"))
 #: Layout of a .pyc: magic number, flags, then a hash of the source or its time and size; PEP 552.
 HEADER_BYTES, FLAGS_AT, FIRST_AT, SECOND_AT = 16, 4, 8, 12
@@ -35,13 +35,13 @@ TIMEOUT_S = 120.0
 
 
 def compile_own() -> None:
-    """Compile what workers and students' processes load of this package, where that is needed and can be done."""
+    """Compile the modules of this package that workers and student processes load, where needed and possible."""
     for folder in OWN:
         compileall.compile_dir(folder, maxlevels=0, quiet=2)
 
 
 def byte_code(runtime: PythonRuntime) -> Fact:
-    """Say whether the byte code of an installation is up to date, and what compiles it."""
+    """Check whether the byte code of an installation is up to date, and name the command that compiles it."""
     compile_own()
     with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:
         try:
@@ -65,12 +65,12 @@ def byte_code(runtime: PythonRuntime) -> Fact:
 
 
 def compile_command(executable: Path, folders: Sequence[Path]) -> str:
-    """Return the command that compiles everything in some folders anew."""
+    """Return the command that recompiles everything in some folders."""
     return shlex.join([str(executable), "-m", "compileall", "-q", "-f", *map(str, folders)])
 
 
 def is_current(source: Path, compiled: Path) -> bool:
-    """Return whether an interpreter would load the byte code of a source file, and not compile the file."""
+    """Return whether an interpreter would load the byte code of a source file instead of compiling the file."""
     try:
         with compiled.open("rb") as file:
             header = file.read(HEADER_BYTES)
@@ -90,14 +90,14 @@ def is_current(source: Path, compiled: Path) -> bool:
 
 
 def _roots(files: Sequence[Path]) -> list[Path]:
-    """Return the folders to compile: that of all packages, or this package, where something in them is stale."""
+    """Return the folders to compile: the site-packages folders, or this package, that hold the stale files."""
     known = {Path(sysconfig.get_path(name)) for name in ("purelib", "platlib", "stdlib")} | {PACKAGE}
     deepest = sorted(known, key=lambda folder: -len(folder.parts))
     return sorted({next((folder for folder in deepest if folder in file.parents), _top(file)) for file in files})
 
 
 def _top(file: Path) -> Path:
-    """Return the folder that a file's outermost package lies in."""
+    """Return the folder that contains a file's outermost package."""
     folder = file.parent
     while (folder / "__init__.py").is_file():
         folder = folder.parent
@@ -105,13 +105,13 @@ def _top(file: Path) -> Path:
 
 
 def _loaded() -> Iterator[tuple[Path, Path]]:
-    """Yield the source and the place of the byte code of each module that a node's start loads."""
+    """Yield the source file and the byte-code file of each module that starting a node loads."""
     for name in LOADED:
         importlib.import_module(name)
     for module in list(sys.modules.values()):
         spec: Any = getattr(module, "__spec__", None)
         if module.__name__.partition(".")[0] == PACKAGE.name:
-            continue  # more than nodes load; what they do follows
+            continue  # includes modules that nodes do not load; the loop below covers those that they do
         if spec is not None and spec.has_location and spec.cached and str(spec.origin).endswith(".py"):
             yield Path(spec.origin), Path(spec.cached)
     for source in (path for folder in OWN for path in folder.glob("*.py")):

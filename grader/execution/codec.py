@@ -1,7 +1,7 @@
-"""Traces, plans and runtimes as plain JSON values, with nothing but the standard library.
+"""Converts traces, plans and runtimes to plain JSON values, with only the standard library.
 
-A worker sees few packages besides ROS and its own part of this one, so what it needs is here. What a worker says is
-read, and checked, in `grader.execution.evidence.packed`.
+A worker can import little besides ROS and its own part of this package. The supervisor reads and checks a worker's
+answers in `grader.execution.evidence.packed`.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from grader.core.trace import (
 )
 
 FORMAT = "grader/trace/v1"
-#: The word for each kind of observation.
-WORDS: Mapping[type, str] = {
+#: The tag of each kind of observation.
+TAGS: Mapping[type, str] = {
     Message: "message",
     Delivery: "delivery",
     Request: "request",
@@ -45,12 +45,12 @@ WORDS: Mapping[type, str] = {
     Mark: "mark",
 }
 _SCALARS = frozenset({str, int, bool, type(None)})
-#: How many of the last fields of a fault are one list.
+#: The number of trailing fields of a fault that are written as one list.
 _DETAILS = 3
 
 
 def trace_to_json(trace: Trace) -> dict[str, Any]:
-    """Return a trace as plain JSON values; NaN and infinities become `{"float": "nan"}`."""
+    """Convert a trace to plain JSON values; NaN and infinities become `{"float": "nan"}`."""
     return {
         "format": FORMAT,
         "scenario": trace.scenario,
@@ -65,15 +65,15 @@ def trace_to_json(trace: Trace) -> dict[str, Any]:
 
 
 def observation_to_json(observation: Observation) -> list[Any]:
-    """Return one observation as `[kind, field, ...]` in the order of its fields."""
-    row = [WORDS[type(observation)], *plain(observation)]
+    """Convert one observation to `[kind, field, ...]`, in the order of its fields."""
+    row = [TAGS[type(observation)], *plain(observation)]
     if isinstance(observation, Fault):
         return [*row[:-_DETAILS], row[-_DETAILS:]]
     return row[:-1] if isinstance(observation, GraphSnapshot) and not observation.services else row
 
 
 def plain(value: Any) -> Any:  # noqa: PLR0911 - one for each kind of value
-    """Return fields of messages, and whatever else a trace holds, as strict JSON values."""
+    """Convert message fields, and any other value in a trace, to strict JSON values."""
     if type(value) in _SCALARS:
         return value
     if isinstance(value, float):
@@ -90,7 +90,7 @@ def plain(value: Any) -> Any:  # noqa: PLR0911 - one for each kind of value
 
 
 def to_json(value: Any) -> Any:
-    """Return a dataclass that `from_json` can read as plain JSON values, by the names of its fields."""
+    """Convert a dataclass to plain JSON values by field name; `from_json` reads them back."""
     if is_dataclass(value):
         return {field.name: to_json(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, tuple):
@@ -101,7 +101,7 @@ def to_json(value: Any) -> Any:
 
 
 def from_json(kind: Any, data: Any) -> Any:
-    """Return the value of a type that `to_json` was given; who sends it is trusted."""
+    """Rebuild a value of a type from the output of `to_json`; the sender must be trusted."""
     if hasattr(kind, "__dataclass_fields__"):
         return kind(**{name: from_json(_hints(kind)[name], value) for name, value in data.items()})
     if get_origin(kind) is tuple:

@@ -1,7 +1,7 @@
-"""Reads what a node writes on standard error in ROS's own format: log records, tracebacks, other lines; pure.
+"""Parses a node's standard error in the default ROS format into log records, tracebacks and other lines.
 
-A line tells where a record begins, but not where it ends, or where it was logged. What loggers of nodes publish on
-/rosout tells both; records of other loggers are taken for one line each.
+A line shows where a record begins, but not where it ends or which source line logged it. The records that node loggers
+publish on /rosout show both. A record of any other logger is assumed to be one line long.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SYNTAX = re.compile(r"(SyntaxError|IndentationError|TabError): (.*)")
 
 @dataclass(frozen=True, slots=True)
 class Logged:
-    """A log record as a logger of a node publishes it on /rosout: when, by which logger, what, and from where."""
+    """A log record as a node's logger publishes it on /rosout: time, logger, text and source line."""
 
     sec: int
     nanosec: int
@@ -39,12 +39,12 @@ class Logged:
 def read_console(
     lines: Sequence[OutputLine], logs: Iterable[Logged], relative: Callable[[str], str]
 ) -> list[LogRecord | OutputLine | None]:
-    """Return what each line of one process is: a log record, a line, or None for a part of the record before it.
+    """Classify each line of one process: a log record, a plain line, or None for a continuation of a record.
 
     Args:
-        lines: What it wrote, in order; only standard error holds records.
-        logs: What was published on /rosout.
-        relative: Returns a path relative to the submission; empty for one outside.
+        lines: The output of the process, in order; only standard error has log records.
+        logs: The records that were published on /rosout.
+        relative: Makes a path relative to the submission; returns an empty string for a path outside of it.
     """
     known: dict[tuple[int, int, str], list[Logged]] = {}
     for one in logs:
@@ -83,7 +83,7 @@ def _published(candidates: list[Logged], first: str) -> Logged | None:
 
 
 def last_traceback(text: str, root: str) -> Mapping[str, Any] | None:
-    """Return the exception that a process ended with, by the end of what it wrote; None if it tells of none.
+    """Find the exception that ended a process in the end of its output; None if there is no traceback.
 
     Args:
         text: The end of its standard error.
@@ -94,14 +94,14 @@ def last_traceback(text: str, root: str) -> Mapping[str, Any] | None:
     if starts:
         block = _block(lines[starts[-1] :])
         after = lines[starts[-1] + len(block) :]
-        # what follows may be more lines of the exception's text, but not a program that went on
+        # the exception's text may have more lines, but a log record means that the program went on
         return None if len(after) > MESSAGE_LINES or any(map(HEADER.fullmatch, after)) else described(block, root)
     syntax = _SYNTAX.match(lines[-1])
     return described(lines, root) if syntax else None
 
 
 def thread_tracebacks(lines: Sequence[str], root: str) -> dict[int, Mapping[str, Any]]:
-    """Return the exceptions that ended threads, by the numbers of the lines that they begin at."""
+    """Find the exceptions that ended threads, keyed by the index of their first line."""
     found = {}
     for number, line in enumerate(lines):
         if line == TRACEBACK and _is_in_thread(lines, number):
@@ -110,7 +110,7 @@ def thread_tracebacks(lines: Sequence[str], root: str) -> dict[int, Mapping[str,
 
 
 def described(lines: Sequence[str], root: str) -> Mapping[str, Any]:
-    """Return a traceback as a fault, in the form in which the host reports one."""
+    """Convert a traceback to a fault, in the format in which the host reports faults."""
     places = [match for line in lines if (match := _FRAME.fullmatch(line))]
     own = [
         (file[len(root) + 1 :], int(number), name)
@@ -136,7 +136,7 @@ def _is_in_thread(lines: Sequence[str], number: int) -> bool:
 
 
 def _block(lines: Sequence[str]) -> Sequence[str]:
-    """Return a traceback without what follows it."""
+    """Return the lines of a traceback, without the lines after it."""
     for number, line in enumerate(lines[1:], 1):
         if not line.startswith(" "):
             return lines[: number + 1]

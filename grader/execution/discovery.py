@@ -1,4 +1,4 @@
-"""Waits, in real time, until endpoints that belong together have found each other, so that nothing sent is lost."""
+"""Waits, in real time, for DDS discovery: messages sent before endpoints are matched would be lost."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from grader.execution.service_peers import ServicePeers
 from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import NAME_CHARACTERS, TraceRecorder
 
-#: Nobody sends more messages than this between two reports.
+#: The most messages that are believed to be sent between two reports.
 COUNT = 1_000_000
-#: Names and types as ROS has them; nothing else that a process calls a name is ever shown.
+#: Valid ROS names and types; anything else that a process reports as a name is never shown.
 _NAME = re.compile(r"/[A-Za-z0-9_/]{0,299}")
 _TYPE = re.compile(r"[A-Za-z0-9_]+(?:/[A-Za-z0-9_]+){1,2}")
 _PARAMETER = re.compile(r"/[A-Za-z0-9_/]{0,150}:[^\s]{1,150}")
 
 
 def is_name(name: Any) -> bool:
-    """Return whether a value is the whole name of a topic, a service or a node."""
+    """Return whether a value is the absolute name of a topic, a service or a node."""
     return isinstance(name, str) and _NAME.fullmatch(name) is not None
 
 
 def counts(data: Any) -> dict[str, int]:
-    """Return numbers of messages by channel; what is no channel, or no number of them, is left out."""
+    """Return the number of messages by channel, without entries that are not valid channels or counts."""
     if not isinstance(data, dict):
         return {}
     channels = {name: count for name, count in data.items() if is_name(str(name).partition(" ")[2])}
@@ -38,7 +38,7 @@ def counts(data: Any) -> dict[str, int]:
 
 
 def is_claim(claim: Any) -> bool:
-    """Return whether a value describes an endpoint, or a parameter, with everything that is asked of it."""
+    """Return whether a value is a complete description of an endpoint or a parameter."""
     if not isinstance(claim, dict) or not all(isinstance(claim.get(k), str) for k in ("kind", "name", "type")):
         return False
     kind, name = claim["kind"], claim["name"]
@@ -52,12 +52,12 @@ def is_claim(claim: Any) -> bool:
 
 
 def readers_of(student: NodeProcess, topic: str) -> list[dict[str, Any]]:
-    """Return the subscriptions that a process says it has on a topic."""
+    """Return the subscriptions that a process reports on a topic."""
     return [c for c in student.claims if c["kind"] == "subscription" and c["name"] == topic]
 
 
 def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
-    """Return whether a publisher's offer satisfies a subscription's request (reliability and durability)."""
+    """Return whether a publisher's QoS satisfies a subscription's: reliability, durability, deadline, liveliness."""
     return (
         (writer["name"], writer["type"]) == (reader["name"], reader["type"])
         and (writer["reliable"] or not reader["reliable"])
@@ -68,7 +68,7 @@ def compatible(writer: dict[str, Any], reader: dict[str, Any]) -> bool:
 
 
 def offered(stream: PlannedMessages) -> dict[str, Any]:
-    """Return the publisher of a stimulus of a fixed type as a process would claim it."""
+    """Describe the publisher of a stimulus of a fixed type as a process would describe its own."""
     return {
         "name": stream.topic,
         "type": stream.type,
@@ -80,49 +80,48 @@ def offered(stream: PlannedMessages) -> dict[str, Any]:
 
 
 def serves(claim: dict[str, Any], service: str, interface: str) -> bool:
-    """Return whether a claim means that a service is there: its server, or the node that every such service has."""
+    """Return whether a claim provides a service: as its server, or as a node, for services that every node has."""
     if claim["kind"] == "node":
         return interface.startswith(BACKGROUND_TYPES) and claim["name"] == service.rpartition("/")[0]
     return (claim["kind"], claim["name"], claim["type"]) == ("service", service, interface)
 
 
 def takes_ordinary(reader: dict[str, Any]) -> bool:
-    """Return whether a subscription takes what a stimulus offers: no deadline, automatic liveliness."""
+    """Return whether a subscription is compatible with ordinary stimuli: no deadline, automatic liveliness."""
     return reader["deadline_ns"] == 0 and not reader["manual"]
 
 
 def announce(arrivals: dict[str, int], channel: str, count: int) -> None:
-    """Note that messages are on their way to somebody."""
+    """Add messages to those that are on their way to a process."""
     arrivals[channel] = arrivals.get(channel, 0) + count
 
 
-#: How long, in real time, something that has gone is waited for to leave the graph.
+#: How long, in real time, to wait until a removed endpoint has left the graph.
 DEPARTURE_S = 2.0
-#: Looking at the graph costs much: not so often that it holds up what is looked for.
+#: Querying the graph is expensive: the pause keeps the queries from delaying discovery itself.
 GRAPH_PAUSE_S = 0.003
-#: A process that names more than this as unmatched does not talk like the host.
-WORDS = 10_000
+#: The host never reports more unmatched names than this.
+MOST_UNMATCHED = 10_000
 
-
-#: Kind, name and type of an endpoint as the graph counts it: it counts servers and clients by their names alone.
+#: Kind, name and type of an endpoint as the graph counts it. Servers and clients are counted by name alone.
 Key = tuple[str, str, str]
 
 
 class Discovery:
-    """Knows which endpoints there are on both sides.
+    """Tracks the endpoints of the students' processes and of the grader, and waits until they are matched.
 
     Args:
         students: The processes.
         observer: The grader's node.
-        recorder: Where the graph is taken down.
+        recorder: Records graph snapshots and notes.
         services: The grader's servers and clients.
         mark_dead: Called with a process that no longer answers.
 
     Attributes:
         streams: The topics that stimuli publish on now, with their types.
-        fixed: Those whose type a rubric has fixed.
-        said: How many messages each of those has sent.
-        patience: How long whatever was announced is waited for.
+        fixed: The streams whose type a rubric has fixed.
+        published: How many messages each stimulus has published.
+        patience: The timeout for anything that was announced.
     """
 
     def __init__(
@@ -145,10 +144,10 @@ class Discovery:
         self._strangers: Counter[Key] = Counter()
         self.streams: dict[str, str] = {}
         self.fixed: dict[str, PlannedMessages] = {}
-        self.said: Counter[str] = Counter()
+        self.published: Counter[str] = Counter()
 
     def match(self, now_ns: int) -> None:
-        """Wait until the graph holds what the processes have and nothing that has gone, and all of it is matched."""
+        """Wait until the graph shows exactly the endpoints that exist, and all of them are matched."""
         claims = self._claims()
         if not self.patience.wait(lambda: self._holds(now_ns, claims), pause_s=GRAPH_PAUSE_S):
             self._recorder.note("an endpoint that a node created was not seen in the graph")
@@ -164,44 +163,44 @@ class Discovery:
         self.tell_all()
 
     def _announce_kept(self) -> None:
-        """Tell processes of what publishers have kept for subscriptions that come late and ask for it."""
+        """Announce the messages that latched publishers resend to new transient-local subscriptions."""
         for topic, stream in self.fixed.items():
             for student in self._students:
                 asks = any(c["latched"] and compatible(offered(stream), c) for c in readers_of(student, topic))
-                if asks and self.said[topic] and (student.name, topic) not in self._served:
+                if asks and self.published[topic] and (student.name, topic) not in self._served:
                     self._served.add((student.name, topic))
-                    announce(student.arrivals, f"topic {topic}", self.said[topic])
+                    announce(student.arrivals, f"topic {topic}", self.published[topic])
 
     def is_heard(self, topic: str) -> bool:
-        """Return whether the publisher of a stimulus has found every subscription that takes what it offers."""
+        """Return whether the publisher of a stimulus is matched with every compatible subscription."""
         stream, interface = self.fixed.get(topic), self.streams[topic]
         best_effort = stream is not None and stream.best_effort
         own = sum(not (reliable and best_effort) for reliable in self._observer.watching(topic, interface))
         asking = [c for s in self._students if not s.ended for c in readers_of(s, topic)]
-        # numbers are latched only where the first subscription asks for it
+        # a number stream is latched only if the first subscription asks for it
         readers = sum(self.takes(c, topic) for c in asking if stream is not None or not c["latched"])
         return self._observer.subscribers_matched(topic) >= readers + own
 
     def takes(self, reader: dict[str, Any], topic: str) -> bool:
-        """Return whether a subscription takes what a stimulus offers on a topic."""
+        """Return whether a subscription is compatible with the stimulus on a topic."""
         fixed = self.fixed.get(topic)
         fits = takes_ordinary(reader) if fixed is None else compatible(offered(fixed), reader)
         return bool(self.streams.get(topic) == reader["type"] and fits)
 
-    def see_off(self, now_ns: int) -> None:
-        """Wait until a process that has left the graph before it ended is gone for all the others."""
+    def await_departure(self, now_ns: int) -> None:
+        """Wait until all other processes have seen that a process left the graph before it ended."""
         if any(not student.ended for student in self._students):
             self.match(now_ns)
 
     def lose(self, student: NodeProcess) -> None:
-        """Note that a process ended without leaving the graph, where its endpoints stay for a while, as in reality."""
+        """Note that a process ended without leaving the graph, so its endpoints stay there for a while."""
         self._strangers += Counter(map(_key, student.claims))
 
     def _claims(self) -> list[dict[str, Any]]:
         return [c for s in self._students if not s.ended for c in s.claims]
 
     def tell_all(self) -> None:
-        """Have every process wait for the counterparts of its endpoints."""
+        """Make every process wait for the counterparts of its endpoints."""
         claims = self._claims()
         graph = self._observer.counts() if any(s.sees_graph for s in self._students) else {}
         for student in self._students:
@@ -209,7 +208,7 @@ class Discovery:
                 self._tell_matches(student, claims, graph)
 
     def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
-        """Return whether the graph holds what the processes claim."""
+        """Return whether the graph shows everything that the processes claim."""
         wanted = _wanted(claims)
         self._known |= wanted.keys()
         graph = self._graph_at(now_ns)
@@ -219,12 +218,12 @@ class Discovery:
         return exchanging <= offered and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:
-        """Count what the graph still holds of what has gone, but for what is known to stay."""
+        """Count the removed endpoints that are still in the graph, except known strangers."""
         wanted, found = _wanted(claims), self._found(self._graph_at(now_ns))
         return +Counter({key: found[key] - wanted[key] - self._strangers[key] for key in self._known})
 
     def _found(self, graph: GraphSnapshot) -> Counter[Key]:
-        """Count in the graph whatever a process has ever claimed."""
+        """Count, in the graph, the endpoints that any process has ever claimed."""
         found = Counter((e.kind, e.topic, e.type) for e in graph.endpoints)
         found.update(("node", name, "") for name in self._observer.students_nodes())
         for kind, name, _ in self._known:
@@ -233,18 +232,18 @@ class Discovery:
         return found
 
     def _graph_at(self, now_ns: int) -> GraphSnapshot:
-        """Return the live graph, with services where a process has said that it has any."""
+        """Return the live graph, including services if any process has reported one."""
         services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
         return self._observer.graph(now_ns, services=services or bool(self._recorder.graph.services))
 
     def is_served(self, calls: PlannedCalls) -> bool:
-        """Return whether the server that some calls need is there and matched."""
+        """Return whether the server for some calls exists and is matched."""
         service = self._services.resolved(calls.service)
         claims = [c for s in self._students if not s.ended for c in s.claims]
         if service is None or not any(serves(c, service, calls.type) for c in claims):
             return False
-        self._services.meet(calls)
-        if self.patience.wait(lambda: self._observer.services.met(service)):
+        self._services.add_clients(calls)
+        if self.patience.wait(lambda: self._observer.services.is_matched(service)):
             return True
         self._recorder.note(f"{service[:NAME_CHARACTERS]} was not matched in time")
         return False
@@ -258,12 +257,12 @@ class Discovery:
         matched = self._observer.publishers_matched(claim["name"], claim["type"], reliable=claim["reliable"])
         if not self._observer.reads(claim["name"]):
             return True
-        # A reader that takes best effort also matches reliable writers: it may see more than its own.
+        # A best-effort subscription also matches reliable publishers, so it may have more matches than these.
         most = len(same) + self._strangers[_key(claim)] + self._observer.publishes(claim["name"])
         return len(same) <= matched and (matched <= most or not claim["reliable"])
 
     def _tell_matches(self, student: NodeProcess, claims: list[dict[str, Any]], graph: dict[str, int]) -> None:
-        """Have a process wait for the counterparts of its endpoints, unless it was told of as many before."""
+        """Make a process wait for the counterparts of its endpoints, unless it already waited for the same ones."""
         expected: dict[str, dict[str, list[int]]] = {}
         for claim in student.claims:
             count = self._counterparts(claim, claims)
@@ -284,7 +283,7 @@ class Discovery:
         missing = answer.get("missing")
         if missing:
             self.patience.lose()
-        for name in filter(is_name, missing[:WORDS] if isinstance(missing, list) else ()):
+        for name in filter(is_name, missing[:MOST_UNMATCHED] if isinstance(missing, list) else ()):
             self._recorder.note(f"{student.name}: {name[:NAME_CHARACTERS]} was not matched in time")
 
     def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
@@ -308,7 +307,7 @@ class Discovery:
         )
 
     def look(self, now_ns: int) -> None:
-        """Take down the graph where it has changed."""
+        """Record the graph if it has changed."""
         self._recorder.look(self._graph_at(now_ns), self._observer.participants())
 
 

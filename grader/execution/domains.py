@@ -1,4 +1,4 @@
-"""ROS domains that nobody else on this machine uses."""
+"""Finds ROS domains that no other program on this machine uses."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from collections.abc import Iterator
 
 from grader.core.errors import EnvironmentFault
 
-#: Domains whose ports lie below the range that Linux hands out to others.
+#: Domains whose ports lie below Linux's ephemeral port range.
 USABLE = range(10, 101)
-#: So many claims are held: those of the scenarios under way, and of a few before them until their ghosts have gone.
+#: How many reservations to keep: for the running scenarios, and for earlier ones whose endpoints have not yet expired.
 HELD = 8
 
 
 def private_domains() -> Iterator[int]:
-    """Yield domains for a network of one's own: each scenario gets another one, and sees no ghost of the last."""
+    """Yield domains in a private network, a different one each time: a scenario sees no endpoints of the last one."""
     return itertools.cycle(USABLE)
 
 
 def shared_domains() -> Iterator[int]:
-    """Yield domains on a network shared with others: each is reserved among graders and seen to be unused.
+    """Yield domains on a shared network; each is unused and reserved against other graders.
 
     Raises:
-        EnvironmentFault: If none is free.
+        EnvironmentFault: No domain is free.
     """
     while True:
         _RESERVED.append(_reserve())
@@ -49,5 +49,5 @@ def _reserve() -> tuple[int, socket.socket]:
     raise EnvironmentFault("ROS domains: expected a free one, found all in use", "wait for other gradings to end")
 
 
-#: Claims that are still held, oldest first.
+#: Reservations that are still held, oldest first.
 _RESERVED: list[tuple[int, socket.socket]] = []

@@ -1,4 +1,4 @@
-"""Faults as a student's process reports them: untrusted values, taken over field by field."""
+"""Turns the reports of a student's process into faults; reports are untrusted, so each field is checked."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from grader.execution.plan import Plan
 from grader.execution.sandbox.start import OUTGROWN
 
 TEXT_CHARACTERS, FRAMES = 500, 20
-#: Processor seconds that a node may use until it first blocks, its imports included, and between two such moments.
+#: Processor seconds that a node may use until it first blocks, including its imports, and later between two blocks.
 START_CPU_S = 10.0
 WAKE_UP_CPU_S = 5.0
 #: Real seconds that a node may wait for something that is neither ROS nor time, such as a keyboard.
 BLOCKED_S = 5.0
-#: The words for the codes with which a process is ended that does not come back.
+#: The texts for the codes that the host's watchdog reports for a process that hangs.
 _HUNG = {
     "start_limit": f"did not return within {START_CPU_S:g} s of processor time",
     "wake_up_limit": f"did not return within {WAKE_UP_CPU_S:g} s of processor time",
@@ -29,29 +29,29 @@ _HUNG = {
     "process": "starts another process, which runs in real time",
     "waiting": "waits for something outside the ROS graph",
 }
-#: The whole name of a class, and of a function, as Python writes them: names only, no sentences.
+#: Qualified names of classes and functions as Python writes them; free text does not match.
 _TYPE = re.compile(r"(?=.{1,200}$)[^\W\d]\w*(?:\.(?:<locals>|[^\W\d]\w*))*")
 _FUNCTION = re.compile(r"(?=.{1,100}$)(?:<(?:module|lambda|listcomp|setcomp|dictcomp|genexpr)>|[^\W\d]\w*)")
-#: What C++ writes before it ends a process that found no memory.
+#: The C++ runtime writes this before it aborts a process that is out of memory.
 NO_MEMORY = b"std::bad_alloc"
-#: A process that had this share of the threads it may have, and then failed, wanted more.
+#: A process that aborts with at least this share of its allowed threads has hit the limit.
 NEARLY_ALL = 0.9
-#: A process that had used less than this share of its processor time has sent itself the signal of that limit.
+#: A process that receives SIGXCPU below this share of its processor time has sent the signal itself.
 HARDLY_ANY = 0.5
-#: The exit code of a program that Ctrl-C has ended, and the exceptions that ROS programs end with then.
+#: The exit code of a program that Ctrl-C ended, and the exceptions that ROS programs raise then.
 STOPPED_CODE = 130
 NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
 
 
 def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: Places) -> Fault:
-    """Return the fault that a report describes; an error that a limit is behind names the limit.
+    """Convert a reported fault; an error that a limit caused names the limit.
 
     Args:
         process: Name of the process.
-        t_ns: When.
-        data: What it says: a code, where, and for an exception its type and its message, which are its own words.
-        limits: What it may use.
-        places: The files of the submission; any other place is left out.
+        t_ns: Time of the fault.
+        data: The report: a code, a place, and for an exception its type and message.
+        limits: Limits of the process.
+        places: The files of the submission; places outside of them are dropped.
     """
     data = data if isinstance(data, dict) else {}
     code = data.get("code")
@@ -76,7 +76,7 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
 
 
 def _own_words(data: Mapping[str, Any]) -> str:
-    """Return an exception as Python tells it: `Type: message`, on one line."""
+    """Format an exception as Python does: `Type: message`, on one line."""
     name, message = data.get("type"), data.get("message")
     name = name if isinstance(name, str) and _TYPE.fullmatch(name) else "Exception"
     message = " ".join(message[:TEXT_CHARACTERS].split()) if isinstance(message, str) else ""
@@ -84,12 +84,12 @@ def _own_words(data: Mapping[str, Any]) -> str:
 
 
 def _place(data: Mapping[str, Any], places: Places, kind: FaultKind) -> tuple[str, int]:
-    """Return file and line of a fault, where the submission has them; empty and 0 otherwise."""
+    """Return file and line of a fault if the submission has them; otherwise an empty string and 0."""
     file, line = data.get("file"), data.get("line")
     if not isinstance(file, str) or not places.has(file):
         return "", 0
     if kind is FaultKind.SYNTAX_ERROR and type(line) is int:
-        line = min(line, places.lines(file))  # Python places what is missing at the end behind the last line
+        line = min(line, places.lines(file))  # Python reports an unexpected end one line after the last
     return (file, line) if type(line) is int and places.has(file, line) else (file, 0)
 
 
@@ -103,7 +103,7 @@ def _frames(data: Any, places: Places) -> tuple[str, ...]:
 
 
 def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Limits, places: Places) -> Fault:
-    """Return the fault of a process that says how it ended."""
+    """Return the fault of a process that reported its end."""
     if isinstance(report.get("fault"), dict):
         return reported_fault(process, t_ns, report["fault"], limits, places)
     code = report.get("code")
@@ -111,28 +111,28 @@ def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Lim
 
 
 def exited(process: str, t_ns: int, code: int | None) -> Fault:
-    """Return the fault of a process that ended by itself; the code is None if it is not known."""
+    """Return the fault of a process that exited by itself; the code is None if it is unknown."""
     text = f"exited with code {'?' if code is None else code}"
     return Fault(t_ns, process, FaultKind.EXITED, text, exit_code=code)
 
 
 def ended_by(process: str, t_ns: int, signal: str) -> Fault:
-    """Return the fault of a process that a signal ended without a limit that explains it."""
+    """Return the fault of a process that was ended by a signal that no limit explains."""
     return Fault(t_ns, process, FaultKind.KILLED, _by(signal), signal=signal)
 
 
 def ending(  # noqa: PLR0913 - each comes from another place
     process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, places: Places, *, stopped: bool
 ) -> Fault | Mark:
-    """Return the fault of a process that says how it ended, or the mark of an end that is none.
+    """Return the fault of a process that reported its end, or a mark if the end is normal.
 
     Args:
         process: Name of the process.
-        t_ns: When.
-        report: What it says.
-        plan: Whether it is free to end, and its limits.
+        t_ns: Time of the end.
+        report: The report of the process.
+        plan: Says whether the process may exit, and its limits.
         places: The files of the submission.
-        stopped: Whether it had got the stop signal.
+        stopped: Whether the process had received the stop signal.
     """
     if stopped and is_normal_stop(report):
         return Mark(t_ns, "stopped", process)
@@ -142,14 +142,14 @@ def ending(  # noqa: PLR0913 - each comes from another place
 
 
 def is_free_exit(report: Mapping[str, Any]) -> bool:
-    """Return whether a process says that it ended by itself and with code 0."""
+    """Return whether a process reports that it exited by itself with code 0."""
     return not isinstance(report.get("fault"), dict) and report.get("code") == 0
 
 
 def is_normal_stop(report: Mapping[str, Any]) -> bool:
     """Return whether a process ended after the stop signal as ROS programs do.
 
-    rclpy shuts its contexts down at that signal, so a program that shuts down once more is told so.
+    rclpy shuts its contexts down at that signal, so a program that calls shutdown() itself gets an exception.
     """
     fault = report.get("fault")
     if isinstance(fault, dict):
@@ -167,14 +167,14 @@ def _by(signal: str) -> str:
 
 
 def limit_behind(signal: str, last_words: bytes, most_threads: int, used_ns: int, limits: Limits) -> str:
-    """Return which limit a process was ended at that a signal ended, in words; empty if none explains it.
+    """Describe the limit that explains why a signal ended a process; empty if no limit does.
 
     Args:
         signal: Name of the signal.
-        last_words: The end of what it wrote on standard error; it serves the wording only.
-        most_threads: The most threads it had.
-        used_ns: The processor time it had used when that was last looked at.
-        limits: What it might use.
+        last_words: The end of its standard error; used for the wording only.
+        most_threads: The most threads that it had.
+        used_ns: Its processor time when the resource monitor last looked.
+        limits: Limits of the process.
     """
     if signal == "SIGXCPU" and used_ns > HARDLY_ANY * limits.processor_ns:
         return f"stopped at {limits.processor_words()}"
@@ -190,7 +190,7 @@ def limit_behind(signal: str, last_words: bytes, most_threads: int, used_ns: int
 
 
 def _errors(limits: Limits) -> Mapping[str, str]:
-    """Return the words for each error by which Python tells of a limit."""
+    """Map each error message that Python gives at a limit to the description of that limit."""
     return {
         "MemoryError": limits.memory_words(),
         "Cannot allocate memory": limits.memory_words(),

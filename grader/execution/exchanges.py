@@ -1,4 +1,4 @@
-"""Planned messages, servers, calls and goals: stimuli whose every field is drawn, as plain JSON values."""
+"""Planned messages, servers, calls and goals: stimuli with all random values drawn, as plain JSON values."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from grader.core.scenario import (
 
 
 def drawn_time(time: Time, draw: random.Random) -> int:
-    """Return a time in nanoseconds; one that is fixed takes nothing from the source."""
+    """Draw a time in nanoseconds; a fixed time consumes no randomness."""
     if not isinstance(time, TimeBetween):
         return time
-    # the ends as they are written are inside, also where they are no whole milliseconds
+    # both ends are included, even if they are not whole milliseconds
     return min(time.high_ns, time.low_ns + NS_PER_MS * draw.randint(0, -(-(time.high_ns - time.low_ns) // NS_PER_MS)))
 
 
 def drawn_count(count: Count, draw: random.Random) -> int:
-    """Return a count; one that is fixed takes nothing from the source."""
+    """Draw a count; a fixed count consumes no randomness."""
     return draw.randint(count.low, count.high) if isinstance(count, CountBetween) else count
 
 
 def in_drawn_order(items: Sequence[Any], draw: random.Random) -> list[Any]:
-    """Return the cases one by one; a list in which nothing is open comes back as it is and takes nothing."""
+    """Flatten a list of cases and draw their order; a list with a fixed order consumes no randomness."""
     return [case for item in items for block in _blocks(item, draw) for case in block]
 
 
 def _blocks(item: Any, draw: random.Random) -> list[list[Any]]:
-    """Return what an item comes to: cases that belong together are one list."""
+    """Expand an item to its cases; cases that must stay together form one list."""
     if isinstance(item, InOrder):
         return [list(item.items)]
     if isinstance(item, SomeOf):
@@ -93,7 +93,7 @@ class PlannedServer:
     responses: tuple[Fields, ...]
 
     def response(self, index: int) -> Fields | None:
-        """Return the fields of the response to a request, counted from 0; None if there is none."""
+        """Return the fields of the response to a request, counted from 0; None if it gets no response."""
         if not self.responses or (self.answers and index >= self.answers):
             return None
         return self.responses[index % len(self.responses) if self.cycle else min(index, len(self.responses) - 1)]
@@ -113,12 +113,12 @@ class PlannedCalls:
 
 @dataclass(frozen=True, slots=True)
 class PlannedCall:
-    """One request that is to be sent.
+    """One request to send.
 
     Attributes:
-        calls: What it is one of.
-        index: Which of them, from 0.
-        then: Requests that follow if the response accepts this one, each with its time from then on.
+        calls: The calls that it belongs to.
+        index: Its index in them, from 0.
+        then: Requests to send if the response accepts this one, each with its delay after the response.
     """
 
     calls: PlannedCalls
@@ -127,13 +127,13 @@ class PlannedCall:
 
     @property
     def client(self) -> int:
-        """Which client of these calls sends it, from 0."""
+        """Index of the client that sends the request, from 0."""
         return self.index % self.calls.clients
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedGoal:
-    """A goal with every field drawn, and the identifier it goes by; see `grader.core.scenario.ActionGoal`."""
+    """A goal with every field drawn, and its goal id; see `grader.core.scenario.ActionGoal`."""
 
     action: str
     type: str
@@ -144,7 +144,7 @@ class PlannedGoal:
 
 
 def goal_call(goal: PlannedGoal) -> PlannedCall:
-    """Return the request that sends a goal, and those that follow: for its result, and perhaps to cancel it."""
+    """Return the request that sends a goal, with the requests that follow: for its result, and perhaps to cancel it."""
     name, identity = f"{goal.action}/_action", {"uuid": list(goal.uuid)}
 
     def once(service: str, interface: str, request: Fields) -> PlannedCalls:
@@ -159,7 +159,7 @@ def goal_call(goal: PlannedGoal) -> PlannedCall:
 
 
 def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages:
-    """Return a message stream with every field drawn, and the order and number of messages where they are open."""
+    """Draw every field of a message stream, and the order and number of its messages unless they are fixed."""
     start_ns, values, repeats = drawn_time(stream.start_ns, draw), in_drawn_order(stream.values, draw), stream.repeats
     each = [(value, drawn_count(repeats, draw)) for value in values] if isinstance(repeats, CountBetween) else []
     planned = [drawn_fields(value, draw) for value in values]
@@ -170,7 +170,7 @@ def plan_messages(stream: MessageStream, draw: random.Random) -> PlannedMessages
 
 
 def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
-    """Return a server with every response drawn, each once: one that is given again is the same again."""
+    """Draw every response of a server once: a response that is sent again has the same values."""
     return _planned(
         PlannedServer,
         server,
@@ -182,7 +182,7 @@ def plan_server(server: ServiceServer, draw: random.Random) -> PlannedServer:
 
 
 def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
-    """Return calls with every request drawn, for each call and client anew."""
+    """Draw every request of some calls, separately for each call and client."""
     start_ns, count = drawn_time(calls.start_ns, draw), drawn_count(calls.calls, draw)
     requests = in_drawn_order(calls.requests, draw)
     wanted = [requests[call % len(requests)] for call in range(count) for _ in range(calls.clients)]
@@ -191,19 +191,19 @@ def plan_calls(calls: ServiceCalls, draw: random.Random) -> PlannedCalls:
 
 
 def plan_goal(goal: ActionGoal, draw: random.Random) -> PlannedGoal:
-    """Return a goal with every field drawn."""
+    """Draw every field of a goal."""
     start_ns, asked = drawn_time(goal.start_ns, draw), drawn_fields(goal.goal, draw)
     return _planned(PlannedGoal, goal, start_ns=start_ns, goal=asked, uuid=tuple(draw.randbytes(16)))
 
 
 def _planned(kind: Callable[..., Planned], stimulus: Any, **drawn: Any) -> Planned:
-    """Return a stimulus with what was drawn; all else is as the scenario has it."""
+    """Build a planned stimulus from drawn values, and take all other fields from the scenario."""
     same = {name: getattr(stimulus, name) for name in inspect.signature(kind).parameters if name not in drawn}
     return kind(**same, **drawn)
 
 
 def drawn_fields(fields: Mapping[str, FieldSpec], draw: random.Random) -> Fields:
-    """Return the fields of a message with every value drawn."""
+    """Draw every value in the fields of a message."""
     return {name: _drawn(value, draw) for name, value in fields.items()}
 
 
@@ -221,7 +221,7 @@ def _drawn(value: FieldSpec, draw: random.Random) -> Any:
 
 
 def drawn_number(spec: Between, draw: random.Random) -> int | float:
-    """Return a number: a whole one between whole ones, otherwise one of as many decimals as tell a hundredth apart."""
+    """Draw a number: an integer between integer bounds, otherwise rounded to a hundredth of the range or finer."""
     if float(spec.low).is_integer() and float(spec.high).is_integer():
         return draw.randint(int(spec.low), int(spec.high))
     decimals = max(2, 2 - math.floor(math.log10(spec.high - spec.low)))

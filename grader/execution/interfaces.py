@@ -1,4 +1,4 @@
-"""Message and service types of this machine: their classes, messages as plain values, and plain values as messages."""
+"""Finds the classes of message and service types, and converts between messages and plain values."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 from grader.core.errors import HarnessError
 
 TYPE_NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)(_[A-Z][A-Za-z]*)?")
-#: What an action is made of, as its parts are called on the wire.
+#: The services and topics of an action, as they are named on the wire.
 ACTION_PARTS = {"_SendGoal": "SendGoalService", "_GetResult": "GetResultService", "_FeedbackMessage": "FeedbackMessage"}
 
 
 def message_class(interface: str) -> Any:
-    """Return the class of a message type, or None if this machine has no such type."""
+    """Return the class of a message type, or None if it is not installed."""
     return interface_class(interface, "msg")
 
 
 def interface_class(interface: str, kind: str) -> Any:
-    """Return the class of a type, or None if this machine has no such type.
+    """Return the class of a type, or None if it is not installed.
 
     Args:
         interface: e.g. `std_srvs/srv/Trigger` or `test_msgs/action/Fibonacci_SendGoal`.
@@ -29,19 +29,19 @@ def interface_class(interface: str, kind: str) -> Any:
     match = TYPE_NAME.fullmatch(interface)
     if match is None:
         return None
-    package, room, name, part = match.groups()
+    package, namespace, name, part = match.groups()
     asked = kind if part is None else "action"
-    if room != asked or (part is not None and kind != ("msg" if part == "_FeedbackMessage" else "srv")):
+    if namespace != asked or (part is not None and kind != ("msg" if part == "_FeedbackMessage" else "srv")):
         return None
     try:
-        found = getattr(importlib.import_module(f"{package}.{room}"), name, None)
+        found = getattr(importlib.import_module(f"{package}.{namespace}"), name, None)
     except ImportError:
         return None
     return found if part is None or found is None else getattr(found.Impl, ACTION_PARTS.get(part, ""), None)
 
 
 def wanted_class(interface: str, kind: str, where: str) -> Any:
-    """Return the class of a type that a rubric needs; raises HarnessError if this machine lacks it."""
+    """Return the class of a type that a rubric needs; raises HarnessError if it is not installed."""
     found = interface_class(interface, kind)
     if found is None:
         package = interface.partition("/")[0]
@@ -50,7 +50,7 @@ def wanted_class(interface: str, kind: str, where: str) -> Any:
 
 
 def plain_fields(message: Any) -> Any:
-    """Return a message's fields as plain values, nested by name."""
+    """Convert a message to plain values, nested by field name."""
     if hasattr(message, "get_fields_and_field_types"):
         return {name: plain_fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
     if isinstance(message, (bool, int, float, str)):
@@ -63,15 +63,15 @@ def plain_fields(message: Any) -> Any:
 
 
 def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
-    """Return a message of a class with some fields; the others have their defaults.
+    """Build a message from plain values; fields that are not given keep their defaults.
 
     Args:
-        message: The class.
-        fields: Plain values, nested by name; whole numbers may stand where the type has a fraction.
-        where: What the message of an error begins with.
+        message: The class of the message.
+        fields: Plain values, nested by name; an integer is accepted for a floating-point field.
+        where: Prefix of error messages.
 
     Raises:
-        HarnessError: The type has no such field, or the field takes no such value.
+        HarnessError: The type has no such field, or the field does not accept the value.
     """
     made = message(check_fields=True)
     kinds = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
@@ -90,7 +90,7 @@ def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
 
 
 def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
-    """Return a plain value as a field of a kind takes it; `part` is the class that the field holds now."""
+    """Convert a plain value for a field of a kind; `part` is the class of the field's current value."""
     if hasattr(kind, "value_type"):
         if not isinstance(value, (list, tuple)):
             raise TypeError(value)

@@ -1,4 +1,4 @@
-"""What this machine is made of and how busy it is, as far as grading depends on it."""
+"""Describes this machine, as far as grading depends on it, and adapts time-outs to its load."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from grader.execution.observer import wait_until
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.properties import confined, install_command, setting_command
 
-#: How long an endpoint or a message that was announced is waited for.
+#: How long to wait for an endpoint or a message that was announced.
 SETTLE_S = 5.0
-#: On a busy machine, so many times as long as there are processes that want each processor, up to this.
+#: On a busy machine, time-outs are multiplied by the load per processor, up to this factor.
 MOST_BUSY = 4.0
-#: After so many that never came, later ones are waited for only briefly.
+#: After this many time-outs, further waits are brief.
 LOSSES, BRIEF_S = 3, 0.05
 
 
 def load_per_processor() -> float:
-    """Return how many processes want each processor, from 1 to `MOST_BUSY`; 1 if the system does not say."""
+    """Return the load average per processor, from 1 to `MOST_BUSY`; 1 if the system does not provide it."""
     try:
         return min(MOST_BUSY, max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
     except OSError:
@@ -37,10 +37,10 @@ def load_per_processor() -> float:
 
 
 class Patience:
-    """The patience of one recording.
+    """The time-out of one recording, which gets short after repeated losses.
 
     Args:
-        full_s: How long a wait may take at first, on a quiet machine.
+        full_s: Time-out of the first waits, on an idle machine.
     """
 
     def __init__(self, full_s: float = SETTLE_S) -> None:
@@ -49,35 +49,35 @@ class Patience:
 
     @property
     def wait_s(self) -> float:
-        """How long the next wait may take."""
+        """Time-out of the next wait, in seconds."""
         return self._full_s if self._losses < LOSSES else BRIEF_S
 
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
-        """Wait until a condition holds; return whether it came to."""
+        """Wait until a condition holds; return whether it did before the time-out."""
         came = wait_until(condition, self.wait_s, pause_s=pause_s)
         if not came:
             self.lose()
         return came
 
     def lose(self) -> None:
-        """Note that something was waited for in vain."""
+        """Count one wait that timed out."""
         self._losses += 1
 
 
-#: Space that staged submissions, recordings and reports may need at a time.
+#: Disk space that staged submissions, recordings and reports may need at the same time.
 MIN_SCRATCH_BYTES = 512 * MIB
 #: Memory below which a scenario with two nodes, its worker and the grader may not fit.
 MIN_MEMORY_BYTES = GIB
 
 _VERSION = re.compile(r"<version>\s*([0-9.]+)\s*</version>")
 _CREATE_RULESET, _ASK_VERSION = 444, 1  # linux/landlock.h; the number is the same on every architecture
-#: Where the kernel shows its settings.
+#: Where the kernel exposes its settings.
 SETTINGS_FOLDER = Path("/proc/sys")
 _PERSISTENT = "/etc/sysctl.d/60-rclpy-grader.conf"
 
 
 def software(ros: RosInstallation | None) -> Iterator[Fact]:
-    """Yield the versions of everything that takes part, ROS only if there is one."""
+    """Yield the versions of all software involved; those of ROS only if it is installed."""
     yield Fact("grader", grader.__version__)
     yield Fact("Python", f"{platform.python_version()} ({sys.executable})")
     if ros is not None:
@@ -89,7 +89,7 @@ def software(ros: RosInstallation | None) -> Iterator[Fact]:
 
 
 def system() -> Iterator[Fact]:
-    """Yield what the kernel and the hardware offer."""
+    """Yield the relevant properties of the kernel and the hardware."""
     yield Fact("kernel", f"{platform.system()} {platform.release()} {platform.machine()}, {_distribution()}")
     yield Fact("user", f"{'root' if os.geteuid() == 0 else f'uid {os.geteuid()}'}{_surroundings()}")
     yield _namespaces()
@@ -100,7 +100,7 @@ def system() -> Iterator[Fact]:
 
 
 def _package_version(prefix: Path, package: str) -> str:
-    """Return the version of a ROS package as its manifest says, or nothing."""
+    """Return the version of a ROS package from its manifest, or an empty string."""
     try:
         manifest = (prefix / "share" / package / "package.xml").read_text(encoding="utf-8")
     except (OSError, UnicodeError):
@@ -110,7 +110,7 @@ def _package_version(prefix: Path, package: str) -> str:
 
 
 def _fast_dds(ros: RosInstallation) -> str:
-    """Return the version of Fast DDS by the name of its library, as a phrase, or nothing."""
+    """Return the version of Fast DDS from the name of its library, as a phrase, or an empty string."""
     for folder in ros.runtime.library_paths:
         for name in ("fastrtps", "fastdds"):
             versions = sorted(re.findall(r"\.so\.(\d+\.\d+\.\d+)", " ".join(map(str, folder.glob(f"lib{name}*.so.*")))))
@@ -152,7 +152,7 @@ def _surroundings() -> str:
 
 
 def _namespaces() -> Fact:
-    """Say whether ordinary users may make namespaces; root may in any case."""
+    """Report whether ordinary users may create namespaces; root always may."""
     command = setting_command()
     if not command:
         filtered = ", but a filter of system calls may" if confined() else ""
@@ -176,7 +176,7 @@ def _memory() -> Fact:
 
 
 def _available_memory() -> int | None:
-    """Return the bytes that new programs can have, or None if the kernel does not say."""
+    """Return the memory available to new programs, in bytes, or None if the kernel does not report it."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     except OSError:

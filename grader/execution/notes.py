@@ -1,4 +1,4 @@
-"""What a student's process says in codes, checked and put into words; the files and lines that it may name."""
+"""Turns the codes that a student's process reports into notes, and checks the files and lines that it names."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any
 from grader.core.submission import main_not_called
 from grader.core.trace import Start, StartWay
 
-#: No file of a submission is larger.
+#: The size limit of a file in a submission.
 MOST_BYTES = 8 << 20
 NAME_CHARACTERS = 300
 
 
 class Places:
-    """The files of a staged submission, looked at when they are named.
+    """The files of a staged submission, read when they are first asked for.
 
     Args:
-        root: Its folder; None for a submission without files.
+        root: The staged folder; None for a submission without files.
     """
 
     def __init__(self, root: Path | None) -> None:
@@ -29,11 +29,11 @@ class Places:
         self._lines: dict[str, int] = {}
 
     def has(self, file: object, line: object = 1) -> bool:
-        """Return whether a file of the submission has a line; its path is relative, and spelt as it is staged."""
+        """Return whether a file of the submission has a line; the path is relative and normalized."""
         return isinstance(file, str) and type(line) is int and 1 <= line <= self.lines(file)
 
     def lines(self, file: str) -> int:
-        """Return how many lines a file has, an empty one has one; 0 for what is no file of the submission."""
+        """Return the number of lines of a file, at least 1; 0 for anything that is not a file of the submission."""
         if len(file) > NAME_CHARACTERS or file in ("", ".") or str(PurePosixPath(file)) != file:
             return 0
         if file not in self._lines:
@@ -58,22 +58,22 @@ class Places:
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; not a pipe that nobody writes to, and nothing that a link leads to."""
+    """Open a file without following a symlink and without blocking on a pipe."""
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
 _WAYS = {way.value: way for way in StartWay}
 _NAME_CHARACTERS, _HIDDEN = 100, 20
-#: The dotted name of a module; folders may have any name, and may not have any sign.
+#: The dotted name of a module. Folder names may contain spaces, parentheses and hyphens.
 _TARGET = re.compile(r"[\w.() -]{1,300}")
 
 
 def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
-    """Return the sentence for a code; empty for a code that is unknown, or that names what cannot be.
+    """Return the note for a code; empty if the code is unknown or names something impossible.
 
     Args:
         file: The file that the process runs.
-        data: What it says.
+        data: The report.
         places: The files of the submission.
     """
     say = NOTES.get(str(data.get("code")))
@@ -81,12 +81,12 @@ def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
 
 
 def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -> Start | None:
-    """Return how a process says that its file is started; None if it says no such thing.
+    """Return how a process reports that its file is started; None if the report is not valid.
 
     Args:
         process: Name of the process.
         file: The file that it runs.
-        data: What it says.
+        data: The report.
         places: The files of the submission.
     """
     way, module, function = _WAYS.get(str(data.get("way"))), data.get("module"), data.get("function")
@@ -103,13 +103,13 @@ def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -
 
 
 def hidden_notes(start: Start) -> list[str]:
-    """Return a sentence for each file that hides a module."""
+    """Return a note for each file that hides a module."""
     need = "has the name of a module that Python or ROS needs: `python3` imports it instead; rename it"
     return [f"{name} {need}" for name in start.hidden]
 
 
 def _is_there(name: object, file: str, places: Places) -> bool:
-    """Return whether a module lies beside a file, or in a folder above it."""
+    """Return whether a module is in the folder of a file or in a parent folder."""
     if not isinstance(name, str) or "/" in name:
         return False
     folders = [file]
@@ -145,7 +145,7 @@ def _is_name(name: object) -> bool:
     return isinstance(name, str) and name.isidentifier() and len(name) <= _NAME_CHARACTERS
 
 
-#: Every code that a process may send, and its sentence.
+#: Every code that a process may send, with the function that words its note.
 NOTES: Mapping[str, Callable[[str, Mapping[str, Any], Places], str]] = {
     "main_not_called": _main_not_called,
     "class_not_started": _class_not_started,

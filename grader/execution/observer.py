@@ -1,7 +1,7 @@
-"""The grader's own node: sees the graph, takes every message the students' nodes publish, publishes stimuli.
+"""The grader's own node: watches the graph, takes every message that students' nodes publish, publishes stimuli.
 
-The only module of the grader's own processes that uses rclpy. It has no services, no parameters and no callbacks, and
-never waits for an executor: messages are taken when the conductor asks for them.
+Apart from the sandbox self-test, it is the only module of the grader's own processes that uses rclpy. The node has no
+services, parameters, callbacks or executor: the runner takes messages by polling.
 """
 
 from __future__ import annotations
@@ -31,27 +31,25 @@ from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
-#: Deep enough for everything that can be published between two looks.
+#: Queue depth, enough for everything that can be published between two polls.
 DEPTH = 5000
-#: What is taken at once at most; the rest is taken the next time.
+#: The most messages of a topic, and bytes of all topics, that one poll takes; the rest is left for the next poll.
 AT_ONCE, AT_ONCE_BYTES = 1000, 4 * MIB
-#: Topics whose trouble is told at the end, and how much of a name.
-TOLD, NAME_CHARACTERS = 20, 200
-#: Durations of QoS policies from here on mean for ever.
+#: How many topics the notes at the end name, and how long a name may be.
+MOST_TOPICS, NAME_CHARACTERS = 20, 200
+#: A QoS duration of at least this means infinite.
 INFINITE_NS = 9_000_000_000_000_000_000
-#: How long, in real time, what a process sent before it died is waited for, and how many looks must find nothing.
+#: How long, in real time, to wait for messages of a process that died, and how many polls in a row must find nothing.
 REST_S, QUIET_LOOKS, QUIET_PAUSE_S = 0.5, 4, 0.005
-#: What rclpy calls a node whose endpoints are known but whose name is not yet, or not any more.
+#: rclpy's name for a node whose endpoints are known, but whose name is not known yet or no longer.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-
-
-#: Participants of the grader's at most, and how long the name of a new one is waited for.
+#: The most participants of the grader, and how long to wait for the name of a new one.
 PARTICIPANTS, NAME_S = 8, 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One message as it came: topic, type, bytes and decoded fields."""
+    """One received message: topic, type, bytes and decoded fields."""
 
     topic: str
     type: str
@@ -60,11 +58,11 @@ class Taken:
 
 
 class Observer:
-    """A node in a context of its own, and a few more where topics have several types.
+    """A node in its own context, and a few more nodes if topics have several types.
 
     Args:
         domain: ROS domain to join.
-        limits: How large a message may be whose content is read.
+        limits: Sets the largest message whose content is read.
     """
 
     def __init__(self, domain: int, limits: Limits) -> None:
@@ -88,10 +86,10 @@ class Observer:
             node.context.shutdown()
 
     def _make(self, create: Callable[[Node], Any]) -> Any:
-        """Make an endpoint, beside the others if its topic has another type there: a participant takes only one.
+        """Create an endpoint, in another node if its topic already has another type: a participant allows only one.
 
         Raises:
-            RCLError: It cannot be made at all.
+            RCLError: No node can create it.
         """
         for node in self._nodes:
             try:
@@ -107,13 +105,13 @@ class Observer:
         return create(other)
 
     def graph(self, t_ns: int, *, services: bool = False) -> GraphSnapshot:
-        """Return the live graph without the grader's own node, everything sorted.
+        """Return the live graph, sorted and without the grader's own node.
 
-        An endpoint comes before the name of its node, and goes after it; without that name it is left out.
+        An endpoint can be in the graph before or after the name of its node is; it is left out then.
 
         Args:
-            t_ns: What time it is.
-            services: Whether to look at services as well, which costs something.
+            t_ns: Time of the snapshot.
+            services: Whether to include services, which takes longer.
         """
         names = [
             pair for pair in self.node.get_node_names_and_namespaces() if pair[0] not in {*self._names, UNKNOWN_NODE}
@@ -132,7 +130,7 @@ class Observer:
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
     def participants(self) -> int:
-        """Return how many participants with endpoints of their own have appeared, without the grader's."""
+        """Return how many participants with endpoints have appeared, without the grader's."""
         return len(self._participants)
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
@@ -155,7 +153,7 @@ class Observer:
         )
 
     def watch(self, graph: GraphSnapshot) -> list[str]:
-        """Subscribe to every topic that a student's node publishes; return topics whose type is unknown here."""
+        """Subscribe to every topic that a student's node publishes; return the topics whose type is not installed."""
         unknown = []
         for end in graph.endpoints:
             key = (end.topic, end.type, end.reliability == "reliable")
@@ -171,11 +169,11 @@ class Observer:
         return unknown
 
     def reads(self, topic: str) -> bool:
-        """Return whether messages on a topic can be taken here."""
+        """Return whether this node subscribes to a topic."""
         return any(name == topic for name, _, _ in self._readers)
 
     def watching(self, topic: str, interface: str) -> list[bool]:
-        """Return the subscriptions on a topic and type: for each, whether it asks for reliability."""
+        """Return, for each subscription of this node to a topic and type, whether it is reliable."""
         return [reliable for name, kind, reliable in self._readers if (name, kind) == (topic, interface)]
 
     def publishes(self, topic: str) -> bool:
@@ -183,17 +181,17 @@ class Observer:
         return topic in self._writers
 
     def students_nodes(self) -> list[str]:
-        """Return the names of the students' nodes that are in the graph, each as often as it is there."""
+        """Return the names of the students' nodes in the graph, including duplicates."""
         pairs = self.node.get_node_names_and_namespaces()
         return [_full_name(*pair) for pair in pairs if pair[0] not in {*self._names, UNKNOWN_NODE}]
 
     def ends_of(self, kind: str, service: str) -> int:
-        """Return how many servers (`service`) or clients (`client`) of a service there are, with the grader's own."""
+        """Return the number of servers (`service`) or clients (`client`) of a service, including the grader's own."""
         count = self.node.count_services if kind == "service" else self.node.count_clients
         return int(count(service))
 
     def counts(self) -> dict[str, int]:
-        """Return how many endpoints and nodes of each name any node sees in the graph now, with the grader's own."""
+        """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own."""
         found = Counter(f"node {_full_name(*pair)}" for pair in self.node.get_node_names_and_namespaces())
         for topic, _ in self.node.get_topic_names_and_types():
             if topic not in BACKGROUND:
@@ -206,29 +204,29 @@ class Observer:
         return {name: count for name, count in found.items() if count}
 
     def publishers_matched(self, topic: str, interface: str, *, reliable: bool) -> int:
-        """Return how many publishers the subscription for a topic, type and reliability has."""
+        """Return how many publishers are matched with the subscription for a topic, type and reliability."""
         reader = self._readers.get((topic, interface, reliable))
         return 0 if reader is None else int(reader.get_publisher_count())
 
     def take(self, at_once: int = AT_ONCE) -> list[Taken]:
-        """Return the messages that have arrived since the last time, topic by topic; of a flood only the first ones.
+        """Take the messages that have arrived since the last call, topic by topic, up to a limit.
 
         Args:
-            at_once: How many of one topic at most.
+            at_once: The most messages to take from one topic.
         """
         taken: list[Taken] = []
-        room = AT_ONCE_BYTES
+        left_bytes = AT_ONCE_BYTES
         for (topic, interface, _), reader in sorted(self._readers.items()):
             with reader.handle:
                 for _ in range(at_once):
-                    if room <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
+                    if left_bytes <= 0 or (found := reader.handle.take_message(reader.msg_type, True)) is None:  # noqa: FBT003
                         break
-                    room -= len(found[0])
+                    left_bytes -= len(found[0])
                     taken.append(self._decoded(topic, interface, reader.msg_type, found[0]))
         return taken
 
     def take_rest(self) -> list[Taken]:
-        """Return what is still on its way from a process that has ended without a word."""
+        """Take the messages that are still in transit from a process that died."""
         wait_until(lambda: not unread_bytes(), REST_S, pause_s=0.001)
         found: list[Taken] = []
         quiet = 0
@@ -241,14 +239,14 @@ class Observer:
                 break
         return found
 
-    def hear_logs(self) -> None:
-        """Subscribe to what the loggers of nodes publish; what came before is kept for those who come late."""
+    def subscribe_to_logs(self) -> None:
+        """Subscribe to /rosout; its publishers are latched, so earlier log records arrive as well."""
         message = message_class(LOG_TYPE)
         qos = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._logs = self._make(_subscribing(message, "/rosout", qos))
 
     def logs(self) -> list[Logged]:
-        """Return the log records that have been published since the last time; broken ones are left out."""
+        """Take the log records that have been published since the last call, without malformed ones."""
         found: list[Logged] = []
         with self._logs.handle:
             while len(found) < AT_ONCE and (taken := self._logs.handle.take_message(self._logs.msg_type, True)):  # noqa: FBT003
@@ -269,17 +267,17 @@ class Observer:
             return Taken(topic, interface, cdr, {})
 
     def notes(self) -> list[str]:
-        """Return what readers must know of messages whose content was not read."""
+        """Return notes about messages whose content was not read."""
         large = f"larger than {size(self._limits.message_bytes)}"
         broken = "that are not what their type says"
         return [
             f"{topic[:NAME_CHARACTERS]}: the content of messages {what} was not looked at ({count:,} in all)"
             for counts, what in ((self._large, large), (self._broken, broken))
-            for topic, count in sorted(counts.items())[:TOLD]
+            for topic, count in sorted(counts.items())[:MOST_TOPICS]
         ]
 
     def advertise(self, topic: str, interface: str, *, latched: bool, best_effort: bool = False) -> None:
-        """Create the publisher of a stimulus: reliable unless it is to be less, latched where a subscription asks."""
+        """Create the publisher of a stimulus."""
         message = message_class(interface)
         if message is None:
             raise ValueError(interface)
@@ -289,24 +287,24 @@ class Observer:
         self._writers[topic] = self._make(lambda node: node.create_publisher(message, topic, qos))
 
     def subscribers_matched(self, topic: str) -> int:
-        """Return how many subscriptions the publisher of a stimulus has."""
+        """Return how many subscriptions are matched with the publisher of a stimulus."""
         return int(self._writers[topic].get_subscription_count())
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message object, or its bytes, on a stimulus's topic."""
+        """Publish a message, as an object or as bytes, on the topic of a stimulus."""
         self._writers[topic].publish(message)
 
     def withdraw(self, topic: str) -> None:
-        """Take the publisher of a stimulus out of the graph."""
+        """Destroy the publisher of a stimulus."""
         writer = self._writers.pop(topic)
         next(node for node in self._nodes if writer in node.publishers).destroy_publisher(writer)
 
 
 def _make_node(domain: int) -> Node:
-    """Return a node in a participant of its own, without services.
+    """Create a node in its own participant, without services.
 
-    It is called as the daemon of the `ros2` command is, which is in most graphs: no student's node can guess the name,
-    or tell from it that it is being graded.
+    It is named like the daemon of the `ros2` command, which is in most graphs. A student's node can neither guess the
+    name nor tell from it that it is being graded.
     """
     context = Context()
     context.init(domain_id=domain)
@@ -317,7 +315,7 @@ def _make_node(domain: int) -> Node:
         enable_rosout=False,
         start_parameter_services=False,
         enable_logger_service=False,
-        # The node would serve descriptions of types to everybody; students' nodes are served nothing.
+        # Otherwise the node would serve type descriptions to students' nodes.
         parameter_overrides=[Parameter("start_type_description_service", value=False)],
     )
 
@@ -327,7 +325,7 @@ def _subscribing(message: Any, topic: str, qos: QoSProfile) -> Callable[[Node], 
 
 
 def unread_bytes() -> int:
-    """Return how much lies unread in the UDP sockets of this network, as /proc/net/udp says (proc(5))."""
+    """Return the number of unread bytes in all UDP sockets of this network namespace, from /proc/net/udp (proc(5))."""
     unread = 0
     for name in ("udp", "udp6"):
         with contextlib.suppress(OSError):
@@ -337,12 +335,12 @@ def unread_bytes() -> int:
 
 
 def size_of(message: Any) -> int:
-    """Return how many bytes a message takes on the wire."""
+    """Return the serialized size of a message in bytes."""
     return len(serialize_message(message))
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float = 0.0003) -> bool:
-    """Wait, in real time, until a condition holds; return whether it came to."""
+    """Wait, in real time, until a condition holds; return whether it did before the time-out."""
     deadline = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > deadline:
@@ -352,7 +350,7 @@ def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float 
 
 
 def _finite_ns(duration: Any) -> int:
-    """Return a QoS duration in nanoseconds; 0 for none, which DDS calls infinite."""
+    """Return a QoS duration in nanoseconds; 0 for an infinite one, which means that none is set."""
     nanoseconds = int(duration.nanoseconds)
     return nanoseconds if 0 < nanoseconds < INFINITE_NS else 0
 
@@ -366,4 +364,4 @@ def _endpoint_order(end: Endpoint) -> tuple[str, str, str, int]:
 
 
 def _nothing(_: object) -> None:
-    """Stand for a callback; messages are taken by hand."""
+    """Do nothing: messages are polled, but rclpy requires a callback."""

@@ -1,4 +1,4 @@
-"""Plans: one scenario made concrete, every drawn value in place, as the supervisor hands it to a worker."""
+"""Plans: a scenario with every random value drawn, as the supervisor sends it to a worker."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ PlannedNumber = tuple[float, int]
 
 @dataclass(frozen=True, slots=True)
 class PlannedNumbers:
-    """Numbers to be published in the type the student's node takes; times in nanoseconds since scenario start."""
+    """Numbers to publish in the type that the student's node subscribes with; times since the scenario's start."""
 
     topic: str
     type: str
@@ -57,7 +57,7 @@ class PlannedNumbers:
 
 @dataclass(frozen=True, slots=True)
 class PlannedRecording:
-    """Recorded messages to be published as they are: `(t_ns, cdr, value)` since scenario start."""
+    """Recorded messages to publish unchanged: `(t_ns, cdr, value)`, with times since the scenario's start."""
 
     topic: str
     type: str
@@ -68,31 +68,31 @@ class PlannedRecording:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a worker needs to know to run one scenario.
+    """Everything that a worker needs to run one scenario.
 
     Attributes:
         scenario: Scenario id.
         processes: Name (the wanted file) and found file of each student process, in start order.
         root: The staged submission.
-        host_seed: Hex; seeds the randomness of the student's processes, and tells nothing about the stimuli.
-        duration_ns: Observed time.
+        host_seed: Hex; seeds the randomness of the student's processes, and reveals nothing about the stimuli.
+        duration_ns: How long to observe.
         first_message_on: Topic whose first message starts the observation, or empty.
-        wait_at_most_ns: How long that message is waited for.
-        numbers: Stimuli.
-        recordings: Stimuli.
+        wait_at_most_ns: How long to wait for that message.
+        numbers: Number streams.
+        recordings: Recordings to play.
         clock: `virtual` or `wall`.
-        limits: How much the processes may use, and how much is taken down.
-        stop_when_unfit: Whether a run on the virtual clock may end as soon as it is clear that it does no justice.
-        messages: Stimuli.
-        servers: Stimuli.
-        calls: Stimuli.
-        goals: Stimuli.
-        starts_ns: Name and time of the processes that start late.
-        may_exit: Names of the processes that are free to end.
-        shutdown_ns: How long processes may take to end after the stop signal; 0 if that is not looked at.
-        bare: Whether the files run as `python3 FILE` does, on the wall clock, with nothing of the grader in their
+        limits: How much the processes may use, and how much is recorded.
+        stop_when_unfit: Whether a run on the virtual clock may end as soon as virtual time is known to be unsuitable.
+        messages: Message streams.
+        servers: Service servers.
+        calls: Service calls.
+        goals: Action goals.
+        starts_ns: Name and start time of the processes that start late.
+        may_exit: Names of the processes that may exit.
+        shutdown_ns: How long processes may take to end after the stop signal; 0 to send none.
+        bare: Whether the files run as with `python3 FILE`, on the wall clock, without the grader's code in their
             processes.
-        first_node_ns: When the first node of the bare processes is expected: their time is counted from it.
+        first_node_ns: When the first node of the bare processes is expected, from which their time is counted.
     """
 
     scenario: str
@@ -121,18 +121,18 @@ class Plan:
 def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     exercise: str, scenario: Scenario, submission: Submission, *, seed: int, odometry: Odometry | None, clock: str
 ) -> Plan:
-    """Return a scenario with every value drawn.
+    """Plan a scenario by drawing every random value in it.
 
     Args:
-        exercise: Id of the exercise it belongs to.
-        scenario: What to run.
-        submission: Whose files run; every process of the scenario has one.
-        seed: Every drawn value follows from it, the exercise and the scenario.
+        exercise: Id of the exercise.
+        scenario: The scenario to plan.
+        submission: Provides the files; every process of the scenario must have one.
+        seed: Determines every drawn value, together with the exercise and the scenario.
         odometry: The recording, if the scenario plays one.
         clock: `virtual` or `wall`.
     """
     purposes = ("stimuli", exercise, scenario.id)
-    # each draws from a source of its own: one more stimulus changes no other
+    # each stimulus has its own source of randomness: adding one does not change the others
     drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
     course = random.Random(derive(seed, "course", exercise, scenario.id))  # noqa: S311 - it has to repeat
     duration_ns = drawn_time(scenario.span.duration_ns, course)
@@ -167,18 +167,18 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
 
 
 def derive(seed: int, *purpose: str) -> str:
-    """Return 64 hex digits that follow from a seed and a purpose, and from which neither can be found."""
+    """Derive 64 hex digits from a seed and a purpose; neither can be recovered from them."""
     text = "/".join((str(seed), *purpose))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, until_ns: int) -> PlannedNumbers:
-    """Return the numbers of a stream.
+    """Draw the numbers of a stream.
 
     Args:
-        stream: What is to be published.
-        draw: Draws the numbers, for all streams of the scenario.
-        own: Draws what else is open in this one.
+        stream: The stream to plan.
+        draw: Draws the numbers of all streams of the scenario.
+        own: Draws all other random values of this stream.
         until_ns: When the observation ends; 0 if that is not known.
     """
     start_ns = drawn_time(stream.start_ns, own)
@@ -186,7 +186,7 @@ def _numbers(stream: NumberStream, draw: random.Random, own: random.Random, unti
     repeats = max(1, shortest(stream.hold_ns) // stream.period_ns)
     if isinstance(stream.hold_ns, TimeBetween) and numbers:
         each = [max(1, drawn_time(stream.hold_ns, own) // stream.period_ns) for _ in numbers]
-        # who hears nothing for long may well switch off: the last number goes on, however little time the others took
+        # a node may switch off when messages stop, so the last number is repeated until the observation ends
         each[-1] = max(each[-1], -(-(until_ns - start_ns) // stream.period_ns) - sum(each[:-1]))
         numbers, repeats = tuple(n for n, times in zip(numbers, each, strict=True) for _ in range(times)), 1
     return PlannedNumbers(stream.topic, stream.type, start_ns, stream.period_ns, repeats, numbers)

@@ -1,4 +1,4 @@
-"""Everything a recording needs, set up and taken down: ROS, isolation, workers, a folder; and the choice of clock."""
+"""Sets up and closes what recordings need (ROS, a sandbox, workers, a folder), and chooses the clock."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from grader.execution.supervisor import Job, Recorder
 from grader.execution.temp_dirs import scratch_folder
 from grader.execution.worker import FOREVER_S, RealTimeBudget
 
-#: What reports call a run without walls.
+#: The name of a run without a sandbox in reports.
 NO_ISOLATION = "none"
-#: A submission has no more scenarios than this that are worth recording side by side.
+#: More parallel workers do not pay off for one submission.
 MOST_WORKERS = 4
-#: Clocks that may be asked for: `auto` is virtual time, and the wall clock where that does no justice.
+#: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 
 Key = TypeVar("Key", bound=Hashable)
@@ -32,14 +32,14 @@ Key = TypeVar("Key", bound=Hashable)
 
 @dataclass(frozen=True, slots=True)
 class RecordingSession:
-    """What a run is recorded with.
+    """The resources that a run is recorded with.
 
     Attributes:
         ros: The ROS installation that nodes run on.
         isolation: The sandbox tier.
-        containment: What it was seen to hold back; empty without walls.
-        recorder: Its workers.
-        folder: A folder of its own, gone afterwards.
+        containment: What the self-test found the sandbox to prevent; empty without a sandbox.
+        recorder: Runs jobs in its workers.
+        folder: A temporary folder, removed at the end.
     """
 
     ros: RosInstallation
@@ -59,15 +59,15 @@ class RecordingSession:
     ) -> dict[Key, Trace]:
         """Record jobs and return their traces.
 
-        Under `auto`, what virtual time does no justice to is recorded again on the wall clock, one at a time: side by
-        side they would disturb each other.
+        With `auto`, a job that virtual time does not suit is recorded again on the wall clock. These jobs run one at a
+        time, because parallel ones would disturb each other.
 
         Args:
             jobs: Planned on the virtual clock, or on the wall clock for `wall`.
             clock: `virtual`, `wall` or `auto`.
-            progress: Hears which job begins.
-            finished: Hears each trace as soon as nothing will replace it, while others are still being recorded.
-            budget_s: Real time that all of them may take together.
+            progress: Called with the title of each job that starts.
+            finished: Called with each trace once it is final, while others are still being recorded.
+            budget_s: Real time that all jobs may take together.
         """
         budget = RealTimeBudget(budget_s)
         first = [Job(job.title, replace(job.plan, stop_when_unfit=clock == AUTO), budget) for job in jobs.values()]
@@ -86,7 +86,7 @@ class RecordingSession:
 
 
 def _unfit(trace: Trace, clock: str) -> bool:
-    """Whether a first recording has to be repeated on the wall clock."""
+    """Return whether a first recording has to be repeated on the wall clock."""
     return clock == AUTO and bool(trace.clock_reason) and not trace.harness_problem
 
 
@@ -94,30 +94,30 @@ def _unfit(trace: Trace, clock: str) -> bool:
 def open_session(
     isolation: str, workers: int | None = None, progress: Callable[[str], None] = lambda _: None
 ) -> Iterator[RecordingSession]:
-    """Set a studio up, and take it down.
+    """Open a recording session, and close it at the end of the block.
 
     Args:
         isolation: `auto`, `none` or the name of a tier.
-        workers: How many scenarios are recorded side by side; None for as many as is of use here.
-        progress: Hears which sandbox has to be tried, and why.
+        workers: How many scenarios to record in parallel; None to choose by the number of processors.
+        progress: Called with a message when a sandbox has to be tested.
 
     Raises:
-        EnvironmentFault: This machine lacks ROS or the tier asked for.
+        EnvironmentFault: This machine lacks ROS or the requested tier.
     """
     ros = find_ros()
     choice = choose_isolation(isolation, ros, progress)
     tier = choice.isolation
     domains = shared_domains() if tier.shares_network else private_domains()
     workers = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
-    # Neither workers nor students' processes write byte code; what they load is compiled once here, not at every start.
+    # Neither workers nor student processes write byte code, so their modules are compiled here, once.
     compile_own()
     with scratch_folder() as folder:
-        folder.chmod(0o755)  # a student's process of another user reads the staged copy in it
+        folder.chmod(0o755)  # students' processes may run as another user and have to read the staged copy
         with Recorder(tier, ros.runtime, domains, scratch=folder, workers=workers) as recorder:
             recorder.warm_up(1)
             yield RecordingSession(ros, tier, choice.containment, recorder, folder)
 
 
 def planned_clock(clock: str) -> str:
-    """Return the clock that jobs are planned on at first."""
+    """Return the clock to plan jobs on for a value of `--clock`."""
     return WALL if clock == WALL else VIRTUAL

@@ -1,8 +1,8 @@
-"""Watches, from the worker, what students' processes use; ends one at its limit and says which limit it was.
+"""Monitors, in the worker, what students' processes use; kills a process that reaches a limit and names the limit.
 
-The system's own limits count address space and processor time of single processes: several together, or memory that is
-only mapped, would be told wrongly or not at all. The guard adds up what is really used. It sees a limit a little late,
-by what a process can use between two looks; the system's limits stand behind it.
+The kernel's own limits apply to the address space and processor time of single processes. They miss the sum of several
+processes, and they count memory that is only mapped. The monitor adds up real usage. It notices a limit with a delay of
+one polling interval; the kernel's limits remain as a second line of defence.
 """
 
 from __future__ import annotations
@@ -19,27 +19,28 @@ from grader.core.trace import Trace
 from grader.execution.student_process import NodeProcess
 from grader.execution.usage import Usage, families, scratch_names, starved_ns, usage
 
-#: How often it looks, and every how many looks it searches for new children.
+#: The polling interval, and the number of polls between two searches for new child processes.
 LOOK_S = 0.025
 SEARCH_EVERY = 10
-#: Processes of the sandbox around a student's, which the system does not count, and some more: it should be first.
+#: Allowance for the sandbox's own processes, which the kernel's limit does not count, with some margin so that the
+#: kernel's limit is hit first.
 WRAPPERS = 16
-#: Files and folders in one scratch folder; log files and caches of an ordinary node are a dozen.
+#: The most files and folders in one scratch folder; an ordinary node creates about a dozen.
 MOST_NAMES = 10_000
-#: What the worker itself may fill beyond its size at the start: messages that have come and were not yet taken.
+#: How much memory the worker may use beyond its size at the start: received messages that were not yet taken.
 UNREAD_BYTES = 512 * MIB
-#: Out of real time with this share of it spent waiting for a processor, a run says nothing about the nodes; unless
-#: they had so much of all processor time themselves: then it was they who kept the processors.
+#: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
+#: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What is left of the real time that a submission may take.
+    """The rest of the real time that a submission may take.
 
     Attributes:
-        left_ns: Real time.
-        words: Why a recording is ended when it is used up.
+        left_ns: Real time that is left.
+        words: The reason to give when a recording is ended because the time is used up.
     """
 
     left_ns: int
@@ -47,12 +48,12 @@ class Budget:
 
 
 class ResourceMonitor:
-    """A thread beside the conductor's, for as long as its block lasts.
+    """A context manager with a thread that polls the usage of processes, next to the runner's thread.
 
     Args:
-        students: Whom to watch.
-        limits: What each may use.
-        budget: What is left for the submission, if there is such a limit.
+        students: The processes to monitor.
+        limits: Limits of each process.
+        budget: Real time that is left for the submission, if it is limited.
     """
 
     def __init__(self, students: Sequence[NodeProcess], limits: Limits, budget: Budget | None = None) -> None:
@@ -78,7 +79,7 @@ class ResourceMonitor:
         self._thread.join()
 
     def reviewed(self, trace: Trace) -> Trace:
-        """Return a trace, with a problem of the machine's if that is why its time ran out."""
+        """Return a trace, with a harness problem added if its time ran out because the machine was too busy."""
         if not self._starved or trace.harness_problem:
             return trace
         problem = "the machine was too busy: the nodes waited for a processor until their time was over"
@@ -86,12 +87,12 @@ class ResourceMonitor:
 
     @property
     def real_ns(self) -> int:
-        """Real time since the start."""
+        """Real time since the start, in nanoseconds."""
         return time.monotonic_ns() - self._started_ns
 
     @property
     def starved_ns(self) -> int:
-        """Real time that the nodes have lost to others on this machine."""
+        """Real time that the nodes have lost to other programs on this machine, in nanoseconds."""
         processors = len(os.sched_getaffinity(0))
         their_own = self._used_ns > OWN_SHARE * processors * self.real_ns
         return 0 if their_own else min(self._waited_ns, self.real_ns)
@@ -117,7 +118,7 @@ class ResourceMonitor:
         self._look_at_time()
 
     def _look_at_itself(self) -> None:
-        """Hold everybody at a limit of the worker's own: nothing but what the nodes send brings it there."""
+        """Stop all processes at a limit of the worker itself, which only the nodes' messages can cause."""
         filled_bytes = usage([os.getpid()]).memory_bytes - self._own_bytes
         if filled_bytes > UNREAD_BYTES:
             self._hold_all(f"stopped at {size(UNREAD_BYTES)} of messages that were under way at once")
@@ -144,7 +145,7 @@ class ResourceMonitor:
                 self._hold(student, f"stopped at {MOST_NAMES:,} files in one folder")
 
     def _reached(self, used: Usage) -> str:
-        """Return which limit was reached, in words; empty if none was."""
+        """Describe the limit that was reached; empty if none was."""
         limits = self._limits
         if used.memory_bytes > limits.memory_bytes:
             return f"stopped at {limits.memory_words()}"

@@ -1,4 +1,4 @@
-"""Finds the Python interpreter and the ROS 2 installation that child processes run with, without importing them."""
+"""Finds the Python interpreter and the ROS 2 installation for child processes, without importing ROS."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class PythonRuntime:
     Attributes:
         executable: Absolute path of the Python interpreter.
         read_paths: Absolute files and folders that the interpreter, its packages and ROS need, read-only.
-        library_paths: Value of LD_LIBRARY_PATH, in order.
-        python_paths: Folders for sys.path beyond the interpreter's own, in order.
+        library_paths: Entries of LD_LIBRARY_PATH, in order.
+        python_paths: Additional entries of sys.path, in order.
         environment: Further variables that ROS needs (AMENT_PREFIX_PATH, ROS_DISTRO, RMW_IMPLEMENTATION ...).
     """
 
@@ -43,12 +43,12 @@ MIDDLEWARE = "librmw_fastrtps_cpp.so"
 DEFAULT_DISTRO = DEFAULT.name
 INSTALLED_HERE = Path("/opt/ros")
 
-# What any program needs from the system: the C library, its loader and cache, libraries chosen through alternatives.
+# What every program needs from the system: the C library, the loader and its cache, and libraries set by alternatives.
 SYSTEM_PATHS = tuple(
     map(Path, ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/alternatives", "/etc/ld.so.cache", "/etc/ld.so.conf"))
 )
 
-# The wheels re-execute Python once to set LD_LIBRARY_PATH; whoever sets both saves that start.
+# The wheels re-execute Python once to set LD_LIBRARY_PATH; setting this as well avoids the second start.
 NO_BOOTSTRAP = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
 
 
@@ -57,8 +57,8 @@ class RosInstallation:
     """The ROS 2 installation that children use.
 
     Attributes:
-        runtime: Interpreter, paths and variables for children.
-        source: Where it comes from: Python wheels beside the interpreter, or an installation that the shell sourced.
+        runtime: Interpreter, paths and variables for child processes.
+        source: Where it comes from: Python wheels of this interpreter, or an installation that the shell sourced.
         distro: Name of the ROS release, e.g. `jazzy`.
         rclpy_version: Version of rclpy, e.g. `7.1.6`.
         prefix: Root folder of the installation.
@@ -72,15 +72,15 @@ class RosInstallation:
 
 
 def find_ros(environment: Mapping[str, str] | None = None) -> RosInstallation:
-    """Return the ROS installation to use: the sourced one if there is one, else the wheels of this interpreter.
+    """Find the ROS installation to use: the sourced one if there is one, else the wheels of this interpreter.
 
-    The two are never mixed: children of a sourced installation get nothing of the wheels' libraries.
+    The two are never mixed: with a sourced installation, child processes get no libraries of the wheels.
 
     Args:
         environment: Variables of the shell; those of this process if None.
 
     Raises:
-        EnvironmentFault: There is no usable ROS, with the command that mends it.
+        EnvironmentFault: There is no usable ROS; the hint is the command that fixes it.
     """
     environment = os.environ if environment is None else environment
     found = _find_sourced(environment) or _find_wheels()
@@ -107,8 +107,8 @@ def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
         return None
     prefix, folder = home_of_rclpy
     _require_this_python(prefix, folder)
-    # A source build has one prefix for each package, side by side. Other prefixes are somebody's workspaces: they may
-    # hold solutions, and no exercise needs them.
+    # A source build has one prefix for each package, all in one folder. Other prefixes are workspaces: they may contain
+    # solutions, and no exercise needs them.
     siblings = tuple(other for other in prefixes if other.parent == prefix.parent)
     libraries = _below(siblings, _paths(environment.get("LD_LIBRARY_PATH", ""))) or tuple(
         other / "lib" for other in siblings
@@ -144,7 +144,7 @@ def _find_wheels() -> RosInstallation | None:
         return None
     folder, wheel = found
     distro = re.sub(r"^ros_(.+)_rclpy-.*", r"\1", wheel.name)
-    # Not sys.prefix: a user's own or a distribution's site-packages lie elsewhere, and the libraries beside them.
+    # Not sys.prefix: the site-packages of a user or a distribution, and their libraries, are elsewhere.
     prefix = folder.parents[2]
     index = prefix / "share" / "ament_index"
     parts = (prefix / "lib", folder, *((index.parent,) if index.is_dir() else ()))
@@ -199,7 +199,7 @@ def _install_hint() -> str:
 
 
 def _interpreter_paths() -> tuple[Path, ...]:
-    """Return what the interpreter itself reads; never a whole prefix, which may be somebody's home folder."""
+    """Return the paths that the interpreter itself reads; never a whole prefix, which may be a home folder."""
     prefix, base = Path(sys.prefix), Path(sys.base_prefix)
     folders = [Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")]
     return (
@@ -217,7 +217,7 @@ def _site_packages() -> tuple[Path, ...]:
 
 
 def _isolated_path() -> tuple[str, ...]:
-    """Return where `python -I` looks for packages: not in the user's own site-packages, for one."""
+    """Return where `python -I` finds packages, which excludes the user's site-packages."""
     return tuple(sysconfig.get_path(name) for name in ("purelib", "platlib"))
 
 
@@ -242,7 +242,7 @@ def _version_of_rclpy(prefix: Path, folder: Path) -> str:
 
 
 def _paths(value: str) -> tuple[Path, ...]:
-    """Return the absolute entries of a search path; an empty entry would mean the working directory."""
+    """Split a search path and keep absolute entries; an empty entry would mean the working directory."""
     return _once(Path(entry) for entry in value.split(os.pathsep) if entry.startswith("/"))
 
 

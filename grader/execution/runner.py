@@ -1,4 +1,4 @@
-"""Runs a plan: what is the same on the virtual clock and on the wall clock."""
+"""Base class of the runners: the parts of running a plan that are the same on both clocks."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Runner(ABC):
 
     Args:
         plan: What to run.
-        students: The started processes, each waiting to be told the time.
+        students: The started processes, each waiting for its first answer.
         observer: The grader's node.
     """
 
     clock: ClassVar[ClockKind]
-    #: Why this clock was used, where nothing else says so.
+    #: The default reason for using this clock.
     clock_reason: ClassVar[str] = ""
     _topics: TopicPeers
 
@@ -85,11 +85,11 @@ class Runner(ABC):
 
     @abstractmethod
     def _run_on(self) -> None:
-        """Go on until the end, or until nothing more can happen."""
+        """Continue until the end, or until nothing more can happen."""
 
     @abstractmethod
     def _last_look(self) -> int:
-        """Look at the graph at the end, and return the time."""
+        """Record the graph at the end, and return the time."""
 
     @abstractmethod
     def _interrupt(self, student: NodeProcess) -> None:
@@ -97,18 +97,18 @@ class Runner(ABC):
 
     @abstractmethod
     def _is_served(self, calls: PlannedCalls) -> bool:
-        """Return whether the server that some calls need is there and matched."""
+        """Return whether the server for some calls exists and is matched."""
 
     def _unfit(self) -> str:
-        """Say why this clock does the nodes no justice, if it does not."""
+        """Return why this clock is not suitable for the nodes; empty if it is."""
         return ""
 
     def _harness_problem(self) -> str:
-        """Say why the recording says nothing about the nodes, if so."""
+        """Return why the recording cannot be judged; empty if it can."""
         return ""
 
     def _observations(self) -> tuple[Observation, ...]:
-        """Return what was observed, in order."""
+        """Return the observations, in order."""
         return tuple(self._recorder.observations)
 
     @abstractmethod
@@ -116,7 +116,7 @@ class Runner(ABC):
         """Note that requests or responses are on their way to the students' nodes."""
 
     def _shut_down(self) -> None:
-        """Send every process the stop signal, and go on until all have ended."""
+        """Send the stop signal to every process, and continue until all have ended."""
         self._due, self._end_ns = [], self._time_ns() + self._plan.shutdown_ns
         for student in self._students:
             if not student.ended:
@@ -142,29 +142,29 @@ class Runner(ABC):
             self._end_ns = min(self._end_ns, now_ns)
 
     def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
-        """Take down a fault that a process has reported."""
+        """Record a fault that a process has reported."""
         fault, limits = report.get("fault"), self._plan.limits
         self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
 
     def _later(self, event: Event) -> None:
-        """Have something done at a time, after everything else that is due then."""
+        """Schedule an event, after all others that are due at the same time."""
         bisect.insort(self._due, event, key=lambda e: e.t_ns)
 
     def _do(self, event: Event, now_ns: int) -> None:
-        """Let one event of a stimulus happen."""
+        """Execute one event of a stimulus."""
         if isinstance(event, TopicEvent):
             self._topics.do(event, now_ns)
         elif isinstance(event, AddServer):
-            self._services.serve(now_ns, event.server)
+            self._services.add_server(now_ns, event.server)
         elif isinstance(event, RemoveServer):
-            self._services.dismiss(now_ns, event.server)
+            self._services.remove_server(now_ns, event.server)
         elif isinstance(event, Respond):
             if self._services.answer(now_ns, event.server, event.number):
                 self._announce_exchange("response", event.server.service, 1)
         elif isinstance(event, AddClients):
-            self._services.meet(event.calls)
+            self._services.add_clients(event.calls)
         elif isinstance(event, Ask):
             if self._is_served(event.call.calls):
                 self._announce_exchange("request", self._services.call(now_ns, event.call), 1)
             else:
-                self._services.wait(event)  # until its server is there
+                self._services.wait(event)  # until its server exists

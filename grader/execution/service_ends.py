@@ -1,6 +1,6 @@
-"""The servers and clients of the grader's own node; requests and responses are taken and sent by hand.
+"""The service servers and clients of the grader's own node.
 
-There is no executor and there are no callbacks: what has come is taken when the conductor asks for it.
+They have no executor and no callbacks: the runner takes requests and responses by polling.
 """
 
 from __future__ import annotations
@@ -11,25 +11,23 @@ from typing import Any
 from grader.core.trace import ServiceEnd
 from grader.execution.interfaces import interface_class
 
-#: Types of the services that every node has.
+#: Prefixes of the types of services that every node has.
 BACKGROUND_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
-
-
-#: Requests that are taken at once at most.
+#: The most requests that one poll takes.
 AT_ONCE = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Arrived:
-    """A request or a response that came.
+    """A request or a response that was received.
 
     Attributes:
-        service: Absolute name.
-        sent_ns: When its sender sent it, by the middleware's clock; tells what came first, and nothing else.
-        message: It.
-        header: What a response to it needs; None for a response.
-        client: Which of the grader's clients it is for; 0 for a request.
-        sequence: That client's number of the request.
+        service: Absolute name of the service.
+        sent_ns: When it was sent, by the middleware's clock; used only to sort.
+        message: The request or response.
+        header: The header of a request, which its response needs; None for a response.
+        client: The number of the grader's client that a response is for; 0 for a request.
+        sequence: Sequence number of the request, given by that client.
     """
 
     service: str
@@ -41,10 +39,10 @@ class Arrived:
 
 
 class ServiceEnds:
-    """The servers and clients of one node.
+    """The service servers and clients of one node.
 
     Args:
-        node: The grader's.
+        node: The grader's node.
     """
 
     def __init__(self, node: Any) -> None:
@@ -52,25 +50,25 @@ class ServiceEnds:
         self._servers: dict[str, Any] = {}
         self._clients: dict[str, dict[int, Any]] = {}
 
-    def serve(self, service: str, interface: str) -> None:
-        """Let a server appear."""
+    def add_server(self, service: str, interface: str) -> None:
+        """Create a server."""
         self._servers[service] = self._node.create_service(interface_class(interface, "srv"), service, _nothing)
 
-    def dismiss(self, service: str) -> None:
-        """Let a server disappear."""
+    def remove_server(self, service: str) -> None:
+        """Destroy a server."""
         self._node.destroy_service(self._servers.pop(service))
 
-    def meet(self, service: str, interface: str, number: int) -> None:
-        """Let a client appear, by the number it is called by."""
+    def add_client(self, service: str, interface: str, number: int) -> None:
+        """Create a client with a number."""
         client = self._node.create_client(interface_class(interface, "srv"), service)
         self._clients.setdefault(service, {})[number] = client
 
-    def met(self, service: str) -> bool:
-        """Return whether every client of a service has a server."""
+    def is_matched(self, service: str) -> bool:
+        """Return whether every client of a service is matched with a server."""
         return all(client.service_is_ready() for client in self._clients.get(service, {}).values())
 
     def ask(self, service: str, number: int, request: Any) -> int:
-        """Send a request, and return the number that its client gives it."""
+        """Send a request, and return its sequence number."""
         client = self._clients[service][number]
         with client.handle:
             return int(client.handle.send_request(request))
@@ -80,7 +78,7 @@ class ServiceEnds:
         self._servers[service].send_response(response, header)
 
     def take_requests(self, service: str) -> list[Arrived]:
-        """Return the requests that have come to a server since the last time."""
+        """Take the requests that a server has received since the last call."""
         server = self._servers[service]
         found = []
         with server.handle:
@@ -92,11 +90,11 @@ class ServiceEnds:
         return found
 
     def take_responses(self, service: str) -> list[Arrived]:
-        """Return the responses that have come to the clients of a service since the last time."""
+        """Take the responses that the clients of a service have received since the last call."""
         found = []
         for number, client in self._clients.get(service, {}).items():
             with client.handle:
-                # what others were answered comes as well, and is taken as nothing: only so many may lie there
+                # responses to other clients are taken as None, hence more attempts than the queue has entries
                 for _ in range(2 * client.qos_profile.depth):
                     header, response = client.handle.take_response(client.srv_type.Response)
                     if header is not None:
@@ -105,10 +103,10 @@ class ServiceEnds:
         return found
 
     def graph(self, nodes: list[tuple[str, str]]) -> tuple[ServiceEnd, ...]:
-        """Return the servers and clients of some nodes, sorted, without those that every node has.
+        """Return the servers and clients of some nodes, sorted, without the services that every node has.
 
         Args:
-            nodes: Name and namespace of each.
+            nodes: Name and namespace of each node.
         """
         found = []
         looks = (
@@ -129,12 +127,12 @@ class ServiceEnds:
 def _looked(look: Any, name: str, space: str) -> list[tuple[str, list[str]]]:
     try:
         found: list[tuple[str, list[str]]] = look(name, space)
-    except Exception:  # the node has gone meanwhile: rclpy raises an exception of its own, which moves about
+    except Exception:  # the node is gone; rclpy's exception for that is in different modules in different releases
         return []
     return found
 
 
 def _nothing(request: object, response: object) -> object:
-    """Stand for a callback; requests are taken by hand."""
+    """Do nothing: requests are polled, but rclpy requires a callback."""
     del request
     return response

@@ -1,4 +1,4 @@
-"""The grader's servers and clients of one run: which are there, what was asked and answered; on either clock."""
+"""Tracks the grader's service servers and clients of one run, with their requests and responses; for both clocks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from grader.execution.service_ends import Arrived, ServiceEnds
 from grader.execution.stimuli import Ask, Event, Respond
 from grader.execution.trace_recorder import TraceRecorder
 
-#: Of a flood of requests and responses no more is taken before it is written down.
+#: The most requests and responses that are held before they are recorded.
 UNREAD = 50_000
-#: Who sends: the grader itself, or a student's node.
+#: The sender of a request or response.
 GRADER, STUDENT = "grader", "student"
 
 
 @dataclass(slots=True)
 class _Served:
-    """A server that is there."""
+    """A server that exists now."""
 
     plan: PlannedServer
     taken: int = 0
@@ -32,14 +32,17 @@ class _Served:
 
 
 class ServicePeers:
-    """Serves and calls.
+    """Creates servers and clients, and sends and records requests and responses.
 
     Args:
-        plan: Its servers and calls; refused with a HarnessError where a type or field is unknown on this machine.
+        plan: Provides the servers and calls.
         ends: The servers and clients of the grader's node.
-        recorder: Where requests and responses are taken down.
+        recorder: Records requests and responses.
         nodes: Returns the names of the students' nodes.
-        later: Takes what is to be done at a later time.
+        later: Schedules an event.
+
+    Raises:
+        HarnessError: The plan names a type or field that is unknown on this machine.
     """
 
     def __init__(
@@ -60,7 +63,7 @@ class ServicePeers:
         self._requests: Counter[str] = Counter()
         self._clients: dict[tuple[str, int, int], int] = {}
         self._called: dict[str, str] = {}
-        self._kept: list[PlannedCalls] = []  # clients are known by the identity of their calls, which must last
+        self._kept: list[PlannedCalls] = []  # clients are keyed by the id() of their calls, which must stay alive
         self._open: dict[tuple[str, int, int], tuple[int, PlannedCall]] = {}
         self._waiting: list[Ask] = []
         self._arrived: list[Arrived] = []
@@ -68,40 +71,40 @@ class ServicePeers:
         check_types(plan)
 
     def serves(self, service: str, interface: str) -> bool:
-        """Return whether the grader has a server of a service and type now."""
+        """Return whether the grader has a server for a service and type now."""
         served = self._servers.get(service)
         return served is not None and served.plan.type == interface
 
     def ends_of(self, kind: str, service: str) -> int:
-        """Return how many servers (`service`) or clients (`client`) of a service the grader has now."""
+        """Return the number of the grader's servers (`service`) or clients (`client`) of a service."""
         if kind == "service":
             return int(service in self._servers)
         return sum(asked == service for asked, _, _ in self._clients)
 
     def calls(self) -> dict[str, str]:
-        """Return the services that the grader has clients of, with their types."""
+        """Return the services that the grader has clients for, with their types."""
         return self._called
 
-    def serve(self, now_ns: int, server: PlannedServer) -> None:
-        """Let a server appear."""
-        self._ends.serve(server.service, server.type)
+    def add_server(self, now_ns: int, server: PlannedServer) -> None:
+        """Create a server."""
+        self._ends.add_server(server.service, server.type)
         self._servers[server.service] = _Served(server)
         self._recorder.add(Mark(now_ns, "server_starts", server.service))
 
-    def dismiss(self, now_ns: int, server: PlannedServer) -> None:
-        """Let a server disappear, if it has not done so; what it has not answered stays unanswered."""
+    def remove_server(self, now_ns: int, server: PlannedServer) -> None:
+        """Destroy a server, if it still exists; its open requests stay unanswered."""
         served = self._servers.get(server.service)
         if served is not None and served.plan is server:
             del self._servers[server.service]
-            self._ends.dismiss(server.service)
+            self._ends.remove_server(server.service)
             self._recorder.add(Mark(now_ns, "server_stops", server.service))
 
     def done(self) -> list[PlannedServer]:
-        """Return the servers that were asked once more after all the answers they are to give."""
+        """Return the servers that have given all their answers and received one more request."""
         return [s.plan for s in self._servers.values() if 0 < s.plan.answers < s.taken and not s.unanswered]
 
-    def meet(self, calls: PlannedCalls) -> str | None:
-        """Let the clients of some calls appear, and return the service; None while its name is not known."""
+    def add_clients(self, calls: PlannedCalls) -> str | None:
+        """Create the clients of some calls, and return the service; None while its name is not known."""
         service = self.resolved(calls.service)
         if service is None:
             return None
@@ -112,20 +115,20 @@ class ServicePeers:
                 self._kept.append(calls)
                 number = 1 + sum(known == service for known, _, _ in self._clients)
                 self._clients[key] = number
-                self._ends.meet(service, calls.type, number)
+                self._ends.add_client(service, calls.type, number)
         return service
 
     def resolved(self, service: str) -> str | None:
-        """Return a service by its whole name; one of the only node is known when there is exactly one node."""
+        """Return the absolute name of a service; `~` stands for the only node, and gives None unless there is one."""
         if not service.startswith("~"):
             return service
         nodes = self._nodes()
         return nodes[0] + service[1:] if len(nodes) == 1 else None
 
     def call(self, now_ns: int, call: PlannedCall) -> str:
-        """Send a request, and return the service that was asked; its clients are there."""
+        """Send a request, and return the service; its clients must exist."""
         calls = call.calls
-        service = self.meet(calls) or calls.service
+        service = self.add_clients(calls) or calls.service
         number = self._clients[service, id(calls), call.client]
         request = built(wanted_class(calls.type, "srv", service).Request, calls.requests[call.index], service)
         count = self._numbered(service, GRADER)
@@ -135,11 +138,11 @@ class ServicePeers:
         return service
 
     def wait(self, due: Ask) -> None:
-        """Keep a call until its server is there."""
+        """Keep a call until its server exists."""
         self._waiting.append(due)
 
     def ready(self, is_served: Callable[[PlannedCalls], bool]) -> list[Ask]:
-        """Return the calls whose servers are there now, which wait no longer."""
+        """Remove and return the waiting calls whose servers exist now."""
         calls = {id(due.call.calls): due.call.calls for due in self._waiting}
         served = {key for key, one in calls.items() if is_served(one)}
         found = [due for due in self._waiting if id(due.call.calls) in served]
@@ -147,7 +150,7 @@ class ServicePeers:
         return found
 
     def expected(self, sent: Mapping[str, int]) -> Counter[str]:
-        """Return how much of what a process has sent, by channel, is to arrive here."""
+        """Return how many of the messages that a process has sent, by channel, the grader should receive."""
         expected: Counter[str] = Counter()
         for channel, count in sent.items():
             kind, _, service = channel.partition(" ")
@@ -158,10 +161,10 @@ class ServicePeers:
         return +expected
 
     def take(self) -> Counter[str]:
-        """Take what has arrived, and return how many requests and responses came, by channel."""
+        """Take the requests and responses that have arrived, and return their number by channel."""
         came: Counter[str] = Counter()
         if len(self._arrived) > UNREAD:
-            return came  # nobody asks so much: what is there ends the recording
+            return came  # a flood: what has arrived is enough to end the recording
         for service in list(self._servers):
             requests = self._ends.take_requests(service)
             self._arrived += requests
@@ -172,8 +175,8 @@ class ServicePeers:
             came[f"response {service}"] += len(responses)
         return came
 
-    def write_down(self, now_ns: int) -> None:
-        """Take down what was taken, in the order in which it was sent, and have requests answered in their time."""
+    def record(self, now_ns: int) -> None:
+        """Record everything that was taken, in the order in which it was sent, and schedule the responses."""
         arrived, self._arrived = sorted(self._arrived, key=lambda a: (a.sent_ns, a.service)), []
         for one in arrived:
             if one.header is None:
@@ -184,7 +187,7 @@ class ServicePeers:
     def _asked(self, now_ns: int, request: Arrived) -> None:
         served = self._servers.get(request.service)
         if served is None or 0 < served.plan.answers < served.taken:
-            return  # it disappears with the request before this one
+            return  # the request before this one ended the server
         plan, number = served.plan, self._numbered(request.service, STUDENT)
         value, size = self._content(request.message)
         self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
@@ -194,7 +197,7 @@ class ServicePeers:
         served.taken += 1
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
-        """Send the response to a request, if the server is still there; return whether it was sent."""
+        """Send the response to a request, if the server still exists; return whether it was sent."""
         served = self._servers.get(server.service)
         if served is None or served.plan is not server or number not in served.unanswered:
             return False
@@ -219,7 +222,7 @@ class ServicePeers:
             self._later(Ask(now_ns + delay_ns, following))
 
     def _content(self, message: Any) -> tuple[dict[str, Any], int]:
-        """Return the fields of what a student's node sent, and its size; of what is too large, none."""
+        """Return the fields and the size of what a student's node sent; no fields if it is too large."""
         size = size_of(message)
         if size <= self._message_bytes:
             return plain_fields(message), size
@@ -235,7 +238,7 @@ class ServicePeers:
 
 
 def check_types(plan: Plan) -> None:
-    """Make sure that this machine has every type a plan names, with the fields; raises HarnessError otherwise."""
+    """Check that this machine has every type and field that a plan names; raises HarnessError otherwise."""
     for stream in plan.messages:
         where = f"scenario {plan.scenario}, messages on {stream.topic}"
         message = wanted_class(stream.type, "msg", where)

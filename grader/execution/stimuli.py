@@ -1,4 +1,4 @@
-"""What stimuli do in a scenario, and when: the schedule of events that a runner works through."""
+"""Builds the schedule of stimulus events that a runner executes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from grader.execution.exchanges import PlannedCall, PlannedCalls, PlannedMessage
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.plan import Plan, PlannedNumbers, PlannedRecording
 
-#: The step that tells "just above" a limit for types with a fraction; whole numbers step by 1.
+#: The distance of "just above" from a limit for floating-point types; integers differ by 1.
 FRACTION_STEP = 0.001
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One thing that a stimulus does.
+    """One action of a stimulus.
 
     Attributes:
-        t_ns: When.
+        t_ns: Time since the scenario's start.
     """
 
     t_ns: int
@@ -27,35 +27,35 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class TopicEvent(Event):
-    """What concerns a topic, and happens whether or not anybody still listens."""
+    """An event on a topic, which happens whether or not any node is still running."""
 
     topic: str
 
 
 @dataclass(frozen=True, slots=True)
 class Appear(TopicEvent):
-    """A publisher appears, of the type that subscriptions ask for."""
+    """Create a publisher of the type that subscriptions ask for."""
 
     type: str
 
 
 @dataclass(frozen=True, slots=True)
 class Advertise(TopicEvent):
-    """A publisher of a fixed type appears."""
+    """Create a publisher of a fixed type."""
 
     stream: PlannedMessages
 
 
 @dataclass(frozen=True, slots=True)
 class PublishNumber(TopicEvent):
-    """A number is published, in the type of the publisher; the second value is the side of a limit it is on."""
+    """Publish a number in the publisher's type; the second value is the side of a limit: 1 above, -1 below, 0 none."""
 
     number: tuple[float, int]
 
 
 @dataclass(frozen=True, slots=True)
 class PublishRecorded(TopicEvent):
-    """A message of a recording is published."""
+    """Publish a message of a recording."""
 
     cdr: bytes
     value: Mapping[str, Any]
@@ -63,7 +63,7 @@ class PublishRecorded(TopicEvent):
 
 @dataclass(frozen=True, slots=True)
 class PublishFields(TopicEvent):
-    """A message of a fixed type is published."""
+    """Publish a message of a fixed type."""
 
     stream: PlannedMessages
     fields: Mapping[str, Any]
@@ -71,26 +71,26 @@ class PublishFields(TopicEvent):
 
 @dataclass(frozen=True, slots=True)
 class Disappear(TopicEvent):
-    """A publisher disappears."""
+    """Remove a publisher."""
 
 
 @dataclass(frozen=True, slots=True)
 class AddServer(Event):
-    """A server appears."""
+    """Create a server."""
 
     server: PlannedServer
 
 
 @dataclass(frozen=True, slots=True)
 class RemoveServer(Event):
-    """A server disappears."""
+    """Remove a server."""
 
     server: PlannedServer
 
 
 @dataclass(frozen=True, slots=True)
 class Respond(Event):
-    """A server answers the request with a number."""
+    """Send a server's response to the request with a number."""
 
     server: PlannedServer
     number: int
@@ -98,24 +98,24 @@ class Respond(Event):
 
 @dataclass(frozen=True, slots=True)
 class AddClients(Event):
-    """The clients of some calls appear."""
+    """Create the clients of some calls."""
 
     calls: PlannedCalls
 
 
 @dataclass(frozen=True, slots=True)
 class Ask(Event):
-    """A client sends a request."""
+    """Send a client's request."""
 
     call: PlannedCall
 
 
-#: What makes something appear; at the start it comes before everything else.
+#: Events that create an endpoint; at time 0 they come before all others.
 APPEARANCES = (Appear, Advertise, AddServer, AddClients)
 
 
 def schedule(plan: Plan) -> list[Event]:
-    """Return everything that stimuli do, in order of time; number streams never disappear."""
+    """Return all stimulus events of a plan, sorted by time; number streams are never removed."""
     due: list[Event] = [d for stream in plan.numbers for d in _number_events(stream)]
     due += [d for recording in plan.recordings for d in _recording_events(recording)]
     due += [d for stream in plan.messages for d in _message_events(stream)]
@@ -160,7 +160,7 @@ def _recording_events(recording: PlannedRecording) -> Iterator[Event]:
 
 
 def numeric_field(interface: str) -> tuple[str, bool] | None:
-    """Return the field of a message type that carries a number, and whether it holds whole numbers only."""
+    """Return the numeric field of a message type, and whether it is an integer; None if there is none."""
     message = message_class(interface)
     if message is None:
         return None
@@ -175,10 +175,10 @@ def numeric_field(interface: str) -> tuple[str, bool] | None:
 
 
 def number_message(interface: str, number: tuple[float, int]) -> tuple[Any, Mapping[str, Any]]:
-    """Return a message that carries a planned number in a type, and its fields; a whole type rounds it.
+    """Build a message of a type from a planned number, and return it with its fields; integer types round.
 
     Raises:
-        ValueError: If the type carries no number.
+        ValueError: The type has no numeric field.
     """
     found = numeric_field(interface)
     if found is None:

@@ -1,4 +1,4 @@
-"""One student process as the worker sees it: its line, its output, its end."""
+"""A student process as seen by the worker: its socket, its output and its end."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from grader.execution.notes import Places, hidden_notes, note_of, start_of
 from grader.execution.sandbox.protocol import Command
 from grader.execution.workload import Workload
 
-#: How the logging library writes records on standard error. Each process has a token of its own, which only the library
-#: and the worker know: what a program writes itself is no log record.
+#: The format of log records on standard error. Each process has its own token, known only to the logging library and
+#: the worker, so a program cannot write log records itself.
 LOG_FORMAT = "\x1e{token}\x1f{severity}\x1f{name}\x1f{file_name}\x1f{line_number}\x1f{message}\x1d"
-#: What follows the token. No part of a record runs over the start of the next one: a stream of starts without ends is
-#: read in linear time.
+#: The fields after the token. No field can extend over the start of the next record, so that a stream of unfinished
+#: records is parsed in linear time.
 _LOG_FIELDS = "\x1f([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?"
 _TOKEN = re.compile("[0-9a-f]{32}")
-#: A report longer than this is not the host's.
+#: The host never sends a longer report.
 REPORT_BYTES = 4 << 20
-#: More reports than this at once are not the host's; so much is read of its line and of each stream without a pause.
+#: The host never sends more reports at once; and the most reads from its socket and from each stream in a row.
 REPORTS_AT_ONCE, READS_AT_ONCE = 1000, 256
-#: Notes that are kept, and how long one is at most.
+#: The most notes that are kept, and the maximum length of a note.
 NOTES, NOTE_CHARACTERS = 100, 500
-#: The host tells of so many things that its program reached for, by names of this length.
+#: The most audit events that the host reports of its program, and the maximum length of their names.
 REACHED, NAME_CHARACTERS = 20, 60
-#: The end of what a process wrote on standard error, kept to tell what ended it.
+#: How much of the end of standard error is kept to find out why a process ended.
 LAST_BYTES = 16_000
-#: A text longer than this is cut.
+#: Longer lines and log messages are cut.
 TEXT_CHARACTERS = 4000
-#: Real seconds that a process gets to end by itself after the stop signal.
+#: Real seconds that a process has to end by itself after the stop signal.
 GRACE_S = 0.2
-#: Real seconds without a report, after which a process is taken for dead weight; the host's own watchdog is faster.
+#: Real seconds without a report after which a process is given up; the host's own watchdog acts sooner.
 SILENCE_S = 90.0
 
 
@@ -53,31 +53,31 @@ class NodeProcess:
     """A running student process.
 
     Attributes:
-        name: The wanted file name; what traces call the process.
+        name: The wanted file name, which identifies the process in traces.
         root: The submission's folder as the process sees it.
         wake_ns: When it next wants to run, or None.
-        claims: Its endpoints, as it says.
-        arrivals: What it has not yet been told is on its way to it.
-        told: The counterparts it has been told to wait for.
+        claims: Its endpoints, as it reports them.
+        arrivals: Messages that are on their way to it and not yet announced to it, by channel.
+        told: The counterparts that it has been told to wait for.
         renewed: Whether its endpoints have changed since then.
-        sees_graph: Whether its program looks at the graph itself, as it says.
-        offers: What it has told of services, clients and parameters.
-        nudged: Whether it should look again at this instant, because its endpoints were matched.
+        sees_graph: Whether its program queries the graph, as it reports.
+        offers: The services, clients and parameters that it has reported.
+        nudged: Whether it has to run again at this instant, because its endpoints were matched.
         ended: Whether it has ended.
-        limits: What it may use.
-        workload: What its steps cost; None until its program starts.
-        most_bytes: Most memory that it and its children filled at once.
-        most_threads: Most threads that it and its children had at once.
-        used_ns: Processor time that it and its children had used when the guard last looked.
-        stopped: Which limit it reached, in words; empty while it reached none.
-        unsettled: Why its program does not settle, as it says; empty if it does.
-        stop_signalled: Whether it is to get, or has got, the stop signal.
-        stopping: Whether it has got it.
-        log_token: What its log records begin with; without one there are none.
+        limits: Its limits.
+        workload: Measures the cost of its steps; None until its program starts.
+        most_bytes: Peak memory of the process and its children.
+        most_threads: Peak number of threads of the process and its children.
+        used_ns: Processor time of the process and its children when the resource monitor last looked.
+        stopped: The limit that it reached, in words; empty if it reached none.
+        unsettled: Why its program does not settle, as it reports; empty if it does.
+        stop_signalled: Whether the stop signal was sent or is about to be sent.
+        stopping: Whether the stop signal was sent.
+        log_token: The token that its log records begin with; empty if it has none, and then no log records.
         file: The file that it runs, relative to the submission.
         places: The files of the submission.
-        start_told: How its file is started, as it said before anything of it ran.
-        reached: What its program reached for, as it says: names of events of Python's.
+        start_told: How its file is started, as it reported before it ran any of the student's code.
+        reached: Names of audit events that its program raised, as it reports.
     """
 
     name: str
@@ -117,7 +117,7 @@ class NodeProcess:
 
     @classmethod
     def start(cls, name: str, root: str, command: Command, line: socket.socket, limits: Limits) -> NodeProcess:
-        """Start the process; `line` is the worker's end."""
+        """Start the process; `line` is the worker's end of the socket pair."""
         try:
             process = subprocess.Popen(
                 command.argv,
@@ -140,32 +140,32 @@ class NodeProcess:
         return student
 
     def tell(self, answer: Mapping[str, Any]) -> None:
-        """Send an answer; a process that is gone is noticed at its next report."""
+        """Send an answer. A dead process is noticed at its next report."""
         try:
             self.line.sendall(json.dumps(answer).encode() + b"\n")
         except OSError:
             return
 
     def is_ready(self) -> bool:
-        """Wait for its first report, which comes before anything of the student's runs; return whether it is that."""
+        """Wait for the first report, sent before any of the student's code runs; return whether it is valid."""
         report = self.report() or {}
         token = str(report.get("log_token"))
         self.log_token = token if _TOKEN.fullmatch(token) else ""
         return report.get("kind") == "ready"
 
     def measured(self, t_ns: int) -> Workload:
-        """Return what measures its steps, from its program's start on, which is now if it has not started before."""
+        """Return the workload of the process; the first call marks the start of its program."""
         if self.workload is None:
             self.workload = Workload(self.process.pid, t_ns)
         return self.workload
 
     def claims_of(self, kind: str, name: str) -> bool:
-        """Return whether it says that it has an endpoint of a kind and name; every node has some services."""
+        """Return whether the process reports an endpoint of a kind and name; every node has some services."""
         node = name.rpartition("/")[0] if kind == "service" else ""
         return any((c["kind"], c["name"]) in ((kind, name), ("node", node)) for c in self.claims)
 
     def note(self, report: Mapping[str, Any]) -> None:
-        """Take down how its file is started, which it says first, or what else a reader must know."""
+        """Record a note: how the file is started, which comes first, or something that readers must know."""
         if report.get("code") == "started":
             if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
                 self.start_told = start
@@ -174,7 +174,7 @@ class NodeProcess:
             self.notes.append(text[:NOTE_CHARACTERS])
 
     def report(self) -> dict[str, Any] | None:
-        """Wait for the next report, as `_next_report` does; what its program reached for is taken down."""
+        """Wait for the next report, as `_next_report` does, and record reports of audit events on the way."""
         report = self._next_report()
         while report is not None and report.get("kind") == "reached" and len(self.reached) < REACHED:
             self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
@@ -182,7 +182,7 @@ class NodeProcess:
         return report
 
     def _next_report(self) -> dict[str, Any] | None:
-        """Wait for the next report, reading its output meanwhile; None if the process has ended or never reports."""
+        """Wait for the next report and read output meanwhile; None if the process has ended or timed out."""
         deadline = time.monotonic() + SILENCE_S
         while b"\n" not in self._pending:
             ready = self._selector.select(timeout=1.0)
@@ -205,7 +205,7 @@ class NodeProcess:
         return data if isinstance(data, dict) else None
 
     def reports(self) -> list[dict[str, Any] | None]:
-        """Return the reports that are there, without waiting; a last None if the process has ended."""
+        """Return the reports that have arrived, without waiting; the last one is None if the process has ended."""
         gone = False
         for _ in range(READS_AT_ONCE):
             if gone or not any(key.data == "line" for key, _ in self._selector.select(timeout=0)):
@@ -227,7 +227,7 @@ class NodeProcess:
         return bool(received)
 
     def _read(self, stream: str) -> bool:
-        """Read what a stream holds; return whether it held anything."""
+        """Read from a stream without blocking; return whether there was any output."""
         source = self.process.stdout if stream == "stdout" else self.process.stderr
         if source is None or source.closed:
             return False
@@ -249,14 +249,14 @@ class NodeProcess:
         return True
 
     def drain(self, reads: int = READS_AT_ONCE) -> None:
-        """Read what has been written so far; of a flood only so many pieces."""
+        """Read the output so far, with at most `reads` reads from each stream."""
         for stream in ("stdout", "stderr"):
             for _ in range(reads):
                 if not self._read(stream):
                     break
 
     def output(self, t_ns: int, *, final: bool = False) -> list[LogRecord | OutputLine]:
-        """Return the complete records and lines written since the last time; `final` adds an unfinished line."""
+        """Return the complete records and lines since the last call; `final` adds an unfinished line."""
         found: list[LogRecord | OutputLine] = []
         for stream, buffer in self._streams.items():
             end = len(buffer) if final else _complete(buffer, self._record_start() if stream == "stderr" else b"")
@@ -299,11 +299,11 @@ class NodeProcess:
         ]
 
     def _anywhere(self, text: str) -> str:
-        """Return what a process wrote as it would be anywhere: the place that it runs at differs from run to run."""
+        """Remove the submission's folder from a text, because it differs from run to run."""
         return text.replace(f"{self.root}/", "")
 
     def death(self, t_ns: int) -> Fault:
-        """Return the fault of a process that ended without a word, or is ended because it no longer talks."""
+        """End a process that died or stopped reporting, and return its fault."""
         ended = self._ends()
         self._end_now()
         code = self.process.wait()
@@ -318,11 +318,11 @@ class NodeProcess:
         return Fault(t_ns, self.name, FaultKind.KILLED, behind) if behind else ended_by(self.name, t_ns, name)
 
     def stop(self, why: str, family: Collection[int] = ()) -> None:
-        """End the process at a limit, and what it started; may be called from another thread.
+        """Kill the process and its children at a limit; may be called from another thread.
 
         Args:
-            why: Which limit, in words.
-            family: What it started that is still known as such.
+            why: The limit, in words.
+            family: Known pids of its children.
         """
         self.stopped = self.stopped or why
         if self.process.returncode is None:
@@ -333,13 +333,13 @@ class NodeProcess:
                 os.killpg(self.process.pid, signal.SIGKILL)
 
     def _ends(self) -> bool:
-        """Return whether the process ends by itself, which it gets a moment for."""
+        """Wait briefly for the process to end by itself; return whether it did."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(GRACE_S)
         return self.process.returncode is not None
 
     def kill(self) -> None:
-        """End the process, if it has not ended, and everything it started."""
+        """Kill the process, if it is still running, and its process group."""
         self._ends()
         self._end_now()
 
@@ -349,7 +349,7 @@ class NodeProcess:
         self.process.wait()
 
     def close(self) -> None:
-        """Free the descriptors of a process that has ended."""
+        """Close the file descriptors of a process that has ended."""
         self._selector.close()
         self.line.close()
         for source in (self.process.stdout, self.process.stderr):
@@ -365,7 +365,7 @@ def _signal_name(number: int) -> str:
 
 
 def _complete(buffer: bytearray, record_start: bytes) -> int:
-    """Return how much of a buffer consists of whole lines and, on a stream that has them, whole log records."""
+    """Return the length of the part of a buffer that has only complete lines and complete log records."""
     end = buffer.rfind(b"\n") + 1
     if not record_start:
         return end

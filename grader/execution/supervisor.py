@@ -1,8 +1,9 @@
-"""The supervisor's side of recording: keeps workers, hands them plans, takes traces back.
+"""The supervisor's side of recording: manages workers, sends them plans and receives traces.
 
-A worker's answer is untrusted input: its size is capped and its shape is checked. A worker that fails is replaced, and
-the plan it had is tried once more, unless it took all the time it had. A second failure becomes a trace with a problem
-of ours, which is never judged; but where workers have ended at their limits twice, the nodes have brought them there.
+A worker's answer is untrusted input: its size is limited and its structure is checked. A worker that fails is replaced,
+and its plan is tried once more, unless the worker had used up its time. A second failure becomes a trace with a harness
+problem, which is never judged. If both workers ended at their own limits, the nodes caused it, and the trace has
+faults.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ from grader.execution.sandbox.protocol import Isolation
 from grader.execution.usage import families, usage
 from grader.execution.worker import RealTimeBudget
 
-#: A worker that has not answered after the real time of a scenario and this many seconds is taken for lost: its guard
-#: would have ended it long before. On the wall clock it may have begun a second try shortly before the end.
+#: A worker that has not answered this many seconds after the real-time limit of a scenario is lost: its resource
+#: monitor would have ended the run before. On the wall clock it may have started a second try shortly before the limit.
 MARGIN_S = 60.0
-#: What an ended worker gets to be gone.
+#: How long to wait for the exit code of a worker that has ended.
 END_S = 5.0
-#: A worker that fills more is ended, which its guard should have prevented: it does not run while the middleware takes
-#: apart what a node has sent. How often that is looked at.
+#: A worker that uses more memory is killed, and the interval of the check. Its resource monitor should prevent this,
+#: but cannot run while the middleware deserializes a message.
 FULL_BYTES, LOOK_S = 768 * MIB, 0.1
-#: An answer larger than this, or than so many times the messages that may be in it, is not a trace.
+#: The largest valid answer: this size, or this multiple of the size of the messages that may be in it.
 ANSWER_BYTES, ANSWER_BYTES_PER_BYTE = 256 << 20, 12
 TRIES = 2
 MODULE = b"grader.execution.worker"
@@ -53,9 +54,9 @@ class WorkerLostError(HarnessError):
     """A worker ended, or did not answer.
 
     Args:
-        message: What happened.
-        limit: The limit of its own that it ended at, in words; empty if none explains it.
-        late: Whether it has taken all the time it had.
+        message: Description of the failure.
+        limit: The worker's own limit that ended it, in words; empty if no limit explains it.
+        late: Whether it has used up its time.
     """
 
     def __init__(self, message: str, *, limit: str = "", late: bool = False) -> None:
@@ -65,16 +66,16 @@ class WorkerLostError(HarnessError):
 
 
 class WorkerProcess:
-    """One running worker and the line to it.
+    """One running worker and the socket to it.
 
     Args:
-        isolation: The tier it runs in, and starts student processes in.
+        isolation: The tier that it runs in and starts student processes in.
         runtime: Interpreter and ROS.
-        domains: Gives the number of a ROS domain that nobody else uses.
-        scratch: A folder for what ROS writes beside its work.
+        domains: Yields ROS domains that no other program uses.
+        scratch: A folder for files that ROS writes, such as logs.
 
     Attributes:
-        worn: Whether it should do no more, as it says.
+        worn: Whether it reports that it should be replaced.
     """
 
     def __init__(self, isolation: Isolation, runtime: PythonRuntime, domains: Iterator[int], scratch: Path) -> None:
@@ -103,12 +104,12 @@ class WorkerProcess:
         theirs.close()
 
     def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
-        """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it is no more."""
+        """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
         own = {"domain": next(self._domains), "left_ns": budget.left_ns, "budget": budget.words}
         request = json.dumps({"plan": to_json(plan), **own}) + "\n"
         expected = f"worker: expected a trace of {plan.scenario}, found none"
         try:
-            self._line.settimeout(MARGIN_S)  # a plan with a recording in it is more than the line holds at once
+            self._line.settimeout(MARGIN_S)  # a plan with a recording is larger than the socket buffer
             self._line.sendall(request.encode())
             tries = 1 + (plan.clock == ClockKind.WALL.value)
             seconds = min(tries * plan.limits.wall_ns, budget.left_ns) / NS_PER_S + MARGIN_S
@@ -135,7 +136,7 @@ class WorkerProcess:
         return trace_from_json(answer["trace"])
 
     def _end(self) -> str:
-        """Return how the worker ended: the name of a signal, or its code."""
+        """Return how the worker ended: the name of a signal, or its exit code."""
         try:
             code = self._process.wait(END_S)
         except subprocess.TimeoutExpired:
@@ -144,13 +145,13 @@ class WorkerProcess:
         return signal.Signals(number).name if number in {*signal.Signals} else f"code {code}"
 
     def _answer(self, limits: Limits, deadline: float) -> bytes:
-        """Return what the worker says.
+        """Wait for the worker's answer.
 
         Raises:
-            TimeoutError: It says nothing until the deadline.
-            MemoryError: It has filled too much memory.
-            EOFError: It has ended.
-            OSError: It says too much, or the line is broken.
+            TimeoutError: There was no answer before the deadline.
+            MemoryError: The worker uses too much memory.
+            EOFError: The worker has ended.
+            OSError: The answer is too large, or the connection is broken.
         """
         most = max(ANSWER_BYTES, ANSWER_BYTES_PER_BYTE * limits.traffic_bytes)
         received = bytearray()
@@ -171,13 +172,13 @@ class WorkerProcess:
         return bytes(received)
 
     def _look(self) -> None:
-        """Raise MemoryError if the worker itself, not what it has started, has filled too much memory."""
+        """Raise MemoryError if the worker itself, without its children, uses too much memory."""
         self._pid = self._pid or self._find()
         if self._pid and usage([self._pid]).memory_bytes > FULL_BYTES:
             raise MemoryError
 
     def _find(self) -> int:
-        """Return the worker's number here, below whatever the isolation put around it; 0 before it has begun."""
+        """Return the pid of the worker inside of its sandbox's processes; 0 before it has started."""
         for pid in sorted(families([self._process.pid])[self._process.pid]):
             with contextlib.suppress(OSError):
                 words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
@@ -186,16 +187,16 @@ class WorkerProcess:
         return 0
 
     def close(self) -> None:
-        """Hang up; the worker and whatever it started end at once."""
+        """Kill the worker and everything that it started."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 9)
         self._process.wait()
-        self._line.close()  # last: a thread that waits for an answer has been woken by the end of the worker
+        self._line.close()  # last, so that a thread waiting for an answer is woken by the end of the worker
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A plan with the name its progress is told by, and the real time it shares with others; without end by default."""
+    """A plan with a title for progress messages, and the real-time budget that it shares; unlimited by default."""
 
     title: str
     plan: Plan
@@ -203,15 +204,15 @@ class Job:
 
 
 class Recorder:
-    """A few workers that record scenarios side by side; virtual time makes that safe.
+    """A pool of workers that record scenarios in parallel, which virtual time makes safe.
 
     Args:
-        isolation: The tier.
+        isolation: The sandbox tier.
         runtime: Interpreter and ROS.
-        domains: Gives ROS domains, a new one for every scenario.
-        scratch: A folder for what ROS writes beside its work, and for all that is recorded: a worker may see no
-            other. The caller removes it.
-        workers: How many scenarios are recorded at the same time.
+        domains: Yields ROS domains, a new one for every scenario.
+        scratch: A folder for files that ROS writes, and for everything that is recorded: a worker may see no other
+            folder. The caller removes it.
+        workers: How many scenarios to record at the same time.
     """
 
     def __init__(
@@ -226,7 +227,7 @@ class Recorder:
         self._closed = False
         self._count = workers
         self._scratch = scratch
-        # The system ends a worker with the thread that started it: these threads live as long as the recorder.
+        # The kernel kills a worker when the thread that started it ends; these threads live as long as the recorder.
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="recorder")
         for _ in range(workers):
             self._idle.put(None)
@@ -238,9 +239,9 @@ class Recorder:
         self.close()
 
     def warm_up(self, count: int) -> None:
-        """Start so many workers now, so that they are ready when the first plan comes."""
-        # In the caller's thread, which outlives the recorder. All places are taken before any is given back: the
-        # queue would hand the first worker out again.
+        """Start some workers now, so that they are ready for the first plan."""
+        # This runs in the caller's thread, which outlives the recorder. All slots are taken before any is put back:
+        # otherwise the queue would return the first worker again.
         places = [self._idle.get() for _ in range(min(count, self._count))]
         for place in places:
             self._idle.put(place or self._start())
@@ -250,13 +251,13 @@ class Recorder:
         return list(self.each(jobs, progress))
 
     def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
-        """Record every job and yield the traces in the same order, each as soon as those before it are there."""
+        """Record every job and yield the traces in the same order, each as soon as it is available."""
         futures = [self._pool.submit(self._record, job, progress) for job in jobs]
         for future in futures:
             yield future.result()
 
     def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
-        """Record a job; once more where a signal ended a process and no limit explains it: a real fault comes again."""
+        """Record a job, and repeat it if an unexplained signal ended a process: a real fault happens again."""
         progress(job.title)
         trace = self._recorded(job)
         return self._recorded(job) if job.budget.left_ns and any(f.signal for f in trace.faults()) else trace
@@ -317,7 +318,7 @@ class Recorder:
                 worker.close()
 
     def close(self) -> None:
-        """End every worker; what is under way is given up."""
+        """Kill every worker; running jobs are abandoned."""
         with self._lock:
             self._closed = True
             alive, self._alive = self._alive, []
@@ -327,7 +328,7 @@ class Recorder:
 
 
 class _Shared:
-    """An iterator that several threads may use."""
+    """A thread-safe iterator."""
 
     def __init__(self, numbers: Iterator[int]) -> None:
         self._numbers = numbers
@@ -342,6 +343,6 @@ class _Shared:
 
 
 def _environment(runtime: PythonRuntime, scratch: Path) -> Mapping[str, str]:
-    """Return the whole environment of a worker: nothing of the caller's but where to find programs."""
+    """Return the complete environment of a worker; only PATH and GRADER_DEBUG come from the caller's."""
     from_caller = {name: os.environ[name] for name in ("PATH", "GRADER_DEBUG") if name in os.environ}
     return {**worker_environment(runtime, scratch), **from_caller}

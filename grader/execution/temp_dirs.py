@@ -1,4 +1,4 @@
-"""Folders and files that a run leaves on the machine: none of its own, and none of a run that was killed before."""
+"""Creates a run's temporary folder, and removes it and the leftovers of runs that were killed."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 PREFIX = "grade-run-"
-#: As `tempfile` makes names.
+#: The names that `tempfile` generates.
 NAME = re.compile(re.escape(PREFIX) + r"[a-z0-9_]{8}")
-#: An empty folder younger than this may be one that is being made.
+#: An empty folder younger than this may just be in the making.
 FRESH_S = 60.0
-#: Where a tracer's library, which ROS loads, leaves files for every program of a user.
-SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - not ours: looked at only
+#: Where LTTng, a tracing library that ROS loads, leaves files for each user.
+SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - no file is created there
 TRACER_FILES = "lttng-ust-wait-*"
 
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Make a folder that is gone afterwards, and remove those that killed runs of this user left behind.
+    """Create a temporary folder for the block, and remove those that killed runs of this user left behind.
 
-    The folder is locked for as long as this process lives: that is how a later run knows that nobody uses it any more.
+    The folder is locked while this process lives, so that a later run can tell whether it is still in use.
     """
     place = Path(tempfile.gettempdir())
     sweep(place)
@@ -43,9 +43,9 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def sweep(place: Path) -> list[str]:
-    """Remove the folders of dead runs from a place, and return their names.
+    """Remove the folders of dead runs in a place, and return their names.
 
-    One is removed only if it has our name, is a folder of this user's and not a link, and is locked by nobody.
+    A folder is removed only if its name matches, it belongs to this user, is not a symlink and is not locked.
     """
     removed = []
     for name in sorted(_names(place)):
@@ -64,7 +64,7 @@ def _is_dead(folder: Path) -> bool:
         if os.fstat(lock).st_uid != os.geteuid():
             return False
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        # Somebody may have made it a moment ago and not have locked it yet: then it is empty.
+        # A folder that was just created, and is not locked yet, is empty.
         return bool(os.listdir(lock)) or time.time() - os.fstat(lock).st_mtime > FRESH_S  # noqa: PTH208
     except OSError:
         return False
@@ -73,7 +73,7 @@ def _is_dead(folder: Path) -> bool:
 
 
 def _remove(folder: Path) -> None:
-    """Delete a folder and what is in it, never what a link in it leads to."""
+    """Delete a folder and its content, without following symlinks."""
     for parent, folders, _ in os.walk(folder):
         for name in ("", *folders):
             path = Path(parent, name)
@@ -85,7 +85,7 @@ def _remove(folder: Path) -> None:
 
 @contextmanager
 def _without_tracer_files() -> Iterator[None]:
-    """Remove the tracer's files that appear meanwhile, unless a program of somebody else's uses them."""
+    """Remove the tracer's files that appear during the block, unless another program uses them."""
     before = _tracer_files()
     try:
         yield
@@ -108,10 +108,10 @@ def _is_plain(path: Path) -> bool:
 
 
 def _in_use(path: Path) -> bool:
-    """Return whether a process that may be looked at has a file in its memory."""
+    """Return whether any process that may be inspected has a file mapped."""
     status = path.lstat()
     device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
-    wanted = f" {device} {status.st_ino} ".encode()  # as in /proc/PID/maps; the name alone may be another file's
+    wanted = f" {device} {status.st_ino} ".encode()  # as in /proc/PID/maps; another file may have the same name
     for pid in _names(Path("/proc")):
         if pid.isdecimal():
             with contextlib.suppress(OSError):

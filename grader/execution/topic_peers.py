@@ -1,4 +1,4 @@
-"""The grader's publishers of one run: they appear, publish for whoever listens, and disappear; on either clock."""
+"""The grader's publishers of one run, on either clock: created, used and removed as stimuli require."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from grader.execution.student_process import NodeProcess
 from grader.execution.trace_recorder import TraceRecorder
 
 ODOMETRY = "nav_msgs/msg/Odometry"
-#: How long, on the wall clock, a publisher stays after its last message, which it would take with it otherwise.
+#: How long, on the wall clock, a publisher stays after its last message, which would be lost otherwise.
 LINGER_NS = 400_000_000
 
 
@@ -34,7 +34,7 @@ class TopicPeers(ABC):
 
     Args:
         observer: The grader's node.
-        recorder: Where it is taken down.
+        recorder: Records deliveries and marks.
     """
 
     def __init__(self, observer: Observer, recorder: TraceRecorder) -> None:
@@ -44,7 +44,7 @@ class TopicPeers(ABC):
         self._streams: dict[str, str] = {}
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
-        """Let one event of a stimulus happen."""
+        """Execute one event of a stimulus."""
         topic = event.topic
         if isinstance(event, PublishNumber):
             message, value = number_message(self._streams[topic], event.number)
@@ -66,7 +66,7 @@ class TopicPeers(ABC):
             self._recorder.add(Mark(now_ns, "stream_starts", topic))
 
     def follow_type(self, topic: str) -> None:
-        """Change a publisher's type or durability when a student's node subscribed with another one."""
+        """Replace a publisher if the subscriptions of students' nodes ask for another type."""
         current, asked = self._streams[topic], [interface for interface, _ in self._asked(topic)]
         if current == ODOMETRY or not asked or current in asked:
             return
@@ -92,21 +92,21 @@ class TopicPeers(ABC):
 
     @abstractmethod
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
-        """Return the type of every subscription of the students' nodes, and whether it asks for latched messages."""
+        """Return the type of each of the students' subscriptions to a topic, and whether it is transient-local."""
 
     @abstractmethod
     def _withdraw(self, topic: str, now_ns: int) -> None:
-        """Take a publisher out of the graph."""
+        """Remove a publisher from the graph."""
 
 
 class VirtualTopicPeers(TopicPeers):
-    """Publishes in virtual time: waits until publishers are matched, and tells processes what is on its way.
+    """Publishes in virtual time: waits until publishers are matched, and announces messages to the processes.
 
     Args:
         students: The processes.
         observer: The grader's node.
-        recorder: Where it is taken down.
-        discovery: Knows which publishers there are, and tells the processes.
+        recorder: Records deliveries and marks.
+        discovery: Waits for publishers to be matched.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class VirtualTopicPeers(TopicPeers):
         self._streams = discovery.streams
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
-        """Let one event of a stimulus happen, for subscriptions as they are now."""
+        """Execute one event of a stimulus, with the publisher's type adapted to the current subscriptions."""
         if isinstance(event, PublishNumber):
             self.follow_type(event.topic)
         super().do(event, now_ns)
@@ -140,7 +140,7 @@ class VirtualTopicPeers(TopicPeers):
     def _publish(self, delivery: Delivery, message: Any) -> None:
         super()._publish(delivery, message)
         topic = delivery.topic
-        self._discovery.said[topic] += 1
+        self._discovery.published[topic] += 1
         for student in self._students:
             if any(self._discovery.takes(reader, topic) for reader in readers_of(student, topic)):
                 announce(student.arrivals, f"topic {topic}", 1)
@@ -163,17 +163,17 @@ class WallTopicPeers(TopicPeers):
         self._leaving: list[tuple[int, str]] = []
 
     def follow_types(self) -> None:
-        """Change the type of publishers when the graph has changed."""
+        """Adapt the types of all publishers after the graph has changed."""
         for topic in list(self._streams):
             self.follow_type(topic)
 
     def leave(self, now_ns: int) -> None:
-        """Let publishers go that have stayed long enough."""
+        """Remove the publishers that have stayed long enough after their last message."""
         while self._leaving and self._leaving[0][0] <= now_ns:
             self._observer.withdraw(self._leaving.pop(0)[1])
 
     def do(self, event: TopicEvent, now_ns: int) -> None:
-        """Let one event happen; a publisher that stayed for its last message goes before the next one comes."""
+        """Execute one event; a publisher that still lingers is removed before its successor is created."""
         if isinstance(event, (Appear, Advertise)) and any(left == event.topic for _, left in self._leaving):
             self._leaving = [(at_ns, left) for at_ns, left in self._leaving if left != event.topic]
             self._observer.withdraw(event.topic)

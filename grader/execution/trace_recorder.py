@@ -1,4 +1,4 @@
-"""Takes down what happens in a scenario, up to its limits; the same for both clocks."""
+"""Records what happens in a scenario, up to its limits; the same for both clocks."""
 
 from __future__ import annotations
 
@@ -10,27 +10,24 @@ from grader.core.quantities import NS_PER_S, size
 from grader.core.trace import Fault, GraphSnapshot, Mark, Message, Observation, Offer, Request, Response
 from grader.execution.observer import Taken
 
-#: Of a trace nobody reads more notes than this, and of a note no longer names.
+#: The most notes of a trace, and the maximum length of a note and of a name in it.
 NOTES, NOTE_CHARACTERS, NAME_CHARACTERS = 50, 500, 200
-#: Bounds beyond which nobody's nodes go, and which keep a trace small enough to be handed on: publishers and
-#: subscriptions at one moment, the same over all snapshots of the graph, faults and offers.
+#: Bounds that no sensible node exceeds, and that limit the size of a trace: nodes, publishers and subscriptions at one
+#: moment; entries in all snapshots of the graph together; faults; offers.
 ENDPOINTS, GRAPH_PARTS, FAULTS, OFFERS = 500, 100_000, 200, 2_000
-
-
-#: Messages a second on one topic, and so many more, beyond which nobody's nodes go either: a node that publishes as
-#: fast as it can.
+#: A topic with more messages per second, plus a burst, is a flood: the node publishes as fast as it can.
 FLOOD_HZ, BURST = 1_000, 100
 
 
 class TraceRecorder:
-    """The observations of one run, in order.
+    """Records the observations of one run, in order.
 
     Args:
-        limits: How much is taken down.
+        limits: How much to record.
 
     Attributes:
-        observations: What was taken down.
-        full: Why the recording has to end, as a sentence; empty while it goes on.
+        observations: The recorded observations.
+        full: Why the recording has to end, as a sentence; empty until then.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -46,19 +43,19 @@ class TraceRecorder:
 
     @property
     def graph(self) -> GraphSnapshot:
-        """The last snapshot."""
+        """The last snapshot of the graph."""
         return self._graph
 
     def seen(self, topic: str) -> int:
-        """Return how many messages on a topic were taken down."""
+        """Return how many messages were recorded on a topic."""
         return self._messages[topic]
 
     def floods(self, now_ns: int) -> bool:
-        """Return whether more messages have come on a topic, for the time it is, than any right node sends."""
+        """Return whether any topic has had more messages by now than a correct node sends."""
         return max(self._messages.values(), default=0) > BURST + FLOOD_HZ * now_ns / NS_PER_S
 
     def add(self, *observations: Observation) -> None:
-        """Take down what needs no counting, or little: of faults and offers only the first ones."""
+        """Record observations other than messages; only the first faults and offers are kept."""
         for observation in observations:
             kind = type(observation)
             self._counts[kind] += 1
@@ -66,7 +63,7 @@ class TraceRecorder:
                 self.observations.append(observation)
 
     def message(self, t_ns: int, taken: Taken) -> None:
-        """Take down a message, or end the recording where it is one too many."""
+        """Record a message, or end the recording if it exceeds a limit."""
         limits = self._limits
         self._messages[taken.topic] += 1
         self._traffic_bytes += len(taken.cdr)
@@ -78,11 +75,11 @@ class TraceRecorder:
             self.observations.append(Message(t_ns, taken.topic, taken.type, taken.value, taken.cdr))
 
     def exchange(self, observation: Request | Response, size_bytes: int) -> None:
-        """Take down a request or response, or end the recording where it is one too many.
+        """Record a request or response, or end the recording if it exceeds a limit.
 
         Args:
-            observation: It.
-            size_bytes: How much of it a student's node sent.
+            observation: The request or response.
+            size_bytes: Its size if a student's node sent it, otherwise 0.
         """
         limits, service = self._limits, observation.service
         self._messages[f"service {service}"] += 1
@@ -96,14 +93,14 @@ class TraceRecorder:
             self.observations.append(observation)
 
     def look(self, graph: GraphSnapshot, participants: int) -> bool:
-        """Take down the graph where it has changed.
+        """Record the graph if it has changed.
 
         Args:
-            graph: As it is now.
+            graph: The current graph.
             participants: How many participants have appeared so far.
 
         Returns:
-            Whether it had changed and may be worked with.
+            Whether the graph has changed and no limit was exceeded.
         """
         last = self._graph
         if (graph.nodes, graph.endpoints, graph.services) == (last.nodes, last.endpoints, last.services):
@@ -123,7 +120,7 @@ class TraceRecorder:
         return not self.full
 
     def look_back(self, t_ns: int) -> None:
-        """Take down that nothing was ever in the graph, if so: a trace without any snapshot says nothing about it."""
+        """Record an empty snapshot if there is none: a trace without snapshots says nothing about the graph."""
         if not any(isinstance(o, GraphSnapshot) for o in self.observations):
             self.observations.append(GraphSnapshot(t_ns, (), ()))
 
@@ -134,11 +131,11 @@ class TraceRecorder:
             self.observations.append(Mark(t_ns, "limit", self.full))
 
     def note(self, *texts: str) -> None:
-        """Take down sentences that a reader must know."""
+        """Add notes, which readers of the report see."""
         self._notes += texts[: 2 * NOTES - len(self._notes)] if len(self._notes) < 2 * NOTES else ()
 
     def notes(self, others: Iterable[str]) -> tuple[str, ...]:
-        """Return the notes, those of others last; the limit that ended the recording comes first."""
+        """Return all notes: first the limit that ended the recording, then the recorded notes, then the others."""
         first = [self.full] if self.full else []
         whole = dict.fromkeys(text[:NOTE_CHARACTERS] for text in (*first, *self._notes, *others))
         return tuple(whole)[:NOTES]

@@ -1,4 +1,4 @@
-"""What processes use, as the kernel says: memory, processor time, threads, and files in scratch folders."""
+"""Reads the resource usage of processes from the kernel: memory, processor time, threads, files in scratch folders."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 
 from grader.core.quantities import NS_PER_S
 
-#: Where a sandbox with its own file systems has the folders that may be written to.
+#: The writable folders of a sandbox that has its own file systems.
 FOLDERS = ("tmp", "dev/shm")
 
 
 def scratch_names(pids: Iterable[int]) -> int:
-    """Return how many files and folders there are in the fullest scratch folder of some processes.
+    """Count the files and folders in the fullest scratch folder of some processes.
 
     Args:
-        pids: The processes, of one sandbox.
+        pids: The processes of one sandbox.
 
     Returns:
-        The count; 0 where they share the machine's folders, of which nothing tells who filled them.
+        The count; 0 if they share the machine's folders, where files cannot be attributed to processes.
     """
     return max(
         (_names_below(f"/proc/{pid}/root/{folder}", f"/{folder}") for pid in pids for folder in FOLDERS), default=0
@@ -31,26 +31,26 @@ def _names_below(folder: str, ours: str) -> int:
         if os.stat(folder).st_dev == os.stat(ours).st_dev:  # noqa: PTH116 -- strings, of folders in /proc
             return 0
         system = os.statvfs(folder)
-    except OSError:  # the process has ended, or is being made
+    except OSError:  # the process has ended, or is just starting
         return 0
     return system.f_files - system.f_ffree
 
 
 NS_PER_TICK = NS_PER_S // os.sysconf("SC_CLK_TCK")
-#: State in /proc/PID/stat of a process that a signal has halted.
+#: State in /proc/PID/stat of a process that was stopped by a signal.
 HALTED = b"T"
-#: Kinds of memory that belong to a process and cannot be read again from a file; in /proc/PID/status, in KiB.
+#: Memory in /proc/PID/status, in KiB, that is not backed by a file.
 OWN_MEMORY = (b"RssAnon:", b"RssShmem:", b"VmSwap:")
-#: Places in /proc/PID/stat after the name in parentheses, which may hold anything; proc(5) counts from 1, and the
-#: first one here is its third.
+#: Indexes of fields in /proc/PID/stat after the name in parentheses, which may contain spaces. Index 0 is the third
+#: field of proc(5), which counts from 1.
 PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
 
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What some processes use together; processor time includes that of children that have ended.
+    """The combined usage of some processes; processor time includes that of children that have ended.
 
-    `halted` is whether a signal has halted one of them, so that it will never run by itself again.
+    `halted` is whether a signal has stopped one of them, so that it never continues by itself.
     """
 
     memory_bytes: int = 0
@@ -60,7 +60,7 @@ class Usage:
 
 
 def usage(pids: Iterable[int]) -> Usage:
-    """Return what processes use; one that has ended uses nothing."""
+    """Return the combined usage of processes; one that has ended counts as nothing."""
     memory_kib = ticks = threads = 0
     halted = False
     for pid in pids:
@@ -74,7 +74,7 @@ def usage(pids: Iterable[int]) -> Usage:
 
 
 def families(roots: Collection[int]) -> dict[int, set[int]]:
-    """Return each process with its children, their children and so on."""
+    """Return each process with all of its descendants."""
     parents = {pid: int(fields[PARENT]) for pid in _pids() if (fields := _stat(pid))}
     found: dict[int, set[int]] = {root: {root} for root in roots}
     for pid in parents:
@@ -87,24 +87,24 @@ def families(roots: Collection[int]) -> dict[int, set[int]]:
 
 
 def innermost(root: int) -> int:
-    """Return the process at the end of a chain of wrappers, each of which has one child."""
+    """Return the last process in a chain of wrapper processes, each of which has one child."""
     pids = {pid: int(fields[PARENT]) for pid in families([root])[root] if (fields := _stat(pid))}
     return next((pid for pid in pids if pid not in pids.values()), root)
 
 
 def starved_ns(pids: Iterable[int]) -> int:
-    """Return how long the threads of processes were ready to run and had to wait for a processor."""
+    """Return how long the threads of processes were ready to run but waited for a processor, in nanoseconds."""
     return sum(thread_starved_ns(pid, thread) for pid in pids for thread in _names(f"/proc/{pid}/task"))
 
 
 def thread_starved_ns(pid: int, thread: int | str) -> int:
-    """Return how long a thread was ready to run and waited for a processor; 0 where the kernel does not count it."""
+    """Return how long a thread was ready to run but waited for a processor; 0 if the kernel does not count it."""
     fields = _read(f"/proc/{pid}/task/{thread}/schedstat").split()
     return int(fields[1]) if len(fields) > 1 else 0
 
 
 def _status(pid: int) -> tuple[int, int]:
-    """Return a process's own memory in KiB and its threads."""
+    """Return the own memory of a process in KiB, and its number of threads."""
     memory_kib = threads = 0
     for line in _read(f"/proc/{pid}/status").splitlines():
         if line.startswith(OWN_MEMORY):
@@ -130,7 +130,7 @@ def _names(folder: str) -> list[str]:
 
 
 def _read(path: str) -> bytes:
-    """Return a file of /proc; nothing if the process has ended meanwhile."""
+    """Read a file in /proc; empty if the process has ended."""
     try:
         with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - many times a second
             return file.read(1 << 16)

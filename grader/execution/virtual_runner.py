@@ -1,17 +1,17 @@
-"""Steps student processes and stimuli through virtual time, in lock-step, and writes down what happens.
+"""Steps student processes and stimuli through virtual time, and records what happens.
 
-At every instant: stimuli first, then each process that is due or has something on its way, one at a time, until nothing
-is left to do at that instant. Then time jumps to the next moment at which anybody wants to do anything.
+At every instant, stimuli come first; then the processes that are due or have messages on their way run, one at a time,
+until nothing is left to do. Then time jumps to the next moment at which a stimulus or process is due.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from grader.core.trace import ClockKind, Fault, Mark, Offer
+from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Observation, Offer
 from grader.execution.discovery import Discovery, announce, compatible, counts, is_claim, readers_of
 from grader.execution.ending import ending
 from grader.execution.exchanges import PlannedCalls
@@ -22,16 +22,20 @@ from grader.execution.stimuli import APPEARANCES, AddServer, Ask, Event, RemoveS
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import VirtualTopicPeers
 from grader.execution.trace_recorder import NAME_CHARACTERS, OFFERS
-from grader.execution.virtual_time_suitability import hopeless, unfit
 from grader.execution.workload import Workload
 
-#: Where the hosts' virtual time starts: 2026-01-01 00:00:00 UTC, as `grader/student_host/clock.py` has it.
+#: Start of the hosts' virtual time: 2026-01-01 00:00:00 UTC, the same as in `grader/student_host/clock.py`.
 EPOCH_NS = 1_767_225_600_000_000_000
-#: Wake-ups of one scenario; more end it.
+#: The most steps of one scenario; more end it.
 STEPS = 400_000
-#: A process that has more to say than this before it waits or ends does not talk like the host, nor does one that says
-#: that it has more endpoints and parameters.
-WORDS, CLAIMS = 10_000, 1_000
+#: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
+MOST_REPORTS, CLAIMS = 10_000, 1_000
+#: Reasons for recording on the wall clock.
+THREADS = "the node's threads wait for each other without blocking"
+OUTSIDE = "the node waits for something that is neither ROS nor time"
+BUSY = "the node needs so much processor time that virtual time would hide it"
+#: The host's codes for a program that does not settle, with their reasons.
+UNSETTLED = {"threads": THREADS, "outside": OUTSIDE}
 
 
 class VirtualRunner(Runner):
@@ -59,7 +63,7 @@ class VirtualRunner(Runner):
 
     def _last_look(self) -> int:
         if not any(s.ended for s in self._students):
-            self._discovery.look(self._now_ns)  # when the endpoints of an ended process disappear is chance
+            self._discovery.look(self._now_ns)  # the endpoints of an ended process disappear at a random time
         return self._now_ns
 
     def _unfit(self) -> str:
@@ -87,7 +91,7 @@ class VirtualRunner(Runner):
         return max(self._now_ns, min(moments))
 
     def _settle(self) -> None:
-        """Let everything happen that happens at this instant."""
+        """Execute everything that happens at this instant."""
         if self._now_ns >= self._end_ns:
             return
         while self._now_ns < self._end_ns:
@@ -109,7 +113,7 @@ class VirtualRunner(Runner):
         )
 
     def _step(self, student: NodeProcess) -> None:
-        """Tell one process the time and what is on its way, and handle its report."""
+        """Let one process run: send it the time and the messages on their way, and handle its reports."""
         arrivals, student.arrivals, student.nudged = student.arrivals, {}, False
         if self._starts_ns.pop(student.name, 0):
             self._recorder.add(Mark(self._now_ns, "process_starts", student.name))
@@ -121,10 +125,10 @@ class VirtualRunner(Runner):
         student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
         student.stopping = student.stop_signalled
         self._hear(student, workload)
-        self._dismiss_done()
+        self._remove_done()
         self._steps += 1
         hopeless_now = self._plan.stop_when_unfit and hopeless(self._students) and self._unfit()
-        # A flood is wrong on every clock: it goes on to its limit, which is the same on every machine.
+        # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
         if hopeless_now and not self._recorder.floods(self._now_ns):
             self._end_ns = self._now_ns
         if self._steps >= STEPS:
@@ -132,7 +136,7 @@ class VirtualRunner(Runner):
         self._end_if_full(self._now_ns)
 
     def _quiet_until(self, student: NodeProcess) -> int:
-        """Return the next moment at which anything but one process wants to do something."""
+        """Return the next moment at which a stimulus or any other process is due."""
         moments = [self._end_ns]
         moments += [self._due[0].t_ns] if self._due else []
         for other in self._students:
@@ -142,14 +146,14 @@ class VirtualRunner(Runner):
         return max(self._now_ns, min(moments))
 
     def _catch_up(self, report: Mapping[str, Any]) -> None:
-        """Move to the time that a process reached by itself while nothing else happened."""
+        """Adopt the time that a process has reached on its own."""
         now_ns = report.get("now_ns")
         if isinstance(now_ns, int):
             self._now_ns = max(self._now_ns, min(now_ns - EPOCH_NS, self._free_until_ns))
 
     def _hear(self, student: NodeProcess, workload: Workload) -> None:
-        """Wait until a process has nothing left to do at this instant, or has ended."""
-        for _ in range(WORDS):
+        """Handle reports until a process has nothing left to do at this instant, or has ended."""
+        for _ in range(MOST_REPORTS):
             report = student.report()
             kind = None if report is None else report.get("kind")
             if report is None or kind not in ("arrived", "note", "fault", "idle", "exited"):
@@ -173,7 +177,7 @@ class VirtualRunner(Runner):
                 stopped, places = student.stop_signalled, student.places
                 self._end(student, ending(student.name, self._now_ns, report, self._plan, places, stopped=stopped))
                 if report.get("left"):
-                    self._discovery.see_off(self._now_ns)
+                    self._discovery.await_departure(self._now_ns)
                 return
             if report.get("leaving"):
                 self._hand_over()
@@ -183,7 +187,7 @@ class VirtualRunner(Runner):
         self._mark_dead(student)
 
     def _account(self, student: NodeProcess, report: Mapping[str, Any]) -> None:
-        """Take what a process has published, let it reach everybody, and match new endpoints."""
+        """Take what a process has published, announce it to the receivers, and match new endpoints."""
         for channel, count in counts(report.get("lost")).items():
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
@@ -204,7 +208,7 @@ class VirtualRunner(Runner):
                 self._later(replace(due, t_ns=self._now_ns))
 
     def _note_offers(self, student: NodeProcess) -> None:
-        """Write down the services, clients and parameters that a process has not told of before."""
+        """Record the services, clients and parameters that a process reports for the first time."""
         for claim in student.claims:
             offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
             told = offer in student.offers or len(student.offers) >= OFFERS
@@ -213,7 +217,7 @@ class VirtualRunner(Runner):
                 self._recorder.add(Offer(self._now_ns, student.name, *offer))
 
     def _collect(self, sent: Mapping[str, int]) -> None:
-        """Wait until everything published has been taken here, and write it down."""
+        """Wait until the observer has taken all published messages, and record them."""
         expected = Counter({topic: n for topic, n in sent.items() if self._observer.reads(topic)})
         if not expected:
             return
@@ -229,7 +233,7 @@ class VirtualRunner(Runner):
                 self._recorder.note(f"some messages on {topic[:NAME_CHARACTERS]} did not arrive")
 
     def _collect_exchanges(self, sent: Mapping[str, int]) -> None:
-        """Wait until the requests and responses for the grader have been taken here, and write them down."""
+        """Wait until all requests and responses for the grader have been taken, and record them."""
         expected = self._services.expected(sent)
         if not expected:
             return
@@ -241,7 +245,7 @@ class VirtualRunner(Runner):
         if not self._discovery.patience.wait(complete):
             for channel in sorted(c for c, n in expected.items() if n > 0):
                 self._recorder.note(f"a {channel[:NAME_CHARACTERS]} did not arrive")
-        self._services.write_down(self._now_ns)
+        self._services.record(self._now_ns)
 
     def _is_served(self, calls: PlannedCalls) -> bool:
         return self._discovery.is_served(calls)
@@ -252,7 +256,7 @@ class VirtualRunner(Runner):
             self._discovery.tell_all()
 
     def _forward(self, sender: NodeProcess, sent: Mapping[str, int]) -> None:
-        """Tell every process what is on its way to it."""
+        """Announce sent messages to every process that receives them."""
         for channel, count in sorted(sent.items()):
             kind, _, name = channel.partition(" ")
             if kind == "topic":
@@ -264,14 +268,14 @@ class VirtualRunner(Runner):
                 self._announce_exchange(kind, name, count)
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
-        """Tell processes of requests, or of responses, of which every client of the service gets all."""
+        """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for student in self._students:
             ends = student.claims_of("service" if kind == "request" else "client", service)
             if not student.ended and ends:
                 announce(student.arrivals, f"{kind} {service}", count)
 
     def _hand_over(self) -> None:
-        """Have every process wait until what is on its way to it has arrived, because its sender is about to go."""
+        """Make every process wait for the messages on their way to it, because their sender is about to leave."""
         for student in self._students:
             if student.arrivals and not student.ended and student.workload is not None:
                 student.tell({"expect": student.arrivals})
@@ -284,14 +288,14 @@ class VirtualRunner(Runner):
         self._recorder.add(*student.output(self._now_ns, final=final))
 
     def _mark_dead(self, student: NodeProcess) -> None:
-        """Note the end of a process that ended without a word, and what it wrote before."""
+        """Record the end of a process that died or stopped reporting, with its last output and messages."""
         death = student.death(self._now_ns)
         student.drain()
         self._write_output(student, final=True)
         for message in self._observer.take_rest():
             self._record(self._now_ns, message)
         if self._services.take():
-            self._services.write_down(self._now_ns)
+            self._services.record(self._now_ns)
         self._discovery.lose(student)
         self._end(student, death)
 
@@ -302,17 +306,40 @@ class VirtualRunner(Runner):
         student.claims = []
 
     def _play(self, *, phase: str = "") -> None:
-        """Do what stimuli do at this instant, of calls one at a time; before the start, only what appears at once."""
+        """Execute the stimuli that are due; return after each call. In phase `before`, stop at the first message."""
         while self._due and self._due[0].t_ns <= self._now_ns:
             if phase and not isinstance(self._due[0], APPEARANCES):
                 return
             due = self._due.pop(0)
             self._do(due, self._now_ns)
             if isinstance(due, Ask):
-                return  # the next one follows when this one has arrived: so their order is always the same
+                return  # the next call follows after this one has arrived, so that their order is always the same
 
-    def _dismiss_done(self) -> None:
-        """Let servers go that have given their last answer, when it has arrived."""
+    def _remove_done(self) -> None:
+        """Remove the servers that have given their last answer, once it has arrived."""
         for server in self._services.done():
             if not any(f"response {server.service}" in s.arrivals for s in self._students if not s.ended):
                 self._do(RemoveServer(self._now_ns, server), self._now_ns)
+
+
+def hopeless(students: Sequence[NodeProcess]) -> bool:
+    """Return whether it is already certain that virtual time hides how late a node would be."""
+    return any(student.workload is not None and student.workload.delay.hopeless for student in students)
+
+
+def unfit(students: Sequence[NodeProcess], seen: Sequence[Observation], *, full: bool) -> str:
+    """Return why virtual time is not suitable for these nodes; empty if it is.
+
+    Args:
+        students: The processes.
+        seen: The observations.
+        full: Whether a limit has ended the recording.
+    """
+    if any(isinstance(o, Fault) and o.kind is FaultKind.HUNG for o in seen):
+        return next((UNSETTLED[s.unsettled] for s in students if s.unsettled in UNSETTLED), "")
+    if full:
+        return ""
+    hiding = [s.workload for s in students if s.workload is not None and s.workload.delay.hides]
+    if not hiding:
+        return ""
+    return OUTSIDE if any(workload.waited_ns > workload.used_ns for workload in hiding) else BUSY

@@ -1,8 +1,8 @@
-"""Runs a plan on the real clock, beside a reference that tells whether the machine kept up.
+"""Runs a plan on the real clock, for programs that virtual time does not suit.
 
-For what virtual time cannot hold. Nothing is stepped: processes run as they like, and whatever arrives gets the real
-time at which it came. The reference is the conductor's own loop: if it was held up for long, so may the students' nodes
-have been, and the run says nothing about them.
+Processes run freely, and everything is recorded with the real time of its arrival. The runner's own loop is the
+reference for the load of the machine: if the loop was delayed for long, the students' nodes may have been as well, and
+the run is not judged.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from grader.execution.stimuli import Advertise, RemoveServer
 from grader.execution.student_process import NodeProcess
 from grader.execution.topic_peers import LINGER_NS, WallTopicPeers
 
-#: How much of a flood is taken in one look, so as not to hold up the reference: messages of a topic, pieces of output.
+#: The most messages of a topic, and reads of a stream, in one iteration, so that a flood does not delay the loop.
 MESSAGES_A_LOOK, READS_A_LOOK = 100, 2
-#: How often the conductor looks, and how long it may be held up at most before the run says nothing.
+#: The pause between two iterations, and the longest delay of the loop before the run counts as invalid.
 LOOK_S = 0.001
 HELD_UP_NS = 150 * NS_PER_MS
-#: How long before its first message a publisher appears: a subscription has to find it.
+#: How long before its first message a publisher is created, so that subscriptions can discover it.
 LEAD_NS = 300 * NS_PER_MS
 GRAPH_EVERY_NS = 50 * NS_PER_MS
 
@@ -50,14 +50,14 @@ class WallRunner(Runner):
         return max(self._stop_ns, time.monotonic_ns() - self._started)
 
     def _begin(self) -> None:
-        """Start the clock, and every process that does not start late."""
+        """Start the clock and every process that does not start late."""
         self._started = time.monotonic_ns()
         for student in self._students:
             if student.name not in self._starts_ns:
                 student.tell({"now_ns": 0, "free_until_ns": 0})
 
     def _run_on(self) -> None:
-        """Look again and again until the end, or until nothing more can happen."""
+        """Poll until the end, or until nothing more can happen."""
         before_ns = self._time_ns() if self._stop_ns else 0
         while (now_ns := self._time_ns()) < self._end_ns and not self._finished():
             self.held_up_ns = max(self.held_up_ns, now_ns - before_ns)
@@ -73,7 +73,7 @@ class WallRunner(Runner):
         student.tell({"stop": True})
 
     def _harness_problem(self) -> str:
-        """Say that the machine did not keep up, if it did not; a node that floods holds it up itself."""
+        """Report that the machine was too busy, unless a flood of the nodes themselves delayed the loop."""
         if self.held_up_ns <= HELD_UP_NS or self._recorder.full:
             return ""
         return "the machine was too busy: a reference timer beside the node was held up as well"
@@ -85,10 +85,10 @@ class WallRunner(Runner):
         for due in self._services.ready(self._is_served):
             self._later(replace(due, t_ns=now_ns))
         self._services.take()
-        self._services.write_down(now_ns)
+        self._services.record(now_ns)
         going = [due.server for due in self._due if isinstance(due, RemoveServer)]
         for server in self._services.done():
-            if server not in going:  # it would take its last response with it
+            if server not in going:  # removed later, because its last response would be lost otherwise
                 self._later(RemoveServer(now_ns + LINGER_NS, server))
         for student in self._students:
             if 0 < self._starts_ns.get(student.name, 0) <= now_ns:
@@ -130,8 +130,8 @@ class WallRunner(Runner):
         self._topics.follow_types()
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
-        """Tell nobody: on the real clock processes take what comes when it comes."""
+        """Do nothing: on the real clock, processes receive messages by themselves."""
 
     def _is_served(self, calls: PlannedCalls) -> bool:
-        service = self._services.meet(calls)
-        return service is not None and self._observer.services.met(service)
+        service = self._services.add_clients(calls)
+        return service is not None and self._observer.services.is_matched(service)

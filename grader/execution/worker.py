@@ -1,4 +1,4 @@
-"""The trusted worker: runs plans one after another in a network of its own, and answers each with a trace."""
+"""The trusted worker: runs plans one after another in its own network namespace, and answers each with a trace."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from grader.execution.sandbox.tiers import isolation_from_name
 from grader.execution.student_process import LOG_FORMAT, NodeProcess
 from grader.execution.usage import usage
 
-#: More than anything takes, for recordings that are not of one submission.
+#: The budget of recordings that do not belong to one submission: effectively unlimited.
 FOREVER_S = 1e9
-#: Where nodes lost more than this share of it to others on the machine, a budget that is used up says nothing of them.
+#: If the nodes spent more than this share of the real time waiting for processors, a used-up budget is not their fault.
 STARVED_SHARE = 0.25
 
 
 class RealTimeBudget:
-    """Real time from its making on; several recordings may go on at once.
+    """A budget of real time that starts when it is created, and that parallel recordings share.
 
     Args:
-        seconds: How much there is.
+        seconds: Size of the budget.
     """
 
     def __init__(self, seconds: float = FOREVER_S) -> None:
@@ -56,7 +56,7 @@ class RealTimeBudget:
 
     @property
     def left_ns(self) -> int:
-        """Real time that is left; 0 if it is used up."""
+        """Real time that is left, in nanoseconds; 0 if it is used up."""
         return max(0, self._total_ns - (time.monotonic_ns() - self._started_ns))
 
     @property
@@ -65,22 +65,22 @@ class RealTimeBudget:
 
     @property
     def words(self) -> str:
-        """Why a recording is ended, or not begun, when the time is used up; the same in every run."""
+        """The reason to give when a recording is ended or not started; the same in every run."""
         return f"stopped: {self._exceeded}"
 
     def charge(self, real_ns: int, starved_ns: int) -> None:
-        """Take note of a recording.
+        """Account for a recording.
 
         Args:
-            real_ns: What it took.
-            starved_ns: How much of that the nodes waited for processors that others had.
+            real_ns: Real time that it took.
+            starved_ns: How much of that the nodes waited for processors that other programs used.
         """
         with self._lock:
             self._real_ns += real_ns
             self._starved_ns += starved_ns
 
     def unrecorded(self, plan: Plan) -> Trace:
-        """Return the trace of a scenario for which no time is left: the nodes' fault, or the machine's."""
+        """Return the trace of a scenario for which no time is left: a fault of the nodes, or a harness problem."""
         clock = ClockKind(plan.clock)
         if self._starved_ns > STARVED_SHARE * self._real_ns:
             problem = f"the machine was too busy: {self._exceeded}"
@@ -89,20 +89,20 @@ class RealTimeBudget:
         return Trace(plan.scenario, clock, stop_ns=plan.duration_ns, observations=faults)
 
 
-#: A run on the wall clock whose reference slipped is repeated so often before the scenario is undecided.
+#: How often a run on the wall clock is tried if the machine is too busy, before the scenario is undecided.
 WALL_TRIES = 3
-#: Where the guard comes too late, the system ends the worker: at this much mapped, and so much processor time beyond
-#: the guard's limit. A worker maps 0.6 GiB.
+#: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
+#: monitor's limit. An ordinary worker maps 0.6 GiB.
 ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 30
-#: A worker that has filled more than this after a scenario does no more; ordinary scenarios leave 30 to 50 MiB.
+#: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
 
 
 class Worker:
-    """Starts students' processes and conducts them.
+    """Starts students' processes and runs plans with them.
 
     Args:
-        isolation: The tier that student processes are started in.
+        isolation: The tier to start student processes in.
         runtime: Interpreter and ROS.
     """
 
@@ -118,7 +118,7 @@ class Worker:
             plan: The scenario.
             domain: The ROS domain to use.
             left_ns: Real time that is left for the submission.
-            budget_words: What to say where that is used up.
+            budget_words: The reason to give when that is used up.
         """
         self._real_ns = self._starved_ns = 0
         limit_processor_time(plan.limits)
@@ -128,7 +128,7 @@ class Worker:
             trace = self._record(plan, domain, Budget(left_ns - spent_ns, budget_words))
             if not trace.harness_problem or time.monotonic_ns() - started_ns > min(plan.limits.wall_ns, left_ns):
                 break
-        # evidence is written in the form of a trace, and what was reached for is none
+        # not in trace_to_json, because the format of evidence does not include it
         cost = {"real_ns": self._real_ns, "starved_ns": self._starved_ns}
         return {"trace": {**trace_to_json(trace), "reached": list(trace.reached)}, **cost, "worn": is_worn(trace)}
 
@@ -146,22 +146,22 @@ class Worker:
 
             observer = Observer(domain, plan.limits)
             stack.callback(observer.close)
-            guard = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
-            stack.callback(self._account, guard)
-            conductor: Callable[..., VirtualRunner | WallRunner] = WallRunner if plan.clock == "wall" else VirtualRunner
+            monitor = stack.enter_context(ResourceMonitor(students, plan.limits, budget))
+            stack.callback(self._account, monitor)
+            runner: Callable[..., VirtualRunner | WallRunner] = WallRunner if plan.clock == "wall" else VirtualRunner
             if plan.bare:
                 from grader.execution.bare_runner import BareRunner  # noqa: PLC0415 - as above
 
-                conductor = BareRunner
+                runner = BareRunner
             else:
                 for student in students:
                     _await_ready(student)
-            trace = guard.reviewed(conductor(plan, students, observer).run())
+            trace = monitor.reviewed(runner(plan, students, observer).run())
             return replace(trace, reached=tuple(dict.fromkeys(what for s in students for what in s.reached)))
 
-    def _account(self, guard: ResourceMonitor) -> None:
-        self._real_ns += guard.real_ns
-        self._starved_ns += guard.starved_ns
+    def _account(self, monitor: ResourceMonitor) -> None:
+        self._real_ns += monitor.real_ns
+        self._starved_ns += monitor.starved_ns
 
     def _start(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
         ours, theirs = socket.socketpair()
@@ -204,7 +204,7 @@ class Worker:
         return student
 
     def _start_bare(self, plan: Plan, name: str, file: str, domain: int) -> NodeProcess:
-        """Start a file with nothing of the grader in its process; see `bare`."""
+        """Start a file without the grader's code in its process."""
         root = self._isolation.submission_seen_at or plan.root
         command = self._isolation.student_command(
             StudentProcess(
@@ -223,13 +223,13 @@ class Worker:
 
 
 def limit_memory() -> None:
-    """Have the system limit what this process may map; students' processes have a limit of their own."""
+    """Set the kernel's limit on the memory that this process may map; students' processes have their own."""
     _, most = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (_lower(ADDRESS_SPACE_BYTES, most), most))
 
 
 def limit_processor_time(limits: Limits) -> None:
-    """Have the system limit the processor time of this process from now on."""
+    """Set the kernel's limit on the processor time of this process, counted from now."""
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
     seconds = math.ceil(time.process_time_ns() / NS_PER_S) + limits.processor_s + SPARE_CPU_S
     resource.setrlimit(resource.RLIMIT_CPU, (_lower(seconds, most), most))
@@ -240,14 +240,14 @@ def _lower(value: int, most: int) -> int:
 
 
 def is_worn(trace: Trace) -> bool:
-    """Return whether a worker should do no more after a scenario: something odd has happened, or it has grown."""
+    """Return whether a worker should be replaced after a scenario: something unusual happened, or it has grown."""
     odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes
     full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)
     return bool(odd or full or trace.harness_problem) or usage([os.getpid()]).memory_bytes > WORN_BYTES
 
 
 def _await_ready(student: NodeProcess) -> None:
-    """Wait until a process is about to run its file; until then nothing of the student's has run."""
+    """Wait until a process is about to run its file; none of the student's code has run until then."""
     if not student.is_ready():
         raise RuntimeError(f"a student's process did not start: {student.stopped or _last_words(student)}")
 
@@ -259,7 +259,7 @@ def _last_words(student: NodeProcess) -> str:
 
 
 def stop(students: list[NodeProcess]) -> None:
-    """Send the stop signal to every process that still runs, give it a moment, end it."""
+    """Send the stop signal to every running process, wait briefly, then kill it."""
     for student in students:
         if not student.ended:
             student.tell({"stop": True})
@@ -269,7 +269,7 @@ def stop(students: list[NodeProcess]) -> None:
 
 
 def main() -> None:
-    """Serve plans until the supervisor hangs up."""
+    """Run plans until the supervisor closes the socket."""
     request = json.loads(sys.argv[1])
     line = socket.socket(fileno=request["line"])
     commands, answers = line.makefile("r"), line.makefile("w")

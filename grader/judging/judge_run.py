@@ -12,9 +12,8 @@ from typing import Any
 
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.quantities import NS_PER_S, seconds
-from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
+from grader.core.report import NOT_JUDGED, ExerciseReport, Pace, Report, ReportedFault, Summary, TopicSummary, Verdict
 from grader.core.submission import Run, Submission
-from grader.core.summary import Pace, Summary, TopicSummary
 from grader.core.trace import ClockKind, Fault, GraphSnapshot, Message, Offer, StartWay, Trace
 from grader.judging.charts import illustrated
 from grader.judging.diagnosis import diagnose, placed

@@ -10,8 +10,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from grader.core.names import Pattern
-from grader.core.quantities import NS_PER_MS, SLACK, within
+from grader.core.quantities import NS_PER_MS, SLACK, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote
 

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
-from grader.core.explanation import CheckExplanation, CriterionExplanation, Parameter
+from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
 from grader.reporting.escape import shown
 
 SCHEMA = "grader/explanation/v1"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from grader.core.quantities import seconds
-from grader.core.summary import Summary, TopicSummary
+from grader.core.report import Summary, TopicSummary
 from grader.core.trace import Endpoint, Fault, LogRecord, OutputLine
 from grader.reporting.escape import shown, valid_unicode
 from grader.reporting.graph import draw_graph

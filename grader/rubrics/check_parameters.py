@@ -10,8 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, 
 
 from pydantic import AfterValidator, Field, create_model
 
-from grader.core import names
-from grader.core.quantities import DurationNs, Hertz, Least, Unit
+from grader.core.quantities import DurationNs, Hertz, Kind, Least, Unit
 from grader.rubrics.drawing import Fields, SomeLongTime, SomeTime
 from grader.rubrics.stimuli import (
     Calls,
@@ -167,7 +166,7 @@ def _accepted(annotation: object, name: str = "") -> object:
     for known, accepted in _BY_ANNOTATION:
         if annotation == known:
             return accepted
-    if kind := _mark(annotation, names.Kind):
+    if kind := _mark(annotation, Kind):
         return _BY_KIND[kind.name]
     if least := _mark(annotation, Least):
         unit = _mark(annotation, Unit)

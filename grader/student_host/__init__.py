@@ -1,5 +1,5 @@
-"""Runs beside a student's file, in its process; uses the standard library and rclpy, and imports nothing of grader.
+"""Runs inside a student's process, next to the student's file; imports rclpy and the standard library, but not grader.
 
-The host knows no rubric, no points and no expected value. It gives the student's unmodified file a clock that belongs
-to the grader: whenever every thread of the process would block, it tells the grader so, and waits to be told the time.
+The host knows no rubric, no points and no expected values. It gives the student's unmodified file a clock that the
+grader controls: whenever every thread of the process would block, it reports this and waits for the grader's answer.
 """

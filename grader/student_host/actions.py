@@ -1,4 +1,4 @@
-"""Counts the traffic of actions, whose servers and clients rclpy builds below its services and topics."""
+"""Counts the traffic of actions, whose servers and clients do not use rclpy's services and topics."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from .clock import VirtualClock
     from .ledger import Ledger
 
-#: Sends something on a channel from a handle, and counts it.
+#: A function that sends a message on a channel from a handle, and counts it.
 Counted = Callable[[str, Any, Callable[[], Any]], Any]
 
-#: The methods of a server and of a client that take something: for each the channel, and which of the answers of
-#: `is_ready` says that it is there.
+#: The methods of a server and of a client that take something: for each the channel, and the index of its flag in the
+#: result of `is_ready`.
 TAKES = {
     "service": {
         "take_goal_request": ("request", "send_goal", 0),
@@ -48,13 +48,13 @@ SENDS = {
         "send_result_request": ("request", "get_result"),
     },
 }
-#: What an action consists of, as it stands in the graph: `{}` is the action's type.
+#: The services and topics of an action in the graph; `{}` is the action's type.
 SERVICES = {
     "send_goal": "{}_SendGoal",
     "get_result": "{}_GetResult",
     "cancel_goal": "action_msgs/srv/CancelGoal",
 }
-#: Whether a client has a server, without a look that would let time pass.
+#: Checks whether a client has a server, without counting as a look, which would let time pass.
 HAS_SERVER = _rclpy.ActionClient.is_action_server_available
 TOPICS = {"feedback": "{}_FeedbackMessage", "status": "action_msgs/msg/GoalStatusArray"}
 
@@ -63,9 +63,9 @@ class Receiver:
     """One of the queues of an action's server or client.
 
     Args:
-        end: Whose queue it is.
-        channel: What comes there, e.g. `request /count/_action/send_goal`.
-        number: Which of the answers of `is_ready` says that something is there.
+        end: The server or client that owns the queue.
+        channel: What the queue receives, e.g. `request /count/_action/send_goal`.
+        number: Index of its flag in the result of `is_ready`.
     """
 
     def __init__(self, end: ActionEnd, channel: str, number: int) -> None:
@@ -73,12 +73,12 @@ class Receiver:
         self._number = number
         self.channel = channel
         self.topic_name = channel.partition(" ")[2]
-        #: How much its queue holds; of states only the last one.
+        #: The depth of the queue; for the status topic only the last message.
         self.depth = 1 if channel.endswith("/status") else 10
 
     @property
     def handle(self) -> Any:
-        """What rclpy takes from."""
+        """The handle that rclpy takes messages from."""
         return self._end.handle
 
     def is_ready_within(self, seconds: float, new_wait_set: Callable[..., Any], context: Any) -> bool:
@@ -102,8 +102,8 @@ class ActionEnd:
     """The server or client of an action.
 
     Args:
-        kind: `service` or `client`, as the services it consists of.
-        handle: What rclpy works with.
+        kind: `service` or `client`, the kind of its services.
+        handle: The handle that rclpy uses.
         name: Absolute name of the action.
         interface: e.g. `test_msgs/action/Fibonacci`.
     """
@@ -124,11 +124,11 @@ class ActionEnd:
         return f"{channel} {self._prefix}{part}"
 
     def services(self) -> list[str]:
-        """Return the names of the services it consists of."""
+        """Return the names of its services."""
         return [f"{self._prefix}{part}" for part in SERVICES]
 
     def claims(self) -> list[dict[str, Any]]:
-        """Return its services and topics as the grader needs to know them."""
+        """Return its services and topics as claims for the grader."""
         services = [(self.kind, part, interface) for part, interface in SERVICES.items()]
         topic = "publisher" if self.kind == "service" else "subscription"
         topics = [(topic, part, interface) for part, interface in TOPICS.items()]
@@ -165,11 +165,11 @@ def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], l
         if ledger.removed:
             settle()
         make(self, node, *arguments)
-        # a server is given its node's clock first
+        # the first argument of a server is the clock of its node
         interface, name = arguments[1:3] if kind == "service" else arguments[:2]
         resolved = _rclpy.rclpy_resolve_name(node, name, False, False)  # noqa: FBT003 - C++
-        package, room = interface.__module__.split(".")[:2]
-        ledger.add_action(ActionEnd(kind, self, resolved, f"{package}/{room}/{interface.__name__}"))
+        package, namespace = interface.__module__.split(".")[:2]
+        ledger.add_action(ActionEnd(kind, self, resolved, f"{package}/{namespace}/{interface.__name__}"))
 
     def destroyed(self: Any) -> None:
         leave()

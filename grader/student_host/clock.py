@@ -1,26 +1,27 @@
-"""The virtual clock: what time it is, and when a program that only looks at the clock has to let time pass."""
+"""The virtual clock: the current time, and the rules by which time passes for a program that never blocks."""
 
 from collections.abc import Callable
 
 #: Virtual time starts at 2026-01-01 00:00:00 UTC.
 EPOCH_NS = 1_767_225_600_000_000_000
 
-#: A program that never blocks is let go on by this much, each time it has shown that it only waits for time to pass.
+#: How far time advances for a program that never blocks, each time it shows that it only waits for time to pass.
 STEP_NS = 500_000
-#: The same for a program that does not even look at the clock, and only waits for something to happen.
+#: The same for a program that does not look at the clock, and only waits for something to happen.
 LONG_STEP_NS = 10_000_000
-#: So many looks at the clock, or fruitless polls, at one instant show it; fewer once it has been seen to do so.
+#: The number of looks at the clock, or of polls without a result, at one instant that shows this; and the smaller
+#: number for a program that has just done so.
 LOOKS = 200
 LOOKS_WHILE_SPINNING = 4
-#: A pause of a program that looks at clocks ends by this much late, as it does on any machine. If it ended to the very
-#: nanosecond, `now - last > period` would hold one pause later than its author ever saw, or by chance of rounding.
+#: How late a pause ends in a program that looks at clocks, as on any real machine. If it ended exactly on time, whether
+#: `now - last > period` holds would depend on rounding, or it would hold one pause later than its author ever saw.
 LATE_NS = 1_000
-#: So many messages sent at one instant show that a program does not pace itself at all.
+#: This many messages sent at one instant show that a program does not pace itself.
 MESSAGES_AT_ONCE = 200
 
 
 class VirtualClock:
-    """The time of one process; moves only when the grader says so."""
+    """The virtual time of one process; it advances only when the grader allows it."""
 
     def __init__(self) -> None:
         self.now_ns = EPOCH_NS
@@ -31,7 +32,7 @@ class VirtualClock:
         self._looked_at = False
         self._was_looked_at = False
         self._seen_ns = 0
-        #: Whether a pause, or a timer's period, has begun at this moment: work before it puts off what comes after it.
+        #: Whether a pause or a timer's period has begun at this moment, so that the work before it delays what follows.
         self.counted = False
         self.let_time_pass: Callable[[int], None] = lambda until_ns: None
 
@@ -40,7 +41,7 @@ class VirtualClock:
         if now_ns > self.now_ns:
             self.now_ns, self._sent = now_ns, 0
             if not self._yielding:
-                self.busy()  # looks between two pauses are no busy loop, however many pauses there are
+                self.busy()  # looks between two pauses do not add up to a busy loop
 
     def end_of(self, pause_ns: int) -> int:
         """Return when a pause that begins now ends."""
@@ -49,11 +50,11 @@ class VirtualClock:
         return self.now_ns + pause_ns + (LATE_NS if self._was_looked_at and pause_ns > 0 else 0)
 
     def count_pause(self) -> None:
-        """Note that a pause begins; who has just looked at a clock may sleep until a deadline, whatever the work."""
+        """Note that a pause begins, unless the program has just looked at a clock: it may sleep until a deadline."""
         self.counted |= self._seen_ns != self.now_ns
 
     def look(self, *, by_library: bool = False) -> int:
-        """Return the time to a program that asks for it, letting time pass if it does nothing else."""
+        """Return the time to the program, and let time pass if the program does nothing but look."""
         self._looked_at = True
         if not by_library:
             self._was_looked_at, self._seen_ns = True, self.now_ns
@@ -75,11 +76,11 @@ class VirtualClock:
             self._yielding = self._looked_at = False
 
     def busy(self) -> None:
-        """Note that the program did something else than wait."""
+        """Note that the program did something other than wait."""
         self._looks, self._allowed = 0, LOOKS
 
     def busy_sending(self) -> None:
-        """Note that the program sends a message, letting time pass if it sends without end at one instant."""
+        """Note that the program sends a message, and let time pass after many messages at one instant."""
         self.busy()
         self._sent += 1
         if self._sent >= MESSAGES_AT_ONCE and not self._yielding:

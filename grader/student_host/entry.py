@@ -1,4 +1,4 @@
-"""Runs a student's file as a ROS user would: as a script, or as a module of its package."""
+"""Runs a student's file as a ROS user would, as a script or as a module of its package."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from .packages import (
 )
 from .shadows import Shadows
 
-#: Takes a code and what belongs to it: `started`, and what the report has to mention.
-Say = Callable[[dict[str, Any]], None]
+#: Sends a note to the grader: a code with its data.
+Notify = Callable[[dict[str, Any]], None]
 
 
 def path_of(root: str, file: str) -> list[str]:
-    """Return the folders that come first on the path: the script's own, or those that hold packages."""
+    """Return the first folders of sys.path: the folder of the script, or the folders that contain packages."""
     layout = layout_of(root, file)
     if not layout.module:
         built = package_folders(root) if layout.package is not None else []
@@ -40,34 +40,34 @@ def path_of(root: str, file: str) -> list[str]:
 
 
 def shadows_of(root: str, file: str) -> Shadows:
-    """Return which modules of a submission hide others from one of its files."""
+    """Find the modules of a submission that hide other modules from one of its files."""
     return Shadows(path_of(root, file))
 
 
-def run_file(root: str, file: str, say: Say, install_ros: Callable[[], None]) -> None:
+def run_file(root: str, file: str, notify: Notify, install_ros: Callable[[], None]) -> None:
     """Run one file of a submission to its end; raises whatever the file raises.
 
     Args:
         root: The submission's folder.
         file: The file, relative to it.
-        say: Hears how the file is started, before anything of it runs, and what the report has to mention.
-        install_ros: Called when the program has imported rclpy, if a module of the submission hides another.
+        notify: Called with the way the file is started, before any of its code runs, and with notes for the report.
+        install_ros: Called when the program imports rclpy, if a module of the submission hides another one.
     """
     path = os.path.join(root, file)
-    tree = _parse(path)  # a syntax error is raised before anything has run
+    tree = _parse(path)  # raises a syntax error before any code has run
     layout = layout_of(root, file)
     start = start_of(root, file, layout, tree)
     shadows = shadows_of(root, file)
     how = {"way": start.way, "module": start.module, "function": start.function}
-    say({"code": "started", **how, "hidden": shadows.files})
+    notify({"code": "started", **how, "hidden": shadows.files})
     if shadows.files:
         shadows.fall(install_ros)
     sys.path[:0] = [f for f in dict.fromkeys((start.base, *path_of(root, file))) if f]
     if layout.module:
-        _find_neighbours(tree, path, say)
+        _find_neighbours(tree, path, notify)
     sys.argv = [path]
     if start.way in (SCRIPT, MODULE):
-        run_what_nothing_called(_run_as_main(path, start.module, layout), tree, say)
+        run_what_nothing_called(_run_as_main(path, start.module, layout), tree, notify)
         return
     main = sys.modules["__main__"] = ModuleType("__main__")  # the console script that calls the module
     main.__file__ = path
@@ -84,7 +84,7 @@ def _parse(path: str) -> ast.Module:
     with open(path, "rb") as source:
         text = source.read()
     before, null, _ = text.partition(b"\0")
-    if null:  # Python says so as well, but not where
+    if null:  # Python's own error has no line number
         raise SyntaxError("source code cannot contain null bytes", (path, before.count(b"\n") + 1, None, None))
     return ast.parse(text, path)
 
@@ -95,7 +95,7 @@ def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:
     Args:
         path: The file.
         name: Its dotted name, if it is run as a module of its package.
-        layout: Where it lies.
+        layout: Its place in the package.
     """
     module = ModuleType("__main__")
     module.__file__ = path
@@ -118,7 +118,7 @@ def _run_as_main(path: str, name: str, layout: PackageLayout) -> dict[str, Any]:
 
 
 def _make_nameless(path: str, layout: PackageLayout) -> None:
-    """Make the package whose own folder is all that was handed in: no folder on the path holds it."""
+    """Create the package if the submission is the package's own folder, which no entry of sys.path contains."""
     parts = layout.module.split(".")
     if layout.base or parts[0] != NAMELESS:
         return
@@ -132,15 +132,15 @@ def _make_nameless(path: str, layout: PackageLayout) -> None:
         spec.loader.exec_module(package)
 
 
-def _find_neighbours(tree: ast.Module, path: str, say: Say) -> None:
-    """Let a file in a package import what lies beside it by its plain name, which `ros2 run` would not find."""
+def _find_neighbours(tree: ast.Module, path: str, notify: Notify) -> None:
+    """Let a file in a package import modules in its folder by their plain names, which `ros2 run` would not find."""
     folder = os.path.dirname(path)
     if folder in sys.path:
         return
     for name in sorted(_plain_imports(tree)):
         beside = os.path.isfile(os.path.join(folder, f"{name}.py"))
         if beside and name not in sys.modules and PathFinder.find_spec(name) is None:
-            say({"code": "neighbour_imported", "module": name})
+            notify({"code": "neighbour_imported", "module": name})
     sys.path.append(folder)
 
 
@@ -150,24 +150,24 @@ def _plain_imports(tree: ast.Module) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, say: Say) -> None:
+def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify: Notify) -> None:
     """Start what a file defines but never starts: its `main`, or its only node class."""
     ros = sys.modules.get(f"{__package__}.ros")
     if ros is None or ros.MADE_NODES:
         return
     main = namespace.get("main")
     if callable(main) and not _calls_at_top_level(tree.body, "main"):
-        say({"code": "main_not_called"})
+        notify({"code": "main_not_called"})
         main()
         return
     nodes = _node_classes(namespace)
     if "main" not in namespace and len(nodes) == 1:
-        say({"code": "class_not_started", "class": nodes[0].__name__})
+        notify({"code": "class_not_started", "class": nodes[0].__name__})
         spin(nodes[0])
 
 
 def _calls_at_top_level(statements: Sequence[ast.stmt], name: str) -> bool:
-    """Return whether a statement that runs when the file is run as a script calls a name."""
+    """Return whether a statement calls a name when the file runs as a script."""
     return calls([statement for statement in statements if not never_true(statement)], name)
 
 
@@ -184,7 +184,7 @@ def _node_classes(namespace: dict[str, Any]) -> list[Any]:
 
 
 def spin(node_class: Any) -> None:
-    """Make a node and spin it."""
+    """Create a node and spin it."""
     import rclpy
 
     if not rclpy.ok():

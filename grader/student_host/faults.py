@@ -1,4 +1,4 @@
-"""Describes what ended a student's program: the kind, one line, and the student's own frames."""
+"""Describes why a student's program ended: the kind, one line of text, and the student's own frames."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import traceback
 from types import FrameType
 from typing import Any
 
-#: Longest text of a fault.
+#: Maximum length of a fault's text.
 TEXT_CHARACTERS = 500
-#: So much of an exception's text is read at all.
+#: How much of an exception's text is read.
 _READ_CHARACTERS = 4_000
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
 _NO_PATH = r"\s'\"():,;<>\[\]"
-#: A file of code by its whole path; what stands in other quotes may be a path or a topic, and stays.
+#: The absolute path of a source or binary file. Other paths are kept, since they may be topic names.
 _CODE_FILE = re.compile(rf"(?<![\w.~/])(?:/[^/{_NO_PATH}]+)+\.(?:pyc?|so(?:\.\d+)*|c|cc|cpp|h|hpp|pyx)\b")
 
 
 class Describer:
-    """Turns exceptions and stacks into faults.
+    """Converts exceptions and stacks to faults.
 
     Args:
-        root: The submission's folder; frames of files below it are the student's own.
+        root: The submission's folder; frames of files in it are the student's own.
     """
 
     def __init__(self, root: str) -> None:
@@ -31,7 +31,7 @@ class Describer:
         self._folders = (os.path.join(root, ""), self._root)
 
     def exception(self, error: BaseException) -> dict[str, Any]:
-        """Return an uncaught exception as a fault."""
+        """Convert an uncaught exception to a fault."""
         if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
@@ -40,12 +40,12 @@ class Describer:
         return {"code": "exception", "type": kind, "message": _behind(kind, said), **self._place(frames)}
 
     def _is_of_file(self, error: SyntaxError) -> bool:
-        """Return whether a file of the submission cannot be compiled: anybody may raise such an error."""
+        """Return whether a file of the submission cannot be compiled: any code may raise a SyntaxError itself."""
         try:
             path = os.path.realpath(error.filename or "")
             with open(path, "rb") as source:
                 text = source.read() if self._inside(path) else b""
-        except Exception:  # what is no path, or a file that cannot be read
+        except Exception:  # the name is not a path, or the file cannot be read
             return False
         try:
             compile(text, path, "exec", dont_inherit=True)
@@ -54,7 +54,7 @@ class Describer:
         return False
 
     def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
-        """Return a file that cannot be compiled as a fault."""
+        """Convert the error of a file that cannot be compiled to a fault."""
         file = os.path.realpath(error.filename or "")
         return {
             "code": "syntax_error",
@@ -67,7 +67,7 @@ class Describer:
         }
 
     def stack(self, frame: FrameType | None, code: str) -> dict[str, Any]:
-        """Return where a thread stands as a fault."""
+        """Return a fault with the current stack of a thread."""
         frames = []
         while frame is not None:
             frames.append((frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name))
@@ -87,9 +87,9 @@ class Describer:
         return path[len(self._root) :] if path.startswith(self._root) else os.path.basename(path)
 
     def one_line(self, error: BaseException) -> str:
-        """Return an exception as its last line in a traceback, without line breaks and not longer than 500 characters.
+        """Format an exception like the last line of a traceback, on one line of at most 500 characters.
 
-        It says nothing that differs from run to run or tells of this machine: no addresses of objects, no folders.
+        Text that differs between runs or machines is removed: addresses of objects, and folders.
         """
         try:
             text = "".join(traceback.format_exception_only(type(error), error))[:_READ_CHARACTERS].strip()
@@ -98,7 +98,7 @@ class Describer:
         return self._without_machine(" ".join(text.split()))[:TEXT_CHARACTERS]
 
     def _without_machine(self, text: str) -> str:
-        """Return a text with the submission's files relative to its folder, and other files by their names alone."""
+        """Make the submission's files in a text relative to its folder, and cut other files to their names."""
         text = _ADDRESS.sub("", text)
         for folder in self._folders:
             text = text.replace(folder, "") if len(folder) > 1 else text
@@ -110,20 +110,20 @@ class Describer:
 
 
 def _name_of(kind: type[BaseException]) -> str:
-    """Return the name of an exception's class as tracebacks write it."""
+    """Return the name of an exception class as tracebacks show it."""
     module = getattr(kind, "__module__", None)
     known = not isinstance(module, str) or module in ("__main__", "builtins")
     return kind.__qualname__ if known else f"{module}.{kind.__qualname__}"
 
 
 def _behind(kind: str, line: str) -> str:
-    """Return what an exception says, without the name of its class in front."""
+    """Return the text of an exception without the name of its class."""
     return "" if line == kind else line.removeprefix(f"{kind}: ")
 
 
 def _machine_folders() -> list[str]:
-    """Return the folders that Python, ROS and the grader lie in, the longest first."""
+    """Return the folders of Python, ROS and the grader, the longest path first."""
     own = os.path.dirname(os.path.abspath(__file__))
     folders = {own, sys.prefix, sys.base_prefix, sys.exec_prefix, os.getcwd(), *filter(os.path.isabs, sys.path)}
-    # a folder near the root, such as /usr, may be a student's own word
+    # a short path such as /usr may also be a student's own text
     return sorted((f for f in folders if f.count("/") > 1), key=lambda f: (-len(f), f))

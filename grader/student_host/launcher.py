@@ -1,4 +1,4 @@
-"""Entry of a student's process: runs one unmodified file as `python3 file.py` would, under the grader's clock.
+"""Entry point of a student's process: runs one unmodified file as `python3 file.py` would, on the grader's clock.
 
 Usage: launcher.py JSON, with an object of `fd`, `root`, `file`, `clock`, `seed` and `limits`.
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 
 def load_package() -> Any:
-    """Load the folder this file lies in as a package with a name that no student's module has."""
+    """Load the folder of this file as a package, under a name that no student's module has."""
     folder = os.path.dirname(os.path.abspath(__file__))
     spec = importlib.util.spec_from_file_location(
         "_grader_host", os.path.join(folder, "__init__.py"), submodule_search_locations=[folder]

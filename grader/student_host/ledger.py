@@ -1,6 +1,6 @@
-"""Counts what this process has sent and still expects, and lists its endpoints.
+"""Counts the messages that this process has sent and still expects, and lists its endpoints.
 
-The counts only let the grader settle an instant; no verdict rests on them.
+The counts only tell the grader when an instant is settled; no verdict depends on them.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from rclpy.qos import DurabilityPolicy, LivelinessPolicy, ReliabilityPolicy
 from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver
 
-#: Topics that every node has; nobody waits for them.
+#: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
-#: Durations of QoS policies from here on mean for ever.
+#: A QoS duration of at least this means infinite.
 INFINITE_NS = 9_000_000_000_000_000_000
 BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_service"})
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
-#: How long, in real time, a message that was announced is waited for before it is given up as lost.
+#: How long, in real time, to wait for an announced message before it counts as lost.
 ARRIVAL_S = 1.0
-#: How long, in real time, the end of a counterpart is waited for.
+#: How long, in real time, to wait until a counterpart has disappeared.
 DEPARTURE_S = 0.5
 #: How long, in real time, contexts may take to shut down at a signal.
 SHUTDOWN_S = 1.0
-#: Whether a context is alive, without a look that would let time pass.
+#: Checks whether a context is valid, without counting as a look, which would let time pass.
 _CONTEXT_OK = Context.ok
 
 
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
-#: The publisher of a state machine, which is none of rclpy's.
+#: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
 _ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False}
 
 
 def type_name(interface: Any) -> str:
-    """Return a message or service class as ROS writes it, e.g. `geometry_msgs/msg/Twist`."""
+    """Return the ROS name of a message or service class, e.g. `geometry_msgs/msg/Twist`."""
     package, kind = interface.__module__.split(".")[:2]
     return f"{package}/{kind}/{interface.__name__}"
 
@@ -59,26 +59,26 @@ class Ledger:
             kind: [] for kind in ("publisher", "subscription", "client", "service")
         }
         self.changed = False
-        #: Whether the program looks at the graph itself: then it sees there what the grader sees.
+        #: Whether the program queries the graph; if so, its view has to match the grader's.
         self.sees_graph = False
-        #: Whether an endpoint or node has gone since the last report. The report comes before anything new is made: the
-        #: grader could take the old endpoint in the graph for the new one.
+        #: Whether an endpoint or node was removed since the last report. A report must be sent before anything new is
+        #: created, or the grader could take the old endpoint in the graph for the new one.
         self.removed = False
-        #: What has sent something that its receivers may not have yet; it must not go before they have.
+        #: Handles that have sent messages which may not have arrived yet; they are kept alive until then.
         self._sending: dict[int, Any] = {}
-        #: Counterparts that nobody knows, by kind and topic, and that did not go when they were waited for.
+        #: Counterparts, by kind and topic, that the grader does not know and that stayed when their end was awaited.
         self._strangers: dict[tuple[str, str], int] = {}
         self.lost: Counter[str] = Counter()
-        #: How many wait sets wait for a receiver now, by the address of its handle: what comes there is read at once.
+        #: How many wait sets wait for a receiver now, by the address of its handle: its messages are read at once.
         self.awaited: Counter[int] = Counter()
         self.contexts: list[weakref.ref[Any]] = []
         self._nodes: list[weakref.ref[Any]] = []
         self._actions: list[ActionEnd] = []
-        #: The topics on which the state machines of lifecycle nodes tell of transitions.
+        #: The topics on which the state machines of lifecycle nodes publish transitions.
         self.transitions: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
     def add(self, kind: str, endpoint: Any) -> None:
-        """Remember a new endpoint."""
+        """Register a new endpoint."""
         self._endpoints[kind].append(weakref.ref(endpoint, self._collected))
         if kind == "subscription":
             if endpoint.topic_name in self._heard_on:
@@ -87,13 +87,13 @@ class Ledger:
         self.changed = True
 
     def forget(self, endpoint: Any) -> None:
-        """Expect nothing more at an endpoint that is being destroyed."""
+        """Discard the expected messages of an endpoint that is being destroyed."""
         self._expected.pop(endpoint, None)
         self._kept.pop(endpoint, None)
         self.remove()
 
     def remove(self) -> None:
-        """Note that something has left the graph, or is about to."""
+        """Note that an endpoint or node has left the graph, or is about to."""
         self.changed = self.removed = True
 
     def _collected(self, reference: weakref.ref[Any]) -> None:
@@ -108,12 +108,12 @@ class Ledger:
 
     @property
     def sending(self) -> bool:
-        """Whether something was sent that its receivers may not have yet."""
+        """Whether a sent message may not have arrived yet."""
         return bool(self._sending)
 
     @property
     def sending_and_removed(self) -> bool:
-        """Whether something has gone, or is kept from going, while what was sent may not have arrived."""
+        """Whether an endpoint or node was removed while a sent message may not have arrived yet."""
         return self.removed and bool(self._sending)
 
     def settled(self) -> None:
@@ -121,20 +121,20 @@ class Ledger:
         self._sending.clear()
 
     def add_action(self, end: ActionEnd) -> None:
-        """Remember the new server or client of an action."""
+        """Register a new action server or client."""
         self._actions.append(end)
         self.changed = True
 
     def action(self, handle: Any) -> ActionEnd | None:
-        """Return the server or client of an action that a handle belongs to, if it is still there."""
+        """Return the action server or client that a handle belongs to, if it still exists."""
         return next((end for end in self._actions if end.handle is handle), None)
 
     def actions(self) -> list[ActionEnd]:
-        """Return the servers and clients of actions that are still there, oldest first."""
+        """Return the action servers and clients that still exist, oldest first."""
         return list(self._actions)
 
     def forget_action(self, handle: Any) -> None:
-        """Expect nothing more at the server or client of an action that is being destroyed."""
+        """Discard the expected messages of an action server or client that is being destroyed."""
         end = self.action(handle)
         if end is not None:
             self._actions.remove(end)
@@ -149,7 +149,7 @@ class Ledger:
         return [endpoint for _, endpoint in found]
 
     def claims(self) -> list[dict[str, Any]]:
-        """Return what the grader needs to know of every endpoint, as plain JSON values."""
+        """Return the claims: a description of every endpoint, as plain JSON values."""
         self.changed = self.removed = False
         claims: list[dict[str, Any]] = []
         for kind in ("publisher", "subscription"):
@@ -190,13 +190,13 @@ class Ledger:
         return [node for node in alive if node is not None and _valid(node)]
 
     def add_node(self, node: Any) -> None:
-        """Remember a new node and its context."""
+        """Register a new node and its context."""
         self._nodes.append(weakref.ref(node, self._collected))
         self.contexts.append(weakref.ref(node.context))
         self.changed = True
 
     def expect(self, arrivals: dict[str, int]) -> None:
-        """Add what the grader says is on its way, and wait until it is here."""
+        """Add messages that the grader has announced, and wait until they have arrived."""
         for channel, count in arrivals.items():
             for receiver in self._receivers(channel):
                 if isinstance(receiver, Receiver):
@@ -205,14 +205,14 @@ class Ledger:
                 depth = _depth(receiver)
                 expected = self._expected.get(receiver, 0) + min(count, depth)
                 self._expected[receiver] = expected
-                # That something can be read says nothing about the newest where older ones were left unread.
+                # If older messages were left unread, readiness does not show that the newest has arrived.
                 unread = expected > 1 or depth == 1 or self.kept(receiver)
                 if channel.startswith("topic ") and unread and not self.awaited[receiver.handle.pointer]:
                     self._keep_all(receiver)
         self.await_arrivals(list(self._expected))
 
     def _keep_all(self, subscription: Any) -> None:
-        """Take everything that is on its way to a subscription nobody reads, and keep what its queue would hold."""
+        """Take all expected messages of a subscription that no wait set reads, and keep as many as its queue holds."""
         kept = self._kept.setdefault(subscription, deque(maxlen=_depth(subscription)))
         while self._expected.get(subscription, 0) > 0 and self.await_arrivals([subscription]):
             with subscription.handle:
@@ -227,7 +227,7 @@ class Ledger:
 
     def took(self, receiver: Any) -> None:
         """Note that one message was taken from a subscription, client or service."""
-        # below 0: taken before it was announced, as a node's own messages are
+        # negative if a message is taken before it was announced, as a node's own messages are
         self._expected[receiver] = self._expected.get(receiver, 0) - 1
 
     def await_arrivals(self, receivers: list[Any]) -> bool:
@@ -240,18 +240,18 @@ class Ledger:
             if _await_ready(receiver, context):
                 arrived = True
             else:
-                # one that took the place of another may miss what was sent meanwhile: so it goes in any ROS system
+                # a subscription that replaced another may have missed messages in between, as in any ROS system
                 if receiver not in self._successors:
                     self.lost[_channel(receiver)] += self._expected[receiver]
                 self._expected[receiver] = 0
         return arrived
 
     def keeps_anything(self) -> bool:
-        """Return whether any message was taken ahead of time."""
+        """Return whether any message was taken ahead of time and is still kept."""
         return any(self._kept.values())
 
     def expects_anything(self) -> bool:
-        """Return whether anything is on its way."""
+        """Return whether any message is expected."""
         return any(count > 0 for count in self._expected.values())
 
     def _context(self) -> Any:
@@ -259,7 +259,7 @@ class Ledger:
         return next((context for context in contexts if context is not None and context.ok()), None)
 
     def await_shutdown(self) -> None:
-        """Wait, in real time, until rclpy has shut down the contexts that a signal ends; not all are ended by one."""
+        """Wait, in real time, until rclpy has shut down its contexts after a signal; some may not be shut down."""
         deadline = originals.perf_counter() + SHUTDOWN_S
         contexts = [context for reference in self.contexts if (context := reference()) is not None]
         while any(map(_CONTEXT_OK, contexts)) and originals.perf_counter() < deadline:
@@ -274,11 +274,11 @@ class Ledger:
         }
 
     def await_matches(self, expected: dict[str, dict[str, list[int]]], wait_s: float) -> list[str]:
-        """Wait, in real time, until endpoints have the counterparts the grader knows of; return those that have not.
+        """Wait, in real time, until endpoints have the expected counterparts; return the names of those that do not.
 
         Args:
             expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any.
-            wait_s: How long.
+            wait_s: Time-out in seconds.
         """
         deadline = originals.perf_counter() + wait_s
         missing = self._unmatched(expected)
@@ -289,7 +289,7 @@ class Ledger:
         return missing
 
     def _await_departures(self, expected: dict[str, dict[str, list[int]]]) -> None:
-        """Wait, in real time, until endpoints have lost the counterparts that have gone."""
+        """Wait, in real time, until endpoints have lost the counterparts that no longer exist."""
         deadline = originals.perf_counter() + DEPARTURE_S
         surplus = self._surplus(expected)
         while surplus and originals.perf_counter() < deadline:
@@ -298,7 +298,7 @@ class Ledger:
         self._strangers.update(surplus)
 
     def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
-        """Count the counterparts, by kind and topic, that neither the grader knows nor an earlier wait has met."""
+        """Count the counterparts, by kind and topic, that neither the grader expects nor an earlier wait has found."""
         over: Counter[tuple[str, str]] = Counter()
         for kind in ("publisher", "subscription"):
             for endpoint in self.alive(kind):
@@ -309,7 +309,7 @@ class Ledger:
         return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
 
     def await_absence(self, services: list[str], wait_s: float) -> None:
-        """Wait, in real time, until clients know that the servers of some services have gone."""
+        """Wait, in real time, until clients see that the servers of some services are gone."""
         deadline = originals.perf_counter() + wait_s
         clients = [client for client in self.alive("client") if service_name(client) in services]
         while any(_matches("client", client) for client in clients) and originals.perf_counter() < deadline:
@@ -337,7 +337,7 @@ class Ledger:
         return missing
 
     def _graph(self) -> dict[str, list[int]]:
-        """Count what the newest node sees in the graph, as the grader counts what it sees itself."""
+        """Count the graph as the newest node sees it, in the same way as the grader does."""
         node = self._node()
         if node is None:
             return {}
@@ -356,7 +356,7 @@ class Ledger:
         return {name: [count] for name, count in found.items() if count}
 
     def _clients_of(self, service: str) -> int:
-        """Return how many clients of a service this process knows."""
+        """Return how many clients of a service this process sees."""
         node = self._node()
         if node is None:
             return 0
@@ -364,7 +364,7 @@ class Ledger:
             return int(node.handle.get_count_clients(service))
 
     def _node(self) -> Any:
-        """Return the newest node that can look at the graph, or None."""
+        """Return the newest node that can query the graph, or None."""
         return next((node for node in reversed(self.nodes()) if _CONTEXT_OK(node.context)), None)
 
     def _receivers(self, channel: str) -> list[Any]:
@@ -413,7 +413,7 @@ def _reliable(qos: Any, kind: str) -> bool:
 
 
 def finite_ns(duration: Any) -> int:
-    """Return a QoS duration in nanoseconds; 0 for none, which DDS calls infinite."""
+    """Return a QoS duration in nanoseconds; 0 for an infinite one, which means that none is set."""
     nanoseconds = int(duration.nanoseconds)
     return nanoseconds if 0 < nanoseconds < INFINITE_NS else 0
 
@@ -424,7 +424,7 @@ def _depth(receiver: Any) -> int:
 
 
 def _matches(kind: str, endpoint: Any) -> int | None:
-    """Return how many counterparts an endpoint has; None if its context was shut down: it stays until freed."""
+    """Return how many counterparts an endpoint has; None if its context was shut down and it is not freed yet."""
     with endpoint.handle:
         if kind == "publisher":
             return _asked(endpoint.handle.get_subscription_count)

@@ -1,14 +1,22 @@
-"""The line to the grader: one JSON object a line over an inherited socket, the host's report first, then an answer."""
+"""The channels to the grader: JSON lines over an inherited socket, and log records marked by a token.
+
+On the socket the host sends a report, and the grader answers.
+"""
+
+from __future__ import annotations
 
 import json
+import os
 import socket
 from typing import Any
 
 from . import originals
 
+_LOG_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
+
 
 class Link:
-    """The host's end of the line.
+    """The host's end of the connection.
 
     Args:
         descriptor: Number of the inherited socket.
@@ -22,18 +30,18 @@ class Link:
         self._cut = False
 
     def send(self, report: dict[str, Any]) -> None:
-        """Send one report; a lost line ends the process, as there is nobody left to run for."""
+        """Send one report; raises OSError if the grader is gone, which ends the process."""
         line = json.dumps(report).encode() + b"\n"
         with self._sending:
             if not self._cut:
                 self._socket.sendall(line)
 
     def is_free(self) -> bool:
-        """Return whether nobody is sending at this moment."""
+        """Return whether no thread is sending at this moment."""
         return not self._sending.locked()
 
     def cut(self) -> None:
-        """Say nothing any more: a forked process is none that the grader knows."""
+        """Close the connection in a forked process, which the grader does not know."""
         self._cut = True
         self._lines.close()
         self._socket.close()
@@ -44,9 +52,43 @@ class Link:
         return self.next_answer()
 
     def next_answer(self) -> dict[str, Any]:
-        """Wait for what the grader says next; raises ConnectionError if it is gone."""
+        """Wait for the grader's next answer; raises ConnectionError if the grader is gone."""
         line = self._lines.readline()
         if not line:
             raise ConnectionError("the grader is gone")
         answer: dict[str, Any] = json.loads(line)
         return answer
+
+
+class Log:
+    """The logging library of this process, set up so that a token marks its records.
+
+    A program cannot write records itself, because it does not know the token.
+
+    Args:
+        log_format: The format of records; `{token}` stands for the token.
+
+    Attributes:
+        token: Random for each process; empty once the library has it.
+    """
+
+    def __init__(self, log_format: str) -> None:
+        self.token = originals.urandom(16).hex()
+        self._format = log_format
+
+    def open(self) -> None:
+        """Make the library read the format, once.
+
+        The environment variable is removed afterwards: neither the student's program nor its children can read it.
+        """
+        import rclpy.logging
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+
+        os.putenv(_LOG_FORMAT_VARIABLE, self._format.replace("{token}", self.token))
+        try:
+            rclpy.logging.initialize()
+        finally:
+            os.unsetenv(_LOG_FORMAT_VARIABLE)
+            self.token = ""
+        # Logging continues after a shutdown, but would read the environment again.
+        rclpy_implementation.rclpy_logging_shutdown = lambda: None

@@ -1,4 +1,4 @@
-"""The real clock and thread functions, taken before anything is replaced; the host's own code uses only these."""
+"""The real clock and thread functions, saved before anything is replaced; the host's own code uses only these."""
 
 import _thread
 import os

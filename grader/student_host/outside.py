@@ -1,6 +1,6 @@
-"""Gives virtual time up for programs that wait for something outside of it: alarms, other processes, the network.
+"""Gives up virtual time for programs that wait for something outside of it: alarms, other processes, the network.
 
-All of these take their own real time, of which a virtual second has only a small part.
+All of these take real time, and a virtual second takes only a small part of a real one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ PROCESSES = frozenset({"os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os
 
 
 def install_alarms(give_up: Callable[[], None]) -> None:
-    """Call `give_up` before a real-time alarm is set; clearing one, or timing the processor, does no harm."""
+    """Call `give_up` before a real-time alarm is set; clearing one, or timing processor time, is allowed."""
     setitimer, alarm = signal.setitimer, signal.alarm
 
     def guarded_setitimer(which: int, seconds: float, interval: float = 0.0, /) -> Any:
@@ -34,7 +34,7 @@ def install_alarms(give_up: Callable[[], None]) -> None:
 
 
 def install_processes(give_up: Callable[[], None]) -> None:
-    """Call `give_up` before the program starts another process, or becomes one."""
+    """Call `give_up` before the program starts another process or replaces itself by one."""
 
     def hook(event: str, arguments: Any) -> None:
         if event in PROCESSES:
@@ -44,10 +44,10 @@ def install_processes(give_up: Callable[[], None]) -> None:
 
 
 def any_outside(descriptors: Iterable[int]) -> bool:
-    """Return whether anybody but this process can make one of some descriptors ready.
+    """Return whether another process can make one of some descriptors ready.
 
-    A pipe is the process's own while both its ends are open here. A local socket without a name is one of a pair, as
-    event loops use them to wake themselves up.
+    A pipe is internal if both its ends are open in this process. A Unix socket without a name is one of a pair, which
+    event loops use to wake themselves up.
     """
     pipes: set[int] = set()
     for descriptor in descriptors:
@@ -73,7 +73,7 @@ def _is_one_of_a_pair(descriptor: int) -> bool:
 
 
 def _own_pipes() -> set[int]:
-    """Return the pipes of which this process has both ends."""
+    """Return the inodes of the pipes that have both ends open in this process."""
     found: dict[int, int] = {}
     for name in os.listdir("/proc/self/fd"):
         try:

@@ -1,6 +1,6 @@
-"""Finds out how a ROS user starts a file: `python3 FILE`, or as `ros2 run` does where the file belongs to a package.
+"""Finds out how a ROS user would start a file: with `python3 FILE`, or with `ros2 run` if it belongs to a package.
 
-Nothing is imported or run here: setup.py is only parsed.
+No student code is imported or run: setup.py is only parsed.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from typing import Any, NamedTuple
 
 from .setup_files import given_to_setup
 
-#: What makes a folder that of a ROS package.
+#: A folder with one of these files is a ROS package.
 MARKERS = ("setup.py", "package.xml")
-#: What builds a package that installs its programs as they are, unless there is a setup.py.
+#: A package with this file, and without setup.py, installs its programs as scripts.
 CMAKE = "CMakeLists.txt"
-#: The name of a package whose own folder is all that was handed in.
+#: The name given to a package if the submission is the package's own folder.
 NAMELESS = "submission"
-#: Folders of a submission that are looked at in search of packages.
+#: The most folders of a submission that are searched for packages.
 FOLDERS = 500
 
 SCRIPT, MODULE, MAIN, ENTRY_POINT = "script", "module", "main", "entry_point"
 
 
 class PackageLayout(NamedTuple):
-    """Where a file lies.
+    """The place of a file in its package.
 
     Attributes:
-        module: Its dotted name in its package; empty for a file in none, and for a program of a CMake package.
-        base: The folder that the dotted name begins in, absolute; empty if that is above the submission.
-        package: Relative folder of the ROS package, that of its setup.py or package.xml; None without one.
+        module: Its dotted name in its package; empty for a file outside of packages or in a CMake package.
+        base: Absolute path of the folder that the dotted name is relative to; empty if that is above the submission.
+        package: Relative folder of the ROS package, which has setup.py or package.xml; None without one.
     """
 
     module: str = ""
@@ -43,11 +43,11 @@ class StartMethod(NamedTuple):
     """How a file is started.
 
     Attributes:
-        way: `script` as `python3 FILE`, `module` as `python3 -m MODULE`, `main` imports the module and calls its
-            main(), `entry_point` calls what setup.py names for it.
+        way: `script` for `python3 FILE`, `module` for `python3 -m MODULE`, `main` to import the module and call its
+            main(), `entry_point` to call the function that setup.py names.
         module: Dotted name; empty for a script.
-        function: What is called, empty if nothing is.
-        base: As for `PackageLayout`.
+        function: The function to call; empty if there is none.
+        base: As in `PackageLayout`.
     """
 
     way: str
@@ -57,7 +57,7 @@ class StartMethod(NamedTuple):
 
 
 def layout_of(root: str, file: str) -> PackageLayout:
-    """Return where a file lies; it is in a package with `__init__.py` beside it or a setup.py or package.xml above."""
+    """Find the package of a file: by an `__init__.py` in its folder, or a setup.py or package.xml above."""
     folder = os.path.dirname(file)
     above = [folder]
     while above[-1]:
@@ -89,7 +89,7 @@ def _is_file(root: str, folder: str, name: str) -> bool:
 
 
 def package_folders(root: str) -> list[str]:
-    """Return the folders of all ROS packages of a submission, which are importable together once they are built."""
+    """Return the folders of all ROS packages in a submission, which can import each other once they are built."""
     found = []
     for number, (folder, folders, files) in enumerate(os.walk(root)):
         folders.sort()
@@ -100,13 +100,13 @@ def package_folders(root: str) -> list[str]:
 
 
 def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module) -> StartMethod:
-    """Return how a file is started.
+    """Decide how a file is started.
 
     Args:
         root: The submission's folder.
-        file: The file, relative to it.
-        layout: Where it lies.
-        tree: Its code.
+        file: The file, relative to `root`.
+        layout: Its place in the package.
+        tree: Its parsed code.
     """
     if not layout.module:
         return StartMethod(SCRIPT)
@@ -119,7 +119,7 @@ def start_of(root: str, file: str, layout: PackageLayout, tree: ast.Module) -> S
 
 
 def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | None:
-    """Return the console script that runs a file, that of the file's own name before others."""
+    """Return the console script that runs a file, preferring one with the name of the file."""
     folder = os.path.join(root, layout.package or "")
     has_init = _is_file(root, os.path.dirname(file), "__init__.py")
     found = []
@@ -127,7 +127,7 @@ def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | N
         path = f"/{module.replace('.', '/')}.py"
         base = os.path.join(root, file).removesuffix(path)
         inside = base == folder.rstrip("/") or base.startswith(os.path.join(folder, ""))
-        # without an __init__.py the package is what setup.py says; with one, the name must be right
+        # without an __init__.py the package name comes from setup.py; with one, the names must agree
         if module == layout.module or (not has_init and base + path == os.path.join(root, file) and inside):
             base = layout.base if module == layout.module else base
             found.append((name == module.rpartition(".")[2], StartMethod(ENTRY_POINT, module, function, base)))
@@ -135,13 +135,13 @@ def _entry_point(root: str, file: str, layout: PackageLayout) -> StartMethod | N
 
 
 def console_scripts(folder: str) -> list[tuple[str, str, str]]:
-    """Return name, module and function of the console scripts that setup.py and setup.cfg of a folder name."""
+    """Return name, module and function of each console script in the setup.py and setup.cfg of a folder."""
     lines: list[str] = []
     try:
         with open(os.path.join(folder, "setup.py"), "rb") as source:
             lines += _scripts_of_setup(ast.parse(source.read()))
     except (OSError, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-        pass  # a setup.py that nobody can read names nothing
+        pass  # an unreadable setup.py has no console scripts
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read(os.path.join(folder, "setup.cfg"), encoding="utf-8")
@@ -152,7 +152,7 @@ def console_scripts(folder: str) -> list[tuple[str, str, str]]:
 
 
 def _script(line: str) -> tuple[str, str, str] | None:
-    """Return the parts of `name = module:function`."""
+    """Parse `name = module:function`."""
     name, equals, target = (part.strip() for part in line.partition("="))
     module, colon, function = (part.strip() for part in target.partition("[")[0].partition(":"))
     parts = [*module.split("."), *function.split(".")]
@@ -167,7 +167,7 @@ def _scripts_of_setup(tree: ast.Module) -> list[str]:
 
 
 def _ini_scripts(text: Any) -> list[str]:
-    """Return the console scripts of entry points that are written as one text."""
+    """Parse the console scripts of entry points that are given as one INI text."""
     lines = text.splitlines() if isinstance(text, str) else []
     section, found = "", []
     for line in map(str.strip, lines):
@@ -179,7 +179,7 @@ def _ini_scripts(text: Any) -> list[str]:
 
 
 def _offers_main(tree: ast.Module) -> bool:
-    """Return whether `main()` starts a module: it can be called so, and the module itself does nothing else."""
+    """Return whether a module can be started by `main()`: it needs no arguments, and nothing else starts the module."""
     main = next((s for s in _top_level(tree.body) if _defines_main(s)), None)
     if main is None or (isinstance(main, ast.FunctionDef) and _must_be_given(main.args)):
         return False
@@ -189,7 +189,7 @@ def _offers_main(tree: ast.Module) -> bool:
 
 
 def _top_level(statements: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield the statements that run when a module is imported, those inside of conditions too."""
+    """Yield the statements that may run when a module is imported, including those in `if` and `try`."""
     for statement in statements:
         yield statement
         if isinstance(statement, (ast.If, ast.Try)):
@@ -211,7 +211,7 @@ def _must_be_given(arguments: ast.arguments) -> bool:
 
 
 def is_guard(statement: ast.stmt) -> bool:
-    """Return whether a statement is `if __name__ == "__main__":`, in whatever order."""
+    """Return whether a statement is `if __name__ == "__main__":`, with the operands in either order."""
     if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
         return False
     test = statement.test
@@ -221,7 +221,7 @@ def is_guard(statement: ast.stmt) -> bool:
 
 
 def never_true(statement: ast.stmt) -> bool:
-    """Return whether a statement is a guard on `__name__` that does not hold, such as a misspelt one."""
+    """Return whether a statement is a guard on `__name__` that is never true, such as a misspelt one."""
     if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
         return False
     names = {node.id for node in ast.walk(statement.test) if isinstance(node, ast.Name)}
@@ -230,7 +230,7 @@ def never_true(statement: ast.stmt) -> bool:
 
 
 def calls(statements: Sequence[ast.stmt], name: str) -> bool:
-    """Return whether one of some statements calls a name when it runs, outside of functions and classes."""
+    """Return whether some statements call a name when they run, outside of functions and classes."""
     return any(
         isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == name
         for statement in statements

@@ -1,4 +1,4 @@
-"""Runs the student's file from start to end, and tells the grader how it ended."""
+"""Runs the student's file from start to end, and reports its end to the grader."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from . import entry, originals
 from .faults import Describer
-from .link import Link
-from .log import Log
+from .link import Link, Log
 from .outside import install_alarms, install_processes
-from .stand_ins import install_stand_ins
+from .shadows import install_stand_ins
 from .virtual import VirtualTime
 from .watch import Watch
 from .watchdog import Watchdog
@@ -30,10 +29,10 @@ if TYPE_CHECKING:
 
 
 def run(request: dict[str, Any]) -> None:
-    """Run the file a request names; never returns.
+    """Run the file that a request names; never returns.
 
     Args:
-        request: `fd` of the line, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
+        request: `fd` of the socket, `root` and `file` of the submission, `clock`, `seed` (hex), `log_format`, `limits`.
     """
     link = Link(request["fd"])
     describer = Describer(request["root"])
@@ -46,7 +45,7 @@ def run(request: dict[str, Any]) -> None:
         time.install_ros()
         log.open()
 
-    if not entry.shadows_of(request["root"], request["file"]).files:  # otherwise when the program imports it
+    if not entry.shadows_of(request["root"], request["file"]).files:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
     install_stand_ins()
@@ -75,7 +74,7 @@ def run(request: dict[str, Any]) -> None:
 
 
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
-    """Return the clock that a scenario is to run on."""
+    """Create the clock that a scenario runs on."""
 
     def report_fault(error: BaseException) -> None:
         link.send({"kind": "fault", "fault": describer.exception(error)})
@@ -95,12 +94,12 @@ def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | Wal
 
 
 def die_with_parent() -> None:
-    """Have the system end this process when the one that started it ends."""
+    """Make the kernel kill this process when its parent ends."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, linux/prctl.h
 
 
 def play(request: dict[str, Any], describer: Describer, link: Link, install_ros: Callable[[], None]) -> dict[str, Any]:
-    """Run the file and the end of the interpreter, and return how it ended: `code` and perhaps `fault`."""
+    """Run the file and the interpreter's exit handlers; return how it ended as `code`, and `fault` if there is one."""
     ending: dict[str, Any] = {"code": 0}
     try:
         entry.run_file(request["root"], request["file"], lambda said: link.send({"kind": "note", **said}), install_ros)
@@ -119,12 +118,12 @@ def play(request: dict[str, Any], describer: Describer, link: Link, install_ros:
 
 
 def forget_modules(root: str) -> None:
-    """Free what a program still holds, as the interpreter does at its very end: a `__del__` may publish.
+    """Free the student's modules, as the interpreter does when it exits: a `__del__` may publish.
 
-    Nothing can be imported by then, such as what rclpy's loggers import.
+    Imports fail at that stage, for instance those of rclpy's loggers.
 
     Args:
-        root: The submission's folder, whose modules are freed; others may still be needed.
+        root: The submission's folder. Only its modules are freed, because others may still be needed.
     """
     sys.last_type = sys.last_value = sys.last_traceback = None
     kept, finders = dict(sys.modules), sys.meta_path
@@ -143,7 +142,7 @@ def forget_modules(root: str) -> None:
 
 
 def finish_threads() -> None:
-    """Wait for the threads that keep a Python process alive, as the interpreter does at its end."""
+    """Wait for all non-daemon threads, as the interpreter does when it exits."""
     for call in reversed(getattr(threading, "_threading_atexits", [])):
         call()
     while threads := [t for t in threading.enumerate() if t is not threading.current_thread() and not t.daemon]:
@@ -152,7 +151,7 @@ def finish_threads() -> None:
 
 
 def exit_code(leaving: SystemExit) -> int:
-    """Return the exit code that Python gives for an exit, printing its message as Python does."""
+    """Return Python's exit code for a SystemExit, and print its message as Python does."""
     if leaving.code is None:
         return 0
     if isinstance(leaving.code, int):
@@ -162,7 +161,7 @@ def exit_code(leaving: SystemExit) -> int:
 
 
 def seed_randomness(seed: str) -> None:
-    """Make every source of randomness in this process repeat for the same seed."""
+    """Make every source of randomness in this process repeatable for the same seed."""
     source = random.Random(seed)  # noqa: S311 - it has to repeat
 
     def urandom(count: int, /) -> bytes:
@@ -187,12 +186,12 @@ def seed_randomness(seed: str) -> None:
 
 
 def preload(path: str) -> None:
-    """Import, before time starts, which of the usual interfaces a file names.
+    """Import the common interface packages that a file names, before time starts.
 
-    No others: most of them bring numpy along, which takes as long to import as all of rclpy.
+    Others are not imported: most of them import numpy, which takes as long as all of rclpy.
 
     Args:
-        path: The file; one that cannot be read names nothing, and running it tells why.
+        path: The file; if it cannot be read, running it reports the error.
     """
     text = b""
     with contextlib.suppress(OSError), open(path, "rb") as source:
@@ -203,7 +202,7 @@ def preload(path: str) -> None:
 
 
 def flush() -> None:
-    """Write out what Python still buffers."""
+    """Flush Python's standard streams."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):
             stream.flush()

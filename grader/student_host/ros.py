@@ -1,6 +1,7 @@
-"""Makes rclpy live in virtual time: its clocks, its wait sets, what it publishes and takes.
+"""Makes rclpy use virtual time: its clocks, its wait sets, and the messages it publishes and takes.
 
-Every spin variant of rclpy blocks in one place, `WaitSet.wait`. It polls here; if nothing is ready, the strand pauses.
+Every spin variant of rclpy blocks in one place, `WaitSet.wait`. The replacement polls, and if nothing is ready, the
+green thread pauses.
 """
 
 from __future__ import annotations
@@ -34,15 +35,15 @@ from .clock import VirtualClock
 from .ledger import BACKGROUND, REAL_WAIT_SET, Ledger, service_name
 from .scheduler import Scheduler
 
-#: So many messages published in a row are let arrive before the next one, so that none is overwritten.
+#: After this many messages in a row, the next one waits until they have arrived, so that no queue overflows.
 MESSAGES_PER_FLUSH = 8
 KINDS = ("subscription", "guard_condition", "timer", "client", "service")
-#: The signals at which rclpy shuts contexts down, and the options that have it do so.
+#: The signals at which rclpy shuts down its contexts, with the options that enable this.
 SHUTTING_DOWN = {
     signal.SIGINT: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGINT),
     signal.SIGTERM: (_rclpy.SignalHandlerOptions.ALL, _rclpy.SignalHandlerOptions.SIGTERM),
 }
-#: The methods by which nodes look at the whole graph.
+#: The methods with which nodes query the whole graph.
 GRAPH_LOOKS = (
     *("count_clients", "count_publishers", "count_services", "count_subscribers"),
     *("get_node_names", "get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"),
@@ -54,14 +55,14 @@ GRAPH_LOOKS = (
 
 
 class RosClocks:
-    """Every clock of rclpy, whatever its type, as a ROS clock whose time the grader sets."""
+    """Makes every clock of rclpy, whatever its type, a ROS clock whose time the grader sets."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
         self._made: weakref.WeakSet[Clock] = weakref.WeakSet()
 
     def new(self, cls: type[Clock] = Clock, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
-        """Stand for `Clock.__new__`."""
+        """Replace `Clock.__new__`."""
         if not isinstance(clock_type, (ClockType, _rclpy.ClockType)):
             raise TypeError("Clock type must be a ClockType enum")
         if clock_type is ClockType.ROS_TIME and not issubclass(cls, ROSClock):
@@ -76,7 +77,7 @@ class RosClocks:
         return made
 
     def move(self) -> None:
-        """Set every clock to the virtual time; timers that are due become ready."""
+        """Set every clock to the virtual time, so that timers that are due become ready."""
         handle = self._time()._time_handle
         for made in list(self._made):
             try:
@@ -90,7 +91,7 @@ class RosClocks:
 
 
 def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock) -> None:
-    """Replace rclpy's clocks, and what sleeps on them."""
+    """Replace rclpy's clocks and the functions that sleep on them."""
     Clock.__new__ = staticmethod(clocks.new)
     ROSClock.__new__ = staticmethod(lambda cls: clocks.new(cls, clock_type=ClockType.ROS_TIME))
     ROSClock._set_ros_time_is_active = lambda self, enabled: None
@@ -100,7 +101,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     timer = rclpy.executors.Timer
 
     def timeout(callback: Any, group: Any, period_ns: int, of: Clock, **rest: Any) -> Any:
-        """Stand for the timer with which an executor ends its waiting; the node's own timers are exact."""
+        """Replace the timer that ends an executor's wait; the node's own timers are not changed."""
         return timer(callback, group, clock.end_of(period_ns) - clock.now_ns, of, **rest)
 
     rclpy.executors.Timer = timeout
@@ -126,7 +127,7 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
 
 
 def _count_periods(clock: VirtualClock, timer: Any) -> None:
-    """Note that a pause begins, or the period of a timer that is made or set again."""
+    """Count the start of each pause, and of the period of each timer that is created or reset."""
 
     def counting(method: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(method)
@@ -141,7 +142,7 @@ def _count_periods(clock: VirtualClock, timer: Any) -> None:
 
 
 def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> type:
-    """Return the class that stands for rclpy's wait set."""
+    """Create the class that replaces rclpy's wait set."""
 
     class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
         """A wait set that blocks in virtual time."""
@@ -149,7 +150,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
         def __init__(self, *counts: Any) -> None:
             super().__init__(*counts)
             self._events = counts[5]
-            self._room = sum(counts[:6])
+            self._capacity = sum(counts[:6])
             self._added: list[tuple[Callable[..., Any], Any]] = []
             self._timers: list[Any] = []
             self._receivers: list[int] = []
@@ -191,7 +192,7 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
             return [*ready, *(p for p in self._kept() if p not in ready)] if kind == "subscription" else ready
 
         def _kept(self) -> list[int]:
-            """Return the subscriptions of this set whose messages were taken ahead of time."""
+            """Return the subscriptions in this set that have messages taken ahead of time."""
             if not ledger.keeps_anything():
                 return []
             known = ledger.handles()
@@ -229,9 +230,9 @@ def wait_set_type(scheduler: Scheduler, clock: VirtualClock, ledger: Ledger) -> 
                         scheduler.pause(min(wakes, default=None), polls=True)
                     finally:
                         ledger.awaited.subtract(self._receivers)
-                if len(self._added) < self._room:
-                    return  # actions add what they wait for behind our back: the executor builds the set anew
-                # Polling has emptied the set of everything that was not ready.
+                if len(self._added) < self._capacity:
+                    return  # actions add their entities without these methods: let the executor rebuild the set
+                # Polling has removed everything that was not ready from the set.
                 super().clear_entities()
                 for add, entity in self._added:
                     add(entity)
@@ -253,10 +254,10 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
     """Count what is published and taken, and let the grader match every endpoint before it is used.
 
     Args:
-        ledger: Where the counts are kept.
-        clock: Told when something happened.
+        ledger: Keeps the counts.
+        clock: Notified of every message.
         settle: Yields to the grader at the same instant.
-        leave: The same, and what was sent has arrived everywhere when it returns; called before a sender goes.
+        leave: The same, but returns only after all sent messages have arrived; called before a sender is destroyed.
     """
     _install_endpoints(ledger, settle, leave)
     in_a_row = 0
@@ -274,7 +275,7 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
         try:
             return send()
         except BaseException:
-            ledger.sent[name] -= 1  # nothing was sent, as after the context was shut down
+            ledger.sent[name] -= 1  # nothing was sent, e.g. because the context was shut down
             raise
 
     publish = rclpy.publisher.Publisher.publish
@@ -306,7 +307,7 @@ def install_traffic(ledger: Ledger, clock: VirtualClock, settle: Callable[[], No
 
 
 def _install_transitions(ledger: Ledger, counted: Counted) -> None:
-    """Count what the state machines of lifecycle nodes publish, which they do below rclpy."""
+    """Count what the state machines of lifecycle nodes publish, which rclpy's publishers do not see."""
     machines = _rclpy.LifecycleStateMachine
     make = machines.__init__
 
@@ -347,7 +348,7 @@ def _counting_take(name: str, ledger: Ledger, clock: VirtualClock) -> Callable[.
 
 
 def _handing_over(subscription: Any, found: tuple[Any, Any]) -> Callable[[], Any]:
-    """Return what an executor runs for a message that was taken ahead of time, as rclpy's own executors make it."""
+    """Return the coroutine function that an executor runs for a message taken ahead of time, as in rclpy itself."""
     message_only = subscription._callback_type is rclpy.subscription.Subscription.CallbackType.MessageOnly
     arguments = found[:1] if message_only else found
 
@@ -380,7 +381,7 @@ def _install_endpoints(ledger: Ledger, settle: Callable[[], None], leave: Callab
 
 
 def note_nodes(note: Callable[[Any], None] = lambda _: None) -> None:
-    """Remember every node that is made from now on; `note` hears of each when it is complete."""
+    """Register every node that is created from now on; `note` is called with each after its creation."""
     create = rclpy.node.Node.__init__
 
     def make_node(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -392,7 +393,7 @@ def note_nodes(note: Callable[[Any], None] = lambda _: None) -> None:
 
 
 def _report_departures_first(ledger: Ledger, method: str, settle: Callable[[], None]) -> None:
-    """Have the grader see what has left the graph before a method of nodes adds to it."""
+    """Report what has left the graph before a method of nodes adds to it."""
     create = getattr(rclpy.node.Node, method)
 
     @functools.wraps(create)
@@ -405,7 +406,7 @@ def _report_departures_first(ledger: Ledger, method: str, settle: Callable[[], N
 
 
 def install_departures(leave: Callable[[], None], remove: Callable[[], None] = lambda: None) -> None:
-    """Call `leave` before a node, a context or the process goes, and `remove` before a node does."""
+    """Call `leave` before a node, a context or the process ends, and `remove` before a node does."""
 
     def leaving(owner: Any, name: str, then: Callable[[], None] = lambda: None) -> None:
         go = getattr(owner, name)
@@ -426,7 +427,7 @@ def install_departures(leave: Callable[[], None], remove: Callable[[], None] = l
 
 
 def install_own_signals(settle: Callable[[], None]) -> None:
-    """Call `settle` when the program has sent itself a signal at which rclpy shuts down, in a thread of its own."""
+    """Call `settle` after the program has sent itself a signal at which rclpy shuts down, in another thread."""
 
     def sending(owner: Any, name: str, mine: Callable[..., bool]) -> None:
         send = getattr(owner, name)
@@ -446,7 +447,7 @@ def install_own_signals(settle: Callable[[], None]) -> None:
 
 
 def leave_graph(ledger: Ledger) -> None:
-    """Destroy every node and context that is left, as the interpreter does at its end."""
+    """Destroy all remaining nodes and contexts, as the interpreter does when it exits."""
     for end in list(ledger.actions()):
         with contextlib.suppress(Exception):
             end.handle.destroy_when_not_in_use()
@@ -477,9 +478,9 @@ def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None]) ->
 
 
 def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None]) -> None:
-    """Let time pass for programs that do nothing but look whether something has happened.
+    """Let time pass for programs that only poll whether something has happened.
 
-    Whoever looks at the graph sees what is there at that instant: it must not depend on who is faster.
+    A program that queries the graph has to see its state at that instant, independent of real-time races.
 
     Args:
         clock: Counts the looks.
@@ -514,5 +515,5 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
         looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
 
 
-#: Every node that was made, oldest first, as weak references: the launcher asks whether there was any.
+#: Weak references to every node that was created, oldest first; `entry` checks whether there was any.
 MADE_NODES: list[weakref.ref[Any]] = []

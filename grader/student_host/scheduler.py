@@ -1,8 +1,8 @@
-"""Runs the student's threads one at a time and in a fixed order, and knows when all of them are blocked.
+"""Runs the student's threads one at a time and in a fixed order, and detects when all of them are blocked.
 
-Each thread is a strand. The strand that runs holds the baton; it hands it on only where the original program would
-block: in a sleep, a lock, a wait set, a selector. Switching nowhere else makes programs with threads repeatable. When
-no strand can run, time has to move: the one that blocked last asks the grader.
+Each thread is a green thread. It switches to another one only where the original program would block: in a sleep, a
+lock, a wait set or a selector. This makes programs with threads repeatable. When no thread can run, time has to
+advance: the thread that blocked last asks the grader.
 """
 
 from collections import deque
@@ -28,12 +28,12 @@ class GreenThread:
 
 
 class Scheduler:
-    """Hands the baton from strand to strand.
+    """Switches between green threads.
 
     Args:
         now_ns: Returns the virtual time.
-        ask_for_time: Called when nothing can run, with the least deadline or None; returns when time or the world has
-            moved.
+        ask_for_time: Called when no thread can run, with the earliest deadline or None; returns when time has advanced
+            or something has happened.
     """
 
     def __init__(self, now_ns: Callable[[], int], ask_for_time: Callable[[int | None], None]) -> None:
@@ -46,24 +46,24 @@ class Scheduler:
         self.current = self._adopt()
 
     def _adopt(self) -> GreenThread:
-        """Make the calling thread a strand that holds the baton."""
+        """Register the calling thread as a green thread that runs."""
         green_thread = GreenThread()
         green_thread.native = originals.get_native_id()
         self._green_threads[originals.get_ident()] = green_thread
         return green_thread
 
     def mine(self) -> GreenThread | None:
-        """Return the calling thread's strand, or None for a thread that is not the student's."""
+        """Return the green thread of the calling thread, or None if it is not one of the student's threads."""
         return self._green_threads.get(originals.get_ident())
 
     def running_thread(self) -> int | None:
-        """Return the identifier of the thread that holds the baton."""
+        """Return the identifier of the thread that runs."""
         return next(
             (ident for ident, green_thread in self._green_threads.items() if green_thread is self.current), None
         )
 
     def running_native_thread(self) -> int:
-        """Return the system's number of the thread that holds the baton."""
+        """Return the native id of the thread that runs."""
         return self.current.native
 
     def has_others(self) -> bool:
@@ -71,15 +71,15 @@ class Scheduler:
         return len(self._green_threads) > 1
 
     def progress(self) -> None:
-        """Note that something happened which may have made a wait set ready."""
+        """Note that something happened that may have made a wait set ready."""
         self._round += 1
 
     def pause(self, deadline_ns: int | None = None, *, polls: bool = False) -> None:
-        """Block the calling strand until its deadline, until `wake`, or, if it polls, until anything happened.
+        """Block the calling thread until its deadline, until `wake`, or, if it polls, until anything happens.
 
         Args:
-            deadline_ns: Virtual time at which to go on at the latest.
-            polls: Whether to go on after anything happened, to look again.
+            deadline_ns: Latest virtual time at which to continue.
+            polls: Whether to continue after anything happens, to poll again.
         """
         green_thread = self.mine()
         if green_thread is None:
@@ -95,13 +95,13 @@ class Scheduler:
         try:
             self._hand_on(green_thread)
         except BaseException:
-            if green_thread.parked:  # a signal handler raised while this strand looked for what runs next: it goes on
+            if green_thread.parked:  # a signal handler raised while this thread chose the next one: it continues
                 self._parked.remove(green_thread)
                 green_thread.parked = False
             raise
 
     def wake(self, green_thread: GreenThread) -> None:
-        """Make a parked strand runnable."""
+        """Make a parked thread runnable."""
         if green_thread.parked:
             self._parked.remove(green_thread)
             green_thread.parked = False
@@ -109,7 +109,7 @@ class Scheduler:
             self._round += 1
 
     def start(self, body: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[[], None]:
-        """Register a new strand at once, and return the function that its thread must run."""
+        """Register a new green thread at once, and return the function that its OS thread must run."""
         green_thread = GreenThread()
         self._runnable.append(green_thread)
         self._round += 1
@@ -141,13 +141,13 @@ class Scheduler:
         try:
             green_thread.gate.acquire()
         except BaseException:
-            # A signal handler raised in the main thread while it was parked: it may go on only with the baton.
+            # A signal handler raised in the main thread while it was parked: it has to wait for its turn.
             self.wake(green_thread)
             green_thread.gate.acquire()
             raise
 
     def _choose(self) -> GreenThread:
-        """Return the strand that runs next; when none can, let time move until one can."""
+        """Choose the thread that runs next; if none can, let time advance until one can."""
         while True:
             if self._runnable:
                 self._round += 1

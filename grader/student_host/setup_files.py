@@ -1,4 +1,4 @@
-"""Finds out what a setup.py passes to setup(): it is read, never run."""
+"""Finds out what a setup.py passes to setup(), without running it."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-#: The longest text and list that is put together of a setup.py, and how much of it is read at all.
+#: The maximum length of strings and lists that are evaluated, and the maximum number of evaluated expressions.
 TEXT_CHARACTERS, ITEMS, STEPS = 10_000, 1_000, 20_000
-#: Methods of texts that are called, if they are given texts.
+#: String methods that are evaluated if their arguments are strings.
 _OF_TEXTS = frozenset(
     {"format", "join", "lower", "lstrip", "replace", "rstrip", "split", "splitlines", "strip", "upper"}
 )
 _OF_DICTS = frozenset({"items", "keys", "values"})
-#: Functions and what they make of one value; `dict` takes named ones as well.
+#: Built-in functions that are evaluated for one argument.
 _MAKING: Mapping[str, Callable[[Any], Any]] = {"list": list, "sorted": sorted, "str": str, "tuple": list}
 
 
 def given_to_setup(tree: ast.Module) -> dict[str, Any]:
-    """Return what is passed to setup() by name, as far as it can be known; unknown values are None.
+    """Return the keyword arguments of setup(), as far as they can be evaluated; unknown values are None.
 
     Raises:
-        ValueError: There is too much of it.
+        ValueError: The file exceeds a limit.
     """
     reader = _Reader()
     reader.run(tree.body)
@@ -29,7 +29,7 @@ def given_to_setup(tree: ast.Module) -> dict[str, Any]:
 
 
 class _Reader:
-    """Follows the statements of a setup.py as far as they deal with texts, lists and dictionaries."""
+    """Evaluates the statements of a setup.py, as far as they use strings, lists and dictionaries."""
 
     def __init__(self) -> None:
         self.given: dict[str, Any] = {}
@@ -37,7 +37,7 @@ class _Reader:
         self._steps = 0
 
     def run(self, statements: Iterable[ast.stmt]) -> None:
-        """Follow statements, every branch of them, and the bodies of functions where these are defined."""
+        """Evaluate statements, including every branch, and the bodies of functions where they are defined."""
         for statement in statements:
             if isinstance(statement, ast.Assign):
                 value = self._value(statement.value)
@@ -71,7 +71,7 @@ class _Reader:
                 holder[key] = value
 
     def _value(self, node: ast.expr | None) -> Any:
-        """Return what an expression comes to; None for anything that is not known."""
+        """Evaluate an expression; None if its value is unknown."""
         self._steps += 1
         value = self._of(node)
         if self._steps > STEPS or (isinstance(value, str) and len(value) > TEXT_CHARACTERS):
@@ -117,7 +117,7 @@ class _Reader:
         return found
 
     def _comprehended(self, element: ast.expr, generators: list[ast.comprehension]) -> Iterator[Any]:
-        """Yield what a comprehension makes; conditions are taken to hold."""
+        """Yield the items of a comprehension; conditions are assumed to be true."""
         if not generators:
             yield self._value(element)
             return
@@ -141,7 +141,7 @@ class _Reader:
 
 
 def _method(of: Any, name: str, values: list[Any], named: dict[str, Any]) -> Any:
-    """Return what a method gives; those that change a list or a dictionary do so."""
+    """Evaluate a method call, including methods that modify a list or a dictionary."""
     if isinstance(of, list) and name in ("append", "extend") and len(values) == 1:
         of += values if name == "append" else _items(values[0])
     elif isinstance(of, dict) and name == "update":
@@ -177,7 +177,7 @@ def _items(value: Any) -> list[Any]:
 
 
 def _loaded(target: ast.expr) -> ast.expr:
-    """Return the target of an assignment as an expression that is read."""
+    """Convert the target of an assignment to an expression that reads it."""
     return ast.Name(target.id) if isinstance(target, ast.Name) else target
 
 

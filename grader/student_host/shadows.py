@@ -1,8 +1,11 @@
-"""Lets a student's modules hide those that Python and ROS need, as they do when ROS users start the file.
+"""Makes imports in the student's program find what they would find without the host.
 
-The host has imported many modules by then, and rclpy with them. Where a student's file has the name of one, the program
-begins without these modules, and rclpy is imported, and made virtual, when the program imports it: so each import finds
-what it would find anywhere, and fails where it would fail.
+A student's module may hide a module that Python or ROS needs. The host has already imported many modules, including
+rclpy. If a student's file has the name of one, the program starts without these modules, and rclpy is made virtual when
+the program imports it: each import finds the same module as without the host, and fails where it would fail.
+
+A stand-in for example_interfaces is provided if it is not installed: its names can be imported, but not used. Tutorials
+import it without using it. Every full ROS installation has it, but no wheel provides it.
 """
 
 from __future__ import annotations
@@ -37,9 +40,9 @@ ROS_MODULES = frozenset(
         "lark",
     }
 )
-#: What every interpreter has imported before it comes to a script.
+#: Modules that every interpreter imports before it runs a script.
 _AT_START = frozenset({"abc", "codecs", "encodings", "genericpath", "io", "os", "posixpath", "site", "stat"})
-#: What imports rest on, or what the host has changed: a second copy would know nothing of that.
+#: Modules that the import system needs, or that the host has changed, which a second copy would not reflect.
 _KEPT = frozenset({"importlib", "selectors", "signal", "threading"})
 #: The parts of rclpy that the host changes.
 ROS_PARTS = (
@@ -62,15 +65,28 @@ ROS_PARTS = (
     "rclpy.utilities",
 )
 
+STAND_IN = "example_interfaces"
+_NUMBERS = ("Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64")
+#: Module -> its names, as in release 0.12 (Jazzy): https://github.com/ros2/example_interfaces
+INTERFACES = {
+    "msg": (
+        *_NUMBERS,
+        *(f"{name}MultiArray" for name in (*_NUMBERS, "Byte")),
+        *("Bool", "Byte", "Char", "Empty", "MultiArrayDimension", "MultiArrayLayout", "String", "WString"),
+    ),
+    "srv": ("AddTwoInts", "SetBool", "Trigger"),
+    "action": ("Fibonacci",),
+}
+
 
 class Shadows:
-    """The modules of a student's that hide others.
+    """The student's modules that hide others.
 
     Args:
-        folders: The folders that come first on the path.
+        folders: The first folders of sys.path.
 
     Attributes:
-        files: Their names, sorted.
+        files: Names of the files and packages that hide a module, sorted.
     """
 
     def __init__(self, folders: Sequence[str]) -> None:
@@ -81,7 +97,7 @@ class Shadows:
         self._real: dict[str, ModuleType] = {}
 
     def fall(self, install: Callable[[], None]) -> None:
-        """Forget the hidden modules, and have ROS installed when the program has imported it.
+        """Remove the hidden modules from sys.modules, and make rclpy virtual when the program has imported it.
 
         Args:
             install: Makes rclpy virtual.
@@ -96,14 +112,14 @@ class Shadows:
         try:
             for part in ROS_PARTS:
                 importlib.import_module(part)
-        except Exception:  # the program's own imports fail at the same place, and say so
+        except Exception:  # the program's own imports fail in the same way
             return
         with self._lifted():
             install()
 
     @contextmanager
     def _lifted(self) -> Iterator[None]:
-        """Let the host's own imports find the real modules."""
+        """Make the host's own imports find the real modules during the block."""
         path, seen = sys.path[:], {name: sys.modules[name] for name in self._real if name in sys.modules}
         before = set(sys.modules)
         sys.modules.update(self._real)
@@ -121,7 +137,7 @@ class Shadows:
 
 
 def _modules(folder: str) -> Iterator[tuple[str, str]]:
-    """Yield the files and folders that can be imported from a folder, and their names as modules."""
+    """Yield the files and folders that can be imported from a folder, with their module names."""
     with suppress(OSError):
         for name in os.listdir(folder):
             module, extension = os.path.splitext(name)
@@ -130,7 +146,7 @@ def _modules(folder: str) -> Iterator[tuple[str, str]]:
 
 
 def _is_needed(module: str) -> bool:
-    """Return whether Python or ROS has a module of that name, and would search the path for it."""
+    """Return whether Python or ROS has a module of that name and finds it through sys.path."""
     known = module in sys.stdlib_module_names or module in ROS_MODULES
     first = BuiltinImporter.find_spec(module) or FrozenImporter.find_spec(module)
     return known and module not in _AT_START and first is None
@@ -147,26 +163,26 @@ def _replaceable() -> set[str]:
 
 
 def _goes_with(name: str, names: set[str]) -> bool:
-    """Return whether a module has imported something from others, or lies in one of these packages."""
+    """Return whether a module has imported something from some modules, or is part of one of them."""
     module = sys.modules[name]
     for value in list(vars(module).values()):
         source = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
         if not isinstance(source, str) or source == name or source.startswith(f"{name}."):
             continue
-        if {source, source.removeprefix("_")} & names:  # what is written in C comes from a module such as _heapq
+        if {source, source.removeprefix("_")} & names:  # C implementations are in modules such as _heapq
             return True
     return any(name.startswith(f"{other}.") for other in names)
 
 
 class _After(MetaPathFinder):
-    """Does something as soon as a module that is not the student's has been imported for the first time."""
+    """An importer that calls a function after a module was imported for the first time."""
 
     def __init__(self, name: str, do: Callable[[], None]) -> None:
         self._name = name
         self._do = do
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
-        """Return how to import the module, with what is done afterwards; None for any other."""
+        """Return the spec of the module, with a loader that calls the function; None for any other module."""
         if fullname != self._name:
             return None
         sys.meta_path.remove(self)
@@ -178,7 +194,7 @@ class _After(MetaPathFinder):
 
 
 class _Doing(Loader):
-    """Loads a module as another loader does, and then does something."""
+    """Wraps a loader, and calls a function after it has run the module."""
 
     def __init__(self, loader: Any, do: Callable[[], None]) -> None:
         self._loader = loader
@@ -188,11 +204,58 @@ class _Doing(Loader):
         return getattr(self._loader, name)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:
-        """Leave the making to the other loader."""
+        """Let the wrapped loader create the module."""
         made: ModuleType | None = self._loader.create_module(spec)
         return made
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the module."""
+        """Run the module, then call the function."""
         self._loader.exec_module(module)
         self._do()
+
+
+class _Missing(type):
+    """The metaclass of a stand-in for an interface: every use fails as the import would have."""
+
+    _TYPE_SUPPORT = None  # rclpy finds no type support here and calls the method below
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        raise _missing()
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise _missing()
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        raise _missing()
+
+
+def _missing() -> ModuleNotFoundError:
+    return ModuleNotFoundError(f"No module named '{STAND_IN}'", name=STAND_IN)
+
+
+class StandIns(MetaPathFinder, Loader):
+    """The last importer: installed modules, and those of the submission, take precedence."""
+
+    def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
+        """Return the spec of a module of the package, or None for any other module."""
+        package, _, rest = fullname.partition(".")
+        if package != STAND_IN or (rest and rest not in INTERFACES):
+            return None
+        return ModuleSpec(fullname, self, is_package=not rest)
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
+        """Let the interpreter create the module."""
+        return None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Fill a module with its names."""
+        for interface in INTERFACES.get(module.__name__.partition(".")[2], ()):
+            setattr(module, interface, _Missing(interface, (), {"__module__": module.__name__}))
+
+
+def install_stand_ins() -> None:
+    """Provide the stand-in for example_interfaces."""
+    sys.meta_path.append(StandIns())

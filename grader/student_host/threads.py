@@ -1,7 +1,7 @@
-"""Locks, threads and selectors that block in virtual time; installed before the student's imports.
+"""Replaces locks, threads and selectors by ones that block in virtual time, before the student's imports.
 
-Everything in `threading`, `queue` and `concurrent.futures` rests on the plain lock, on starting a thread and on
-joining it, so replacing these three is enough. A lock is handed to whoever has waited longest.
+Everything in `threading`, `queue` and `concurrent.futures` is built on the plain lock, on starting a thread and on
+joining it, so replacing these three is enough. A released lock goes to the thread that has waited longest.
 """
 
 import _thread
@@ -23,28 +23,28 @@ NS_PER_S = 1_000_000_000
 
 
 class Timeouts:
-    """Turns the timeouts that Python's calls take, seconds or None, into virtual deadlines."""
+    """Converts the timeouts of Python's functions, in seconds or None, to virtual deadlines."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
 
     def deadline_ns(self, seconds: float | None) -> int | None:
-        """Return the deadline of a timeout; None or a negative number waits for ever."""
+        """Return the deadline of a timeout; None, if the timeout is None or negative, means to wait forever."""
         if seconds is None or seconds < 0:
             return None
         return self._clock.end_of(round(seconds * NS_PER_S))
 
     def over(self, deadline_ns: int | None) -> bool:
-        """Return whether a deadline has come."""
+        """Return whether a deadline has passed."""
         return deadline_ns is not None and self._clock.now_ns >= deadline_ns
 
 
 def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
-    """Return the class that stands for `threading.Lock`."""
+    """Create the class that replaces `threading.Lock`."""
     timeouts = Timeouts(clock)
 
     class VirtualLock:
-        """A lock whose waiters are parked strands."""
+        """A lock whose waiters are parked green threads."""
 
         __slots__ = ("__weakref__", "_locked", "_waiters")
 
@@ -82,7 +82,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             return True
 
         def _leave(self, green_thread: GreenThread) -> None:
-            """Stop waiting; a lock that was handed over in the same moment is passed on."""
+            """Stop waiting; if the lock was handed over at the same moment, pass it on."""
             if green_thread in self._waiters:
                 self._waiters.remove(green_thread)
             else:
@@ -107,7 +107,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             return self._locked
 
         def _is_owned(self) -> bool:
-            """Answer a condition that asks whether it may go on; trying to acquire would count as a look."""
+            """Tell a Condition whether the lock is held; its default, trying to acquire, would count as a look."""
             return self._locked
 
         def __reduce_ex__(self, protocol: Any) -> Any:
@@ -133,7 +133,7 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
 
 
 def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
-    """Make every lock that is created from now on a virtual one."""
+    """Make every lock that is created from now on virtual."""
     virtual = lock_type(scheduler, clock)
     threading.Lock = virtual  # type: ignore[assignment]
     threading._allocate_lock = virtual  # type: ignore[attr-defined]
@@ -146,7 +146,7 @@ def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
 
 
 def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Callable[[BaseException], None]) -> None:
-    """Make every thread that is started from now on a strand, and joining one a virtual wait."""
+    """Make every thread that is started from now on a green thread, and joining one a virtual wait."""
 
     def start_new_thread(function: Callable[..., Any], args: tuple[Any, ...] = (), kwargs: Any = None) -> int:
         run = scheduler.start(function, tuple(args), kwargs or {})
@@ -156,7 +156,7 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
     _thread.start_new = start_new_thread
     if hasattr(threading, "_start_new_thread"):
         threading._start_new_thread = start_new_thread
-    else:  # Python 3.13 and later start threads that can be joined without a lock
+    else:  # Python 3.13 and later have joinable threads
         joinable = threading._start_joinable_thread  # type: ignore[attr-defined]
 
         def start_joinable_thread(function: Callable[[], Any], handle: Any = None, daemon: bool = True) -> Any:
@@ -204,12 +204,12 @@ def install_threads(scheduler: Scheduler, clock: VirtualClock, report_fault: Cal
 
 
 def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callable[[], None]) -> None:
-    """Make waiting for file descriptors poll them, and block in virtual time.
+    """Make selectors poll file descriptors and block in virtual time.
 
     Args:
-        scheduler: Blocks.
-        clock: Gives deadlines.
-        give_up: Called where somebody outside of the process has to make a descriptor ready.
+        scheduler: Blocks the calling thread.
+        clock: Provides deadlines.
+        give_up: Called if only another process can make a descriptor ready.
     """
     timeouts = Timeouts(clock)
 

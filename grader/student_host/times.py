@@ -1,4 +1,4 @@
-"""Sleeps and clocks of the standard library in virtual time, and what programs look at while they only wait."""
+"""Replaces sleeps and clocks of the standard library, and the methods that programs poll while they wait."""
 
 import concurrent.futures
 import functools
@@ -13,12 +13,12 @@ from .clock import VirtualClock
 from .scheduler import Scheduler
 
 NS_PER_S = 1_000_000_000
-#: Clocks of the system that only count on.
+#: Monotonic system clocks.
 STEADY = frozenset({time.CLOCK_MONOTONIC, time.CLOCK_MONOTONIC_RAW, time.CLOCK_BOOTTIME})
 
 
 def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
-    """Make sleeping, and every look at a clock of the standard library, virtual."""
+    """Make `time.sleep` and the monotonic clocks of the standard library virtual."""
 
     def sleep(seconds: float | SupportsIndex, /) -> None:
         if not isinstance(seconds, float):
@@ -33,14 +33,14 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
             scheduler.pause(end_ns)
 
     time.sleep = sleep
-    start_ns = clock.now_ns - 1000 * NS_PER_S  # a steady clock does not start at zero, nor at the epoch
+    start_ns = clock.now_ns - 1000 * NS_PER_S  # a monotonic clock starts neither at zero nor at the epoch
     time.monotonic_ns = lambda: clock.look() - start_ns
     time.monotonic = lambda: (clock.look() - start_ns) / NS_PER_S
     time.perf_counter_ns = lambda: clock.look() - start_ns
     time.perf_counter = lambda: (clock.look() - start_ns) / NS_PER_S
 
     def look_unseen() -> float:
-        """Stand for the clock in libraries: that they look is no sign of how the program paces itself."""
+        """Replace the clock in libraries, whose looks do not show how the program paces itself."""
         return (clock.look(by_library=True) - start_ns) / NS_PER_S
 
     threading._time = look_unseen  # type: ignore[attr-defined]
@@ -48,7 +48,7 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
 
 
 def install_wall_time(clock: VirtualClock) -> None:
-    """Make `time.time`, `datetime.now` and their relatives virtual, however they were imported."""
+    """Make `time.time`, `datetime.now` and related functions virtual, however they were imported."""
     import time_machine
 
     traveller = time_machine.travel(clock.now_ns / NS_PER_S, tick=False).start()
@@ -58,14 +58,14 @@ def install_wall_time(clock: VirtualClock) -> None:
         (kind,),
         {"time_ns": lambda self: clock.look(), "time": lambda self: clock.look() / NS_PER_S},
     )
-    # After time_machine, which takes what it finds here for a function written in C.
+    # After time_machine, which expects the original C functions here.
     get, get_ns = time.clock_gettime, time.clock_gettime_ns
     time.clock_gettime_ns = lambda kind, /: time.monotonic_ns() if kind in STEADY else get_ns(kind)
     time.clock_gettime = lambda kind, /: time.monotonic() if kind in STEADY else get(kind)
 
 
 def install_looks(clock: VirtualClock) -> None:
-    """Let time pass for programs that do nothing but look whether another thread has done something."""
+    """Let time pass for programs that only poll whether another thread has done something."""
     fruitless: dict[tuple[Any, str], object] = {
         (threading.Event, "is_set"): False,
         (threading.Thread, "is_alive"): True,

@@ -1,4 +1,4 @@
-"""Puts the pieces of virtual time together, and holds the conversation with the grader."""
+"""Combines the parts of virtual time, and exchanges reports and answers with the grader."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from .ledger import Ledger
     from .ros import RosClocks
 
-#: So often time moves on unasked at most. The grader measures what a program does between two reports: work must not
-#: disappear among the polls of a busy loop.
+#: How often time may advance without asking the grader. The grader measures the work between two reports, which must
+#: not be hidden among the polls of a busy loop.
 MOST_MOVES = 10
-#: After the stop signal the host's own clock runs on, at most this far.
+#: How far the host's own clock may advance after the stop signal.
 STOPPING_NS = 60_000_000_000
-#: Real seconds in which a thread that waits for its turn hears of a signal.
+#: Real seconds that a waiting thread is given to receive a signal.
 INTERRUPT_S = 0.02
 
 
 class VirtualTime:
-    """The virtual clock of one process and what hangs on it.
+    """The virtual time of one process.
 
     Args:
-        link: The line to the grader.
+        link: The connection to the grader.
         report_fault: Called with an exception that ended one of the student's threads.
     """
 
@@ -53,7 +53,7 @@ class VirtualTime:
         threads.install_threads(self.scheduler, self.clock, report_fault)
         times.install_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
-        #: Called before the program waits for somebody outside of virtual time.
+        #: Called before the program waits for something outside of virtual time.
         self.give_up_outside: Callable[[], None] = lambda: None
         threads.install_selectors(self.scheduler, self.clock, self._give_up_outside)
 
@@ -76,7 +76,7 @@ class VirtualTime:
         self._notice_output(ros)
 
     def _notice_output(self, ros: Any) -> None:
-        """Have everything that is written reported before time moves, so that it gets its own instant."""
+        """Make the program report before time advances whenever it has written output, so that its time is exact."""
 
         def noticing(write: Callable[..., Any]) -> Callable[..., Any]:
             def write_and_note(*args: Any) -> Any:
@@ -90,12 +90,12 @@ class VirtualTime:
         ros.replace_log(noticing)
 
     def start(self, now_ns: int) -> None:
-        """Begin to live at a time."""
+        """Start virtual time."""
         self._move_to(now_ns)
         self.resumed_ns = originals.processor_ns()
 
     def summary(self) -> dict[str, Any]:
-        """Return what every report carries: the time, traffic, and endpoints if they changed."""
+        """Return the common part of reports: the time, traffic, and endpoints if they have changed."""
         self.unreported = False
         report: dict[str, Any] = {"now_ns": self.clock.now_ns, "counted": self.clock.counted, "moved": self._moved}
         self.clock.counted, self._moved = False, 0
@@ -122,18 +122,18 @@ class VirtualTime:
         self._converse(self.clock.now_ns)
 
     def leave(self) -> None:
-        """Let everything that was sent arrive everywhere, because its sender is about to go."""
+        """Wait until everything that was sent has arrived, because its sender is about to be destroyed."""
         if self._ledger is not None and self._ledger.sending and not self._stopping:
             self._converse(self.clock.now_ns, leaving=True)
 
     def finish(self) -> None:
-        """Tell of everything that was made, and of no departure any more: what is freed at the end may still send."""
+        """Report the last changes of endpoints; later ones are not reported, since freed objects may still send."""
         if self._ledger is not None and self._ledger.changed:
             self._settle()
         self._finishing = True
 
     def end(self) -> bool:
-        """Leave the ROS graph, as the interpreter does at its end; return whether that was done."""
+        """Leave the ROS graph, as the interpreter does when it exits; return whether that was done."""
         if self._ledger is None or self._stopping:
             return False
         from . import ros
@@ -143,11 +143,11 @@ class VirtualTime:
         return True
 
     def _converse(self, wake_ns: int | None, *, leaving: bool = False) -> None:
-        """Report, wait for the answer and do what it says.
+        """Send a report, wait for the answer and act on it.
 
         Args:
             wake_ns: When the program next wants to run, or None.
-            leaving: Whether what was sent is to arrive everywhere before the answer.
+            leaving: Whether the answer has to wait until everything that was sent has arrived.
         """
         if self._stopping:
             return
@@ -156,7 +156,7 @@ class VirtualTime:
             self._moved += 1
             return
         if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
-            self.leave()  # what was freed in the meantime goes only now
+            self.leave()  # endpoints that were freed in the meantime may only be destroyed now
         report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
         self.running = False
         answer = self._answered(report)
@@ -178,7 +178,7 @@ class VirtualTime:
             self._interrupt()
 
     def _answered(self, report: dict[str, Any]) -> dict[str, Any]:
-        """Send a report and return the answer, after waiting in real time for whatever the grader asks to wait for."""
+        """Send a report and return the answer; handle the grader's requests to wait for matches or messages first."""
         answer = self._link.ask(report)
         while self._ledger is not None:
             if "match" in answer:
@@ -193,10 +193,10 @@ class VirtualTime:
         return answer
 
     def _interrupt(self) -> None:
-        """Get the stop signal as from Ctrl-C, while time stays with the grader.
+        """Receive the stop signal as from Ctrl-C, while the grader keeps control of time.
 
-        The program's main thread hears of it here, or where it waits for its turn; rclpy shuts its contexts down in a
-        thread of its own, which is waited for: what the program sees must not depend on who is faster.
+        The program's main thread handles it here, or where it waits for its turn. rclpy shuts down its contexts in
+        another thread; waiting for it makes the result independent of which is faster.
         """
         try:
             originals.kill(os.getpid(), signal.SIGINT)
@@ -205,13 +205,13 @@ class VirtualTime:
             self._await_shutdown()
 
     def _await_shutdown(self) -> None:
-        """Wait, in real time, until rclpy has done what it does at a signal."""
+        """Wait, in real time, until rclpy has handled a signal."""
         if self._ledger is not None:
             self._ledger.await_shutdown()
         self.scheduler.progress()
 
     def _may_go_on(self, wake_ns: int) -> bool:
-        """Return whether time may move on unasked: nothing else happens until then, and nothing is to be told."""
+        """Return whether time may advance without asking: nothing else happens and there is nothing to report."""
         return (
             self.clock.now_ns < wake_ns < self._free_until_ns
             and self._moved < MOST_MOVES
@@ -223,13 +223,13 @@ class VirtualTime:
 
     def _move_to(self, now_ns: int) -> None:
         if self._ledger is not None and now_ns > self.clock.now_ns:
-            self._ledger.settled()  # time moves on only when everybody has what was sent
+            self._ledger.settled()  # time advances only after all messages have arrived
         self.clock.move_to(now_ns)
         if self._clocks is not None:
             self._clocks.move()
 
     def _run_on(self, wake_ns: int | None) -> None:
-        """Let time pass after the stop signal, without the grader."""
+        """Advance time after the stop signal, without the grader."""
         originals.sleep(0.001)
         if wake_ns is not None and wake_ns <= self._end_ns:
             self._move_to(wake_ns)

@@ -1,4 +1,4 @@
-"""Runs a student's program on the real clock: nothing is replaced, but no first message is lost."""
+"""Runs a student's program on the real clock: no clock is replaced, but first and last messages are not lost."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .link import Link
 
 #: How long, in real time, a new publisher waits for its first subscription before its first message.
 MATCH_S = 2.0
-#: How long, in real time, what a publisher has sent may take to arrive before the publisher goes.
+#: How long, in real time, to wait until a publisher's messages have arrived before it is destroyed.
 ACKNOWLEDGED_S = 0.5
 
 
 class WallTime:
-    """The real clock, as the program finds it.
+    """The real clock, with the same interface as `VirtualTime`.
 
     Args:
-        link: The line to the grader.
+        link: The connection to the grader.
     """
 
     def __init__(self, link: Link) -> None:
@@ -31,7 +31,7 @@ class WallTime:
         self._patience: Any = None
 
     def install_ros(self) -> None:
-        """Let every publisher find a subscription before its first message; in a running system it would have one."""
+        """Make every publisher wait for a subscription before its first message, as if it joined a running system."""
         import rclpy.publisher
         from rclpy.duration import Duration
 
@@ -46,7 +46,7 @@ class WallTime:
         @functools.wraps(publish)
         def publish_when_matched(self: Any, msg: Any) -> Any:
             if self not in matched and self.topic_name not in BACKGROUND:
-                # In another domain nobody listens: waiting there would hold up the rest of the program.
+                # In another domain there are no subscriptions: waiting would only delay the program.
                 deadline = originals.perf_counter() + (
                     MATCH_S if _domain_of(self, ros.MADE_NODES, domain) == domain else 0.0
                 )
@@ -66,21 +66,21 @@ class WallTime:
         ros.install_departures(self._leave)
 
     def _leave(self) -> None:
-        """Let what was published arrive before its publisher goes, which would take it along otherwise."""
+        """Wait until published messages have arrived, since they are lost when their publisher is destroyed."""
         for publisher in list(self._publishing):
             with contextlib.suppress(Exception):  # it has been destroyed, or its context has been shut down
                 publisher.wait_for_all_acked(self._patience)
 
     def finish(self) -> None:
-        """Nothing depends on what is freed at the end."""
+        """Do nothing: on the real clock, nothing depends on what is freed at the end."""
 
     def end(self) -> bool:
-        """Let what was published arrive; the process leaves the graph with its end."""
+        """Wait until published messages have arrived; the process leaves the graph when it ends."""
         self._leave()
         return False
 
     def start(self, now_ns: int) -> None:
-        """Begin; the time is whatever it is, and the grader's next word is to stop."""
+        """Start waiting for the grader's next answer, which is the request to stop."""
         del now_ns
         originals.start_new_thread(self._await_stop, ())
 
@@ -89,13 +89,13 @@ class WallTime:
         originals.kill(os.getpid(), signal.SIGINT)
 
     def summary(self) -> dict[str, Any]:
-        """Return what the last report carries."""
+        """Return the additional fields of the last report: none."""
         return {}
 
 
 def _domain_of(publisher: Any, made: list[weakref.ref[Any]], usual: int) -> int:
-    """Return the ROS domain of the node that a publisher belongs to; the usual one if that cannot be found out."""
-    with contextlib.suppress(Exception):  # a node that is being destroyed, or a context that is being shut down
+    """Return the ROS domain of a publisher's node; the usual domain if that cannot be determined."""
+    with contextlib.suppress(Exception):  # the node may be being destroyed, or its context shut down
         nodes = [node for reference in made if (node := reference()) is not None]
         owner = next(node for node in nodes if any(publisher is own for own in node.publishers))
         return int(owner.context.get_domain_id())

@@ -1,6 +1,6 @@
-"""Notices what the student's program reaches for: events that Python raises for its own insides, processes and sockets.
+"""Watches for audit events of the student's program that could manipulate the process: internals, processes, sockets.
 
-Nothing is forbidden. The grader is told before the action goes on, and looks at the program a second time, elsewhere.
+Nothing is forbidden. The grader is informed before the action continues, and runs the program again as a bare process.
 """
 
 from __future__ import annotations
@@ -12,31 +12,31 @@ from typing import Any
 
 from .link import Link
 
-#: Events, or the beginnings of their names, of https://docs.python.org/3/library/audit_events.html.
+#: Prefixes of event names from https://docs.python.org/3/library/audit_events.html.
 EVENTS = (
     *("gc.", "sys._", "sys.settrace", "sys.setprofile", "sys.addaudithook", "ctypes.", "object.__", "cpython."),
     *("subprocess.", "os.system", "os.fork", "os.posix_spawn", "os.exec", "os.spawn", "os.kill", "pty.", "mmap."),
     *("socket.__new__", "socket.connect", "socket.bind", "compile", "exec", "code.__new__", "function.__new__"),
     *("marshal.", "pickle.", "fcntl.", "resource.", "signal.", "builtins.breakpoint"),
 )
-#: Folders whose files tell about processes and the machine.
+#: Folders with information about processes and the machine.
 FOLDERS = ("/proc", "/sys", "/dev/fd", "/dev/shm")  # noqa: S108 - looked for in what is opened
-#: Events of looking into folders and files.
+#: Events of opening files and listing folders.
 LOOKS = ("open", "os.listdir", "os.scandir")
-#: Modules of the standard library that make code of their own for whoever defines a class, and the events of that.
+#: Modules of the standard library that generate code for class definitions, and the events that this raises.
 MAKERS = ("collections/__init__.py", "dataclasses.py", "enum.py", "typing.py")
 MAKING = ("compile", "exec", "sys._", "object.__", "function.__new__", "code.__new__")
-#: The student's code is looked for so many callers above the event, as long as these are of the standard library.
+#: How many callers in the standard library are skipped to find the student's code.
 CALLERS = 12
-#: So many different things are told of one process.
+#: The most different events that are reported.
 MOST = 20
 
 
 class Watch:
-    """Tells the grader of each kind of event once.
+    """Reports each kind of event once.
 
     Args:
-        link: The line to the grader.
+        link: The connection to the grader.
         root: The submission's folder.
     """
 
@@ -50,7 +50,7 @@ class Watch:
         self._inside = False
 
     def install(self) -> None:
-        """Begin; there is no end."""
+        """Install the audit hook, which cannot be removed."""
         sys.addaudithook(self._hear)
 
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
@@ -61,7 +61,7 @@ class Watch:
             if len(self._told) < MOST and self._by_student(sys._getframe(1), event) and self._link.is_free():
                 self._told.add(event)
                 self._link.send({"kind": "reached", "what": event})
-        except Exception:  # noqa: S110 - whatever is wrong with the arguments must not change what the program does
+        except Exception:  # noqa: S110 - an error here must not change what the program does
             pass
         finally:
             self._inside = False
@@ -82,7 +82,7 @@ class Watch:
             if not file.startswith(("<frozen", self._library)) or file.startswith(self._packages):
                 return False
             if file.startswith("<frozen importlib"):
-                return False  # what a module does while it is imported
+                return False  # the event comes from importing a module
             if file in self._makers and event.startswith(MAKING):
                 return False
             frame = frame.f_back

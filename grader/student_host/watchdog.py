@@ -1,4 +1,4 @@
-"""Watches, in real time, that the student's code comes back; if not, tells the grader where it stands and ends it."""
+"""Checks, in real time, that the student's code does not hang; if it does, reports its stack and ends the process."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ INTERVAL_S = 0.1
 
 
 class Watchdog:
-    """A thread of the host's own beside the student's.
+    """A thread of the host that watches the student's threads.
 
     Args:
-        link: The line to the grader.
-        time: Says since when the student's code has been running.
-        describer: Names the student's frames.
-        limits: `start_cpu_s` and `wake_up_cpu_s`, processor seconds until it first blocks and between two such moments;
-            `blocked_s`, real seconds blocked elsewhere.
+        link: The connection to the grader.
+        time: Provides since when the student's code has been running.
+        describer: Describes the student's stack.
+        limits: `start_cpu_s` and `wake_up_cpu_s`: processor seconds until the program first blocks, and between two
+            blocks; `blocked_s`: real seconds that it may block outside of virtual time.
     """
 
     def __init__(self, link: Link, time: VirtualTime, describer: Describer, limits: dict[str, float]) -> None:
@@ -41,7 +41,7 @@ class Watchdog:
         originals.start_new_thread(self._watch, ())
 
     def stop(self) -> None:
-        """Stop watching: the program has ended."""
+        """Stop watching, because the program has ended."""
         self._stopped = True
 
     def _watch(self) -> None:
@@ -63,7 +63,7 @@ class Watchdog:
                 self._give_up("blocked", "outside")
 
     def _sleeps(self) -> bool:
-        """Return whether the thread that should run is asleep in the system, rather than waiting for a processor."""
+        """Return whether the thread that should run is asleep in the kernel, as opposed to waiting for a processor."""
         thread = self._time.scheduler.running_native_thread()
         try:
             with open(f"/proc/self/task/{thread}/stat", encoding="ascii", errors="replace") as stat:
@@ -72,19 +72,19 @@ class Watchdog:
             return False
 
     def give_up_on_alarms(self) -> None:
-        """End the process, because it is about to be woken by alarms, which know no virtual time."""
+        """End the process, because it is about to set an alarm, which works in real time."""
         self._give_up("alarm", "outside")
 
     def give_up_on_processes(self) -> None:
-        """End the process, because it is about to start another one, which knows no virtual time."""
+        """End the process, because it is about to start another process, which runs in real time."""
         self._give_up("process", "outside")
 
     def give_up_on_waiting(self) -> None:
-        """End the process, because it is about to wait for somebody outside of the ROS graph."""
+        """End the process, because it is about to wait for something outside of the ROS graph."""
         self._give_up("waiting", "outside")
 
     def _give_up(self, code: str, unsettled: str) -> None:
-        """End the process; `code` says why, `unsettled` why the real clock may do the program more justice."""
+        """End the process; `code` is the reason, `unsettled` the reason for using the real clock, if there is one."""
         if self._stopped or not self._time.running:
             return
         frame = sys._current_frames().get(self._time.scheduler.running_thread() or -1)

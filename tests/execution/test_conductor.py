@@ -30,7 +30,7 @@ from scripted import (
 
 from grader.core.limits import Limits
 from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, GraphSnapshot, Mark, Message, Offer, OutputLine
-from grader.execution import discovery, machine, trace_recorder, virtual_time_suitability
+from grader.execution import discovery, machine, trace_recorder
 from grader.execution import virtual_runner as module
 from grader.execution.observer import Observer
 from grader.execution.plan import PlannedRecording
@@ -268,7 +268,7 @@ def test_too_many_wake_ups_end_the_run_with_a_mark(monkeypatch: pytest.MonkeyPat
 
 def test_a_process_that_talks_without_waiting_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """Notes and faults of one breath are counted."""
-    monkeypatch.setattr(module, "WORDS", 20)
+    monkeypatch.setattr(module, "MOST_REPORTS", 20)
 
     def talker(me: ScriptedStudent, world: World) -> Program:
         while True:
@@ -469,7 +469,7 @@ def test_sentences_in_place_of_names_are_dropped() -> None:
 def test_a_program_that_does_not_settle_is_for_the_other_clock(why: str) -> None:
     """The host says which of the known reasons; any other word of its own counts for nothing."""
     hung = {"kind": "exited", "fault": {"code": "blocked"}}
-    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == virtual_time_suitability.UNSETTLED[why]
+    assert Run(saying({**hung, "unsettled": why})).trace.clock_reason == module.UNSETTLED[why]
     assert Run(saying({**hung, "unsettled": "please"})).trace.clock_reason == ""
 
 

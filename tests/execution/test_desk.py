@@ -36,14 +36,14 @@ class Ends:
         self.responses: list[Arrived] = []
         self.done: list[str] = []
 
-    def serve(self, service: str, interface: str) -> None:
-        self.done.append(f"serve {service} {interface}")
+    def add_server(self, service: str, interface: str) -> None:
+        self.done.append(f"add server {service} {interface}")
 
-    def dismiss(self, service: str) -> None:
-        self.done.append(f"dismiss {service}")
+    def remove_server(self, service: str) -> None:
+        self.done.append(f"remove {service}")
 
-    def meet(self, service: str, interface: str, number: int) -> None:
-        self.done.append(f"meet {service} {number}")
+    def add_client(self, service: str, interface: str, number: int) -> None:
+        self.done.append(f"add client {service} {number}")
 
     def ask(self, service: str, number: int, request: Any) -> int:
         self.done.append(f"ask {service} {number}")
@@ -77,7 +77,7 @@ class Run:
         """Let requests come that were sent in the order of their headers' numbers."""
         self.ends.requests = [Arrived(NAME, header, Trigger.Request(), header=header) for header in headers]
         came = self.services.take()
-        self.services.write_down(at_ns)
+        self.services.record(at_ns)
         return came
 
 
@@ -95,7 +95,7 @@ def test_requests_are_answered_in_the_order_in_which_they_were_sent() -> None:
     """Whatever order they arrive in, and each in its time."""
     run = Run()
     asked = server("a", "b", delay_ns=5)
-    run.services.serve(0, asked)
+    run.services.add_server(0, asked)
     assert run.ask(3, 2, at_ns=10) == {f"request {NAME}": 2}
     assert run.due == [Respond(15, asked, 1), Respond(15, asked, 2)]
     assert all(run.services.answer(15, due.server, due.number) for due in run.due)
@@ -109,27 +109,27 @@ def test_a_server_that_has_given_its_answers_takes_nothing_more() -> None:
     """The request that comes too late is none that it has seen."""
     run = Run()
     asked = server("a", answers=1)
-    run.services.serve(0, asked)
+    run.services.add_server(0, asked)
     run.ask(1, 2)
     assert len(run.due) == 1
     assert run.services.done() == []
     run.services.answer(0, run.due[0].server, run.due[0].number)
     assert run.services.done() == [asked]
-    run.services.dismiss(7, asked)
+    run.services.remove_server(7, asked)
     assert run.recorder.observations[-1] == Mark(7, "server_stops", NAME)
     assert not run.services.serves(NAME, KIND)
 
 
 def test_what_a_server_has_not_answered_when_it_goes_stays_unanswered() -> None:
-    """A second dismissal does nothing."""
+    """A second removal does nothing."""
     run = Run()
     asked = server("a", delay_ns=5)
-    run.services.serve(0, asked)
+    run.services.add_server(0, asked)
     run.ask(1)
-    run.services.dismiss(3, asked)
-    run.services.dismiss(4, asked)
+    run.services.remove_server(3, asked)
+    run.services.remove_server(4, asked)
     assert not run.services.answer(5, run.due[0].server, run.due[0].number)
-    assert run.ends.done == [f"serve {NAME} {KIND}", f"dismiss {NAME}"]
+    assert run.ends.done == [f"add server {NAME} {KIND}", f"remove {NAME}"]
 
 
 def test_calls_go_from_client_to_client_and_are_paired_with_their_answers() -> None:
@@ -138,14 +138,14 @@ def test_calls_go_from_client_to_client_and_are_paired_with_their_answers() -> N
     several = calls(clients=2, requests=({},) * 4)
     for index in range(4):
         run.services.call(index, PlannedCall(several, index))
-    assert run.ends.done == [f"meet {NAME} 1", f"meet {NAME} 2", *(f"ask {NAME} {n}" for n in (1, 2, 1, 2))]
+    assert run.ends.done == [f"add client {NAME} 1", f"add client {NAME} 2", *(f"ask {NAME} {n}" for n in (1, 2, 1, 2))]
     assert run.services.expected({f"response {NAME}": 9, "response /other": 1, "topic /a": 1}) == {
         f"response {NAME}": 4
     }
     answers = [(6, 2, "last"), (3, 1, "first"), (3, 1, "twice")]
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message=text), None, n, s) for s, n, text in answers]
     run.services.take()
-    run.services.write_down(9)
+    run.services.record(9)
     found = [(r.number, r.client, r.value["message"]) for r in run.recorder.observations if isinstance(r, Response)]
     assert found == [(4, 2, "last"), (1, 1, "first")]
 
@@ -155,7 +155,7 @@ def test_a_service_of_the_only_node_has_a_name_when_there_is_one(nodes: tuple[st
     """Calls wait until then."""
     run = Run(nodes=nodes)
     assert run.services.resolved("~/get_state") == asked
-    assert run.services.meet(calls("~/get_state")) == asked
+    assert run.services.add_clients(calls("~/get_state")) == asked
 
 
 def test_calls_wait_for_their_server() -> None:
@@ -180,14 +180,14 @@ def test_what_follows_an_accepted_request_is_sent_in_its_time() -> None:
         run.services._content = lambda _, accepted=accepted: ({"accepted": accepted}, 1)  # type: ignore[method-assign, misc]
         run.ends.responses = [Arrived(NAME, 0, answer, None, 1 + accepted, len(run.ends.done))]
         run.services.take()
-        run.services.write_down(10)
+        run.services.record(10)
     assert run.due == [Ask(15, following)]
 
 
 def test_more_requests_than_the_limit_end_the_recording() -> None:
     """They count like messages on a topic; the content of a large one is not looked at."""
     run = Run(limits=Limits(messages=3, message_bytes=64))
-    run.services.serve(0, server())
+    run.services.add_server(0, server())
     run.ask(*range(1, 6))
     assert [type(o) for o in run.recorder.observations] == [Mark, Request, Request, Request, Mark]
     assert run.recorder.full == f"more than 3 requests and responses of {NAME}: the rest was not looked at"
@@ -195,7 +195,7 @@ def test_more_requests_than_the_limit_end_the_recording() -> None:
     run.services.call(0, PlannedCall(calls(), 0))
     run.ends.responses = [Arrived(NAME, 0, Trigger.Response(message="x" * 99), None, 1, 2)]
     run.services.take()
-    run.services.write_down(0)
+    run.services.record(0)
     last: Any = run.recorder.observations[-1]
     assert last.value == {}
     assert "larger than the limit" in run.recorder.notes(())[0]

@@ -23,8 +23,7 @@ from grader.execution.sandbox import properties as remedies
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.choose import choose_isolation, inspect_tier, inspect_tiers, sandbox_memory
 from grader.execution.sandbox.memory import Memory
-from grader.execution.sandbox.plain import Plain
-from grader.execution.sandbox.tiers import WALLED, isolation_from_name
+from grader.execution.sandbox.tiers import ISOLATING, Plain, isolation_from_name
 from grader.execution.sandbox.trial import NO_EXCHANGE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -95,7 +94,7 @@ def test_without_a_required_property_auto_refuses(
     tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation, name: str
 ) -> None:
     """Whichever it is; the tiers, what they lack and what to do are told."""
-    for tier in WALLED:
+    for tier in ISOLATING:
         tested[1][tier] = report(tier, without(name), usable=False, why=f"{name} NOT CONTAINED")
     with pytest.raises(EnvironmentFault, match=f"landlock: not contained: {name}") as refused:
         choose_isolation("auto", ros)
@@ -116,7 +115,7 @@ def test_a_tier_asked_for_by_name_must_keep_its_promises(
     tested: tuple[list[str], dict[str, TierReport]], ros: RosInstallation, cache: Path
 ) -> None:
     """Landlock promises nothing about the network that it was given; every other tier does."""
-    for tier in WALLED:
+    for tier in ISOLATING:
         tested[1][tier] = report(tier, without("net_egress"), usable=False, why="net_egress NOT CONTAINED")
     assert choose_isolation("landlock", ros).isolation == "landlock"
     with pytest.raises(EnvironmentFault, match=r"bubblewrap-flat: .*net_egress"):
@@ -146,7 +145,7 @@ def test_a_self_test_is_made_once(tested: tuple[list[str], dict[str, TierReport]
     assert choose_isolation("auto", ros) == choose_isolation("auto", ros)
     assert asked == ["bubblewrap-root"]
     assert [found.name for found in inspect_tiers(ros)] == list(TIERS)
-    assert asked == ["bubblewrap-root", *WALLED]
+    assert asked == ["bubblewrap-root", *ISOLATING]
 
 
 def test_a_failed_self_test_is_made_again(
@@ -444,7 +443,7 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", WALLED)
+@pytest.mark.parametrize("name", ISOLATING)
 def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """In virtual time, with the same verdicts; the report names the tier and what it contains."""
     found = walls(name, ros, tmp_path)

@@ -19,9 +19,9 @@ import grader
 from grader.core.errors import EnvironmentFault, HarnessError
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox import seccomp as seccomp_flat
-from grader.execution.sandbox.landlock import Landlock
 from grader.execution.sandbox.protocol import Limits, StudentProcess
 from grader.execution.sandbox.start import OUTGROWN, SPARE
+from grader.execution.sandbox.tiers import Landlock
 
 pytestmark = pytest.mark.sandbox
 

@@ -14,7 +14,7 @@ pytest.importorskip("rclpy")
 from hostile import hostile, record
 
 from grader.core.quantities import NS_PER_S
-from grader.execution.virtual_time_suitability import BUSY, OUTSIDE
+from grader.execution.virtual_runner import BUSY, OUTSIDE
 
 pytestmark = pytest.mark.ros
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-STAND_INS = "from grader.student_host.stand_ins import install_stand_ins; install_stand_ins()\n"
+STAND_INS = "from grader.student_host.shadows import install_stand_ins; install_stand_ins()\n"
 
 
 def run(program: str) -> subprocess.CompletedProcess[str]:

@@ -1,1 +1,1 @@
-"""Evidence: what one submission's recordings hold, kept in files that other tools can read and that judging trusts."""
+"""Evidence: the recordings of one submission, in files that other tools can read and that judging verifies."""

@@ -1,4 +1,4 @@
-"""A folder of evidence and its manifest: what was handed in, with what it was recorded, and all digests."""
+"""A folder of evidence and its manifest, with the submission, the software it was recorded with, and all digests."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from grader.core.report import Environment
 from grader.core.scenario import Scenario
 from grader.core.submission import StudentFile
 
-#: What the run was and which recordings belong to it; written last.
+#: Describes the run and lists its recordings; written last.
 MANIFEST = "evidence.json"
-#: The report that was made of the recordings at first.
+#: The report that was made when the submission was graded.
 REPORT = "report.json"
 METADATA = "metadata.yaml"
 _ID = "[a-z][a-z0-9_]{0,99}"
@@ -39,7 +39,7 @@ def recording_name(exercise: str, scenario: str) -> str:
 
 
 def metadata_name(exercise: str, scenario: str) -> str:
-    """Return the path of what rosbag2 wants beside the recording."""
+    """Return the path of rosbag2's metadata file for a recording."""
     return f"{exercise}.{scenario}/{METADATA}"
 
 
@@ -49,17 +49,17 @@ def is_own(name: str) -> bool:
 
 
 def is_recording(folder: Path) -> bool:
-    """Return whether a folder is named as that of a recording is, and holds one."""
+    """Return whether a folder has the name and the content of a recording."""
     return is_own(f"{folder.name}/{METADATA}") and (folder / f"{folder.name}_0.mcap").is_file()
 
 
 def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> None:
-    """Raise EvidenceError if a file would be replaced that is not the grader's own.
+    """Raise EvidenceError if writing would replace a file that the grader did not write.
 
     Args:
-        folder: Where evidence is to be kept; need not exist.
-        names: What is to be written into it.
-        own: What a manifest in it says is the grader's.
+        folder: The folder for the evidence; may not exist yet.
+        names: The files to write.
+        own: The files that the folder's manifest lists.
     """
     known = set(own)
     for name in names:
@@ -73,7 +73,7 @@ def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> No
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files, each whole or not at all.
+    """Write files, each atomically.
 
     Raises:
         EvidenceError: One cannot be written.
@@ -88,7 +88,7 @@ def write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def remove(folder: Path, names: Iterable[str]) -> None:
-    """Remove files of the grader's own, and the folders that they leave empty."""
+    """Remove files that the grader wrote, and folders that become empty."""
     for name in filter(is_own, names):
         with suppress(OSError):
             (folder / name).unlink()
@@ -98,10 +98,10 @@ def remove(folder: Path, names: Iterable[str]) -> None:
 
 
 def read(path: Path, most: int) -> bytes:
-    """Return the bytes of a plain file; links are not followed.
+    """Read a regular file without following links.
 
     Raises:
-        EvidenceError: It is not there, is no plain file, cannot be read or is longer than `most` bytes.
+        EvidenceError: It is missing, not a regular file, not readable, or longer than `most` bytes.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -109,7 +109,7 @@ def read(path: Path, most: int) -> bytes:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
                 raise EvidenceError(f"{path}: expected a file, found something that is no plain one")
-            # one byte more than there is tells whether it grows; to ask for `most` sets memory aside for all of it
+            # one byte more than its size shows whether it grows; reading `most` bytes would allocate that much memory
             data = file.read(min(status.st_size, most) + 1)
     except OSError as error:
         found = "nothing there" if error.errno in (errno.ENOENT, errno.ENOTDIR) else (error.strerror or str(error))
@@ -135,7 +135,7 @@ def _write_whole(path: Path, data: bytes) -> None:
 
 
 FORMAT = "grader/evidence/v1"
-#: A longer manifest is none that the grader wrote.
+#: The grader never writes a longer manifest.
 MOST_BYTES = 64 << 20
 
 
@@ -144,7 +144,7 @@ class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class KeptSubmission(_Strict, frozen=True):
-    """What was handed in; see `grader.core.submission.Submission`."""
+    """The submission; see `grader.core.submission.Submission`."""
 
     name: str
     digest: str
@@ -158,9 +158,9 @@ class KeptRecording(_Strict, frozen=True):
     Attributes:
         scenario: Scenario id.
         asked: Digest of the scenario as the rubric described it.
-        digest: `sha256:` of the file; None if the scenario could not be recorded for want of a file.
-        at: Where in the file the trace begins that judging takes, in bytes.
-        size: How long it is there.
+        digest: `sha256:` of the file; None if the scenario was not recorded because a student's file is missing.
+        at: Offset of the packed trace in the file, in bytes.
+        size: Size of the packed trace, in bytes.
     """
 
     scenario: str
@@ -179,7 +179,7 @@ class KeptExercise(_Strict, frozen=True):
 
 
 class KeptRun(_Strict, frozen=True):
-    """What belongs to this one run: what was typed, and how long it took."""
+    """Data of this particular run: the path as typed, and the duration."""
 
     path: str
     seed: int
@@ -190,7 +190,7 @@ class KeptRun(_Strict, frozen=True):
 
 
 class Manifest(_Strict, frozen=True):
-    """Everything but the recordings; `files` are the grader's own, `complete` is false while they are written."""
+    """Everything but the recordings; `files` lists what the grader wrote, `complete` is false while writing."""
 
     format: str
     complete: bool
@@ -203,15 +203,15 @@ class Manifest(_Strict, frozen=True):
 
 
 def dump(manifest: Manifest) -> bytes:
-    """Return a manifest as JSON text; the same manifest gives the same bytes."""
+    """Convert a manifest to JSON; the same manifest gives the same bytes."""
     return json.dumps(msgspec.to_builtins(manifest), indent=1, allow_nan=False).encode() + b"\n"
 
 
 def parse(data: bytes) -> Manifest:
-    """Return the manifest that a text holds.
+    """Parse a manifest.
 
     Raises:
-        EvidenceError: It holds none, or one of another version.
+        EvidenceError: The text is not a manifest, or has another version.
     """
     try:
         found = json.loads(data)
@@ -225,7 +225,7 @@ def parse(data: bytes) -> Manifest:
 
 
 def scenario_digest(scenario: Scenario) -> str:
-    """Return a digest of everything that shapes a recording; fields at their defaults do not count."""
+    """Return a digest of everything that determines a recording; fields with default values are left out."""
     try:
         return _known_digest(scenario)
     except TypeError:  # one with fields of messages cannot be a key
@@ -242,7 +242,7 @@ def _digest(scenario: Scenario) -> str:
 
 
 def sha256(data: bytes) -> str:
-    """Return the digest of bytes as manifests name it."""
+    """Return the digest of bytes in the format of manifests."""
     return f"sha256:{hashlib.sha256(data).hexdigest()}"
 
 

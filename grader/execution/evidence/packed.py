@@ -1,4 +1,4 @@
-"""Traces packed for judging: the JSON of the codec, with marks where the bytes of messages stand in the recording."""
+"""Packs traces for judging: the codec's JSON, with placeholders for message bytes that the recording contains."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from grader.core.trace import (
     Start,
     Trace,
 )
-from grader.execution.codec import FORMAT, WORDS, trace_to_json
+from grader.execution.codec import FORMAT, TAGS, trace_to_json
 
-#: Shorter values take less as the dict they are; a longer one may hold a number that no decoder takes.
+#: Shorter values take less memory as dicts; a longer one may contain a number that no decoder accepts.
 _SHORTEST, _LONGEST = 64, 4_000
 _OPENING = ord("{")
 _decode = msgspec.json.Decoder(dict[str, Any]).decode
 
 
 class Fields(Mapping[str, Any]):
-    """A mapping that is decoded again whenever something is looked up: most of a trace is never looked at.
+    """A mapping that is decoded on each access, because most of a trace is never read.
 
     Args:
-        text: A JSON object in ASCII, its syntax checked.
+        text: A JSON object in ASCII with valid syntax.
     """
 
     __slots__ = ("_text",)
@@ -78,28 +78,28 @@ class Fields(Mapping[str, Any]):
 
 
 def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
-    """Return the fields that a JSON text holds; raises MsgspecError if it holds no object."""
+    """Decode the fields of a JSON object; raises MsgspecError if the text is not an object."""
     lazy = _SHORTEST < len(text) <= _LONGEST and memoryview(text)[0] == _OPENING
     return Fields(text) if lazy else _decode(text)
 
 
 #: Exit code, signal and Python version of a fault, as `Fault` has them.
 _FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
-# The words of faults in recordings that lack these details.
+# The texts of faults in recordings without these details.
 _EXITED = re.compile(r"exited with code (-?\d{1,9})")
 _KILLED = re.compile(r"ended by (SIG[A-Z0-9]+|signal \d+)")
 _PYTHON = re.compile(r"\(read by Python (\d{1,3})\.(\d{1,3})\)")
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-#: Stands for bytes that are a message of the recording itself.
+#: Placeholder for bytes that are a message of the recording.
 THERE = "*"
-#: Place of the bytes in what is packed of messages, and of requests and responses.
+#: Index of the bytes in packed messages, and in packed requests and responses.
 _CDR = 5
 _PLACES = {"message": _CDR, "delivery": _CDR, "request": 8, "response": 8}
 _ODD_NUMBER = b'{"float":'
 
 
 def _lively(value: Any) -> Any:
-    """Return what `plain` was given of the fields of a message."""
+    """Undo `plain` for the fields of a message."""
     if isinstance(value, dict):
         if value.keys() == {"float"} and isinstance(value["float"], str):
             return _SPECIAL[value["float"]]
@@ -108,13 +108,13 @@ def _lively(value: Any) -> Any:
 
 
 def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: Any) -> Any:
-    """Return the struct that checks what is written of a dataclass: a list of its fields, after its word if it has one.
+    """Create the struct that validates a packed dataclass: a list of its fields, after its tag if it has one.
 
     Args:
         kind: The dataclass.
-        left_out: Fields that are not written, or otherwise.
-        last: Name, type and default of a field at the end that need not be there.
-        others: Types of fields that are written as something else.
+        left_out: Fields that are not written, or written in another way.
+        last: Name, type and default of an optional field at the end.
+        others: Types of fields that are written as another type.
     """
     hints = {**get_type_hints(kind), **others}
     fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]
@@ -123,13 +123,13 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
         [*fields_, *([last] if last else [])],
         array_like=True,
         forbid_unknown_fields=True,
-        tag=WORDS.get(kind),
-        tag_field="is" if kind in WORDS else None,
+        tag=TAGS.get(kind),
+        tag_field="is" if kind in TAGS else None,
     )
 
 
 def _trace_row(rows: Iterable[Any]) -> Any:
-    """Return the struct that checks what `trace_to_json` writes, of observations that are checked by these."""
+    """Create the struct that validates the output of `trace_to_json`, with these structs for observations."""
     written: list[Any] = [
         *((name, str) for name in ("format", "scenario", "clock_reason", "harness_problem")),
         ("clock", ClockKind),
@@ -143,7 +143,7 @@ def _trace_row(rows: Iterable[Any]) -> Any:
 
 
 def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> Trace:
-    """Return the trace that a struct holds, with observations that are made by these."""
+    """Build a trace from a struct, with these functions for observations."""
     return Trace(
         scenario=row.scenario,
         clock=row.clock,
@@ -158,7 +158,7 @@ def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> 
 
 
 def trace_from_json(data: Any) -> Trace:
-    """Return the trace that JSON values hold; raises HarnessError if they hold none."""
+    """Build a trace from JSON values; raises HarnessError if they are not valid."""
     try:
         if data["format"] != FORMAT:
             raise HarnessError(f"trace: expected format {FORMAT}, found {str(data['format'])[:40]}")
@@ -189,7 +189,7 @@ def _fault(row: Any) -> Fault:
 def _details_from_text(kind: FaultKind, text: str) -> _FaultDetails:
     """Return exit code, signal and Python version of a fault whose recording has only the text.
 
-    Early recordings of version 1 tell these three only in the words of that time. Nothing else reads them from text.
+    Early recordings of version 1 have these three only in the text. No other code parses them from it.
     """
     exited = _EXITED.fullmatch(text) if kind is FaultKind.EXITED else None
     killed = _KILLED.fullmatch(text) if kind is FaultKind.KILLED else None
@@ -203,7 +203,7 @@ def _details_from_text(kind: FaultKind, text: str) -> _FaultDetails:
 
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
     blank = kind.__new__
-    # the __init__ of a frozen dataclass takes twice as long, and there are a thousand messages
+    # the __init__ of a frozen dataclass takes twice as long, and there may be thousands of messages
     t_ns, topic, type_, value, cdr = (getattr(kind, name).__set__ for name in kind.__slots__)
 
     def make(row: Any) -> Observation:
@@ -222,7 +222,7 @@ def _exchange(kind: type[Request] | type[Response]) -> Callable[[Any], Observati
     return lambda row: kind(row.t_ns, row.service, row.type, row.number, row.sender, row.client, row.value)
 
 
-#: What checks each kind of observation, and what makes it of that.
+#: For each kind of observation, the struct that validates it and the function that builds it.
 _EXACT_ROWS: Mapping[type, Any] = {
     **{kind: _row_of(kind, value=dict[str, Any], cdr=str) for kind in (Message, Delivery, Request, Response)},
     **{kind: _row_of(kind) for kind in (LogRecord, OutputLine, Offer, Mark)},
@@ -243,7 +243,7 @@ _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     _EXACT_ROWS[Fault]: _fault,
 }
 _TRACE = _trace_row(_EXACT_ROWS.values())
-#: The quick way leaves the fields of messages as the JSON that they are.
+#: The fast variant keeps the fields of messages as JSON text.
 _ROWS: Mapping[type, Any] = {
     **_EXACT_ROWS,
     **{kind: _row_of(kind, value=msgspec.Raw, cdr=str) for kind in (Message, Delivery)},
@@ -259,11 +259,11 @@ _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 
 
 def pack(trace: Trace, there: Sequence[bool]) -> bytes:
-    """Return a trace as JSON; the same trace gives the same bytes.
+    """Pack a trace as JSON; the same trace gives the same bytes.
 
     Args:
-        trace: What was observed.
-        there: For each observation, whether the recording has its bytes as a message of their own.
+        trace: The trace.
+        there: For each observation, whether the recording contains its bytes as a message.
     """
     data = trace_to_json(trace)
     for row, left_out in zip(data["observations"], there, strict=True):
@@ -273,10 +273,10 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
 
 
 def unpack(data: bytes) -> Trace:
-    """Return what `pack` was given, without the bytes of messages, which judging does not read.
+    """Unpack a trace without the bytes of messages, which judging does not read.
 
     Raises:
-        EvidenceError: This is no packed trace.
+        EvidenceError: The data is not a packed trace.
     """
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
@@ -293,14 +293,14 @@ def unpack(data: bytes) -> Trace:
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
-    """Return what `pack` was given.
+    """Unpack a trace.
 
     Args:
         data: A packed trace.
-        cdrs: The bytes of the recording's messages, one for each observation; None leaves all messages without.
+        cdrs: The bytes of the recording's messages, one for each observation; None leaves them out.
 
     Raises:
-        EvidenceError: This is no packed trace, or not that of the recording.
+        EvidenceError: The data is not a packed trace, or does not match the recording.
     """
     try:
         rows = json.loads(data)
@@ -322,7 +322,7 @@ def _base64(packed: str, cdrs: Sequence[bytes] | None, index: int) -> str:
 
 
 def _revived(observation: Observation) -> Observation:
-    """Return an observation whose NaN and infinities are numbers again."""
+    """Convert the NaN and infinities of an observation back to numbers."""
     if not isinstance(observation, (Message, Delivery, Request, Response)):
         return observation
     try:

@@ -1,4 +1,4 @@
-"""One scenario's recording as an MCAP file that is a rosbag2 recording, and the trace that judging takes from it."""
+"""Writes one scenario's recording as an MCAP file for rosbag2, and reads the trace for judging from it."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from grader.core.trace import Trace
 from grader.execution.evidence.packed import pack, unpack, unpack_exactly
 from grader.execution.evidence.shown import RUN, Shown, definition, said, shown
 
-#: The attachment that holds everything judging reads.
+#: The attachment with everything that judging reads.
 TRACE = "trace.json.zst"
 #: Name of the metadata record about the run.
 FACTS = "grader"
-#: Version of rosbag2's own metadata, as Jazzy writes it.
+#: Version of rosbag2's metadata format in Jazzy.
 ROSBAG2_VERSION = 9
-#: A longer trace is none that the grader wrote.
+#: The grader never writes a longer trace.
 MOST_BYTES = 256 << 20
 _LIBRARY = "rclpy-grader evidence v1"
 _Key = tuple[str, str, str]
@@ -60,12 +60,12 @@ class _Channels:
 
 
 def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[bytes, bytes]:
-    """Return a trace as an MCAP file, and the `metadata.yaml` that makes its folder a rosbag2 recording.
+    """Convert a trace to an MCAP file, and the `metadata.yaml` that makes its folder a rosbag2 recording.
 
     Args:
-        trace: What was observed; the same trace gives the same bytes.
-        facts: What a reader must know of the run: digests, seed, environment.
-        name: File name, which rosbag2's metadata repeats.
+        trace: The trace; the same trace gives the same bytes.
+        facts: Information about the run: digests, seed, environment.
+        name: File name, which is part of rosbag2's metadata.
     """
     about = _about(trace, facts)
     messages = [said(0, RUN, about), *shown(trace.observations)]
@@ -85,7 +85,7 @@ def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[
 
 
 def place_of_trace(recording: bytes) -> tuple[int, int]:
-    """Return where the packed trace begins in a recording, and its size; raises EvidenceError if there is none."""
+    """Return offset and size of the packed trace in a recording; raises EvidenceError if there is none."""
     with _reading():
         summary = make_reader(io.BytesIO(recording)).get_summary()
         index = next((i for i in (summary.attachment_indexes if summary else ()) if i.name == TRACE), None)
@@ -96,10 +96,10 @@ def place_of_trace(recording: bytes) -> tuple[int, int]:
 
 
 def trace_at(recording: bytes, at: int, size: int) -> Trace:
-    """Return the trace at a place in a recording, without the bytes of messages, which judging does not read.
+    """Read the trace at an offset of a recording, without the bytes of messages, which judging does not read.
 
     Raises:
-        EvidenceError: There is none at that place.
+        EvidenceError: There is no trace at that offset.
     """
     with _reading():
         data = _unpressed(recording[at : at + size])
@@ -107,14 +107,14 @@ def trace_at(recording: bytes, at: int, size: int) -> Trace:
 
 
 def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
-    """Return the trace that a recording holds.
+    """Read the trace of a recording.
 
     Args:
         recording: The file's bytes.
-        wire: Whether messages carry the bytes that went over the wire, which takes longer.
+        wire: Whether to include the bytes of messages, which takes longer.
 
     Raises:
-        EvidenceError: This is no recording with a trace in it.
+        EvidenceError: The file is not a recording with a trace.
     """
     data = packed_trace(recording)
     if not wire:
@@ -126,7 +126,7 @@ def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
 
 
 def packed_trace(recording: bytes) -> bytes:
-    """Return the trace that a recording holds as `pack` made it; raises EvidenceError if there is none."""
+    """Return the packed trace of a recording; raises EvidenceError if there is none."""
     with _reading():
         attachments = make_reader(io.BytesIO(recording)).iter_attachments()
         packed = next((a.data for a in attachments if a.name == TRACE), None)
@@ -137,7 +137,7 @@ def packed_trace(recording: bytes) -> bytes:
 
 @contextmanager
 def _reading() -> Iterator[None]:
-    """Turn whatever damaged bytes make the parsers raise into an EvidenceError."""
+    """Convert any error that parsers raise for damaged bytes to an EvidenceError."""
     try:
         yield
     except EvidenceError:
@@ -155,12 +155,12 @@ def _unpressed(packed: bytes) -> bytes:
 
 @lru_cache(maxsize=1)
 def _decompressor() -> zstandard.ZstdDecompressor:
-    """Return the one that is used again and again: to make one takes longer than what it does."""
+    """Return a shared instance, because creating one takes longer than using it."""
     return zstandard.ZstdDecompressor()
 
 
 def _about(trace: Trace, facts: Mapping[str, str]) -> dict[str, Any]:
-    """Return what a reader must know before the first message."""
+    """Return the information that readers need before the first message."""
     return {
         "scenario": trace.scenario,
         "clock": trace.clock.value,
@@ -173,7 +173,7 @@ def _about(trace: Trace, facts: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _information(messages: Iterable[Shown], channels: _Channels, name: str, distro: str) -> dict[str, Any]:
-    """Return what rosbag2 wants to know about a recording."""
+    """Return rosbag2's metadata of a recording."""
     times = [message.t_ns for message in messages]
     return {
         "version": ROSBAG2_VERSION,
@@ -198,7 +198,7 @@ def _span(times: Sequence[int]) -> dict[str, Any]:
 
 
 def _topics(counts: Mapping[_Key, int]) -> list[dict[str, Any]]:
-    """Return topics with their types, each once, whoever published on it."""
+    """Return each topic with its type once, independent of the publisher."""
     sums: Counter[tuple[str, str]] = Counter()
     for (topic, interface, _), count in counts.items():
         sums[topic, interface] += count

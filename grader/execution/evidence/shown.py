@@ -1,4 +1,4 @@
-"""What a recording shows to tools that read rosbag2: every observation of a trace as a message on a topic."""
+"""Converts every observation of a trace to a message on a topic, for tools that read rosbag2."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ _ZERO: Mapping[str, Any] = {"string": "", "bool": False, "float32": 0.0, "float6
 
 
 class Unknown(ValueError):  # noqa: N818 - named after what the type or the bytes are
-    """A message of a type that has no definition here, or bytes that are no message of it."""
+    """A message has a type without a known definition, or its bytes do not match the type."""
 
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """How messages of a type are laid out: the text of its definition, parts included, and its hash."""
+    """The definition of a message type: its text, including nested types, and its hash."""
 
     text: str
     digest: str
@@ -53,7 +53,7 @@ def _store() -> Any:
 
 @lru_cache(maxsize=256)
 def definition(interface: str) -> Definition:
-    """Return the definition of a message type; raises Unknown for one that is none of ROS's common types."""
+    """Return the definition of a message type; raises Unknown if it is not one of ROS's common types."""
     if interface not in _store().fielddefs:
         raise Unknown(interface)
     text, _ = _store().generate_msgdef(interface, ros_version=2)
@@ -61,7 +61,7 @@ def definition(interface: str) -> Definition:
 
 
 def check_readable(interface: str, cdr: bytes) -> None:
-    """Make sure that other tools can decode a message; raises Unknown if they cannot."""
+    """Check that other tools can decode a message; raises Unknown if they cannot."""
     definition(interface)
     try:
         _store().deserialize_cdr(cdr, interface)
@@ -70,7 +70,7 @@ def check_readable(interface: str, cdr: bytes) -> None:
 
 
 def encode(interface: str, value: Mapping[str, Any]) -> bytes:
-    """Return a message with these fields, all others zero, as CDR; raises Unknown if they do not fit the type."""
+    """Serialize a message with these fields, all others zero, as CDR; raises Unknown if they do not fit the type."""
     definition(interface)
     try:
         return bytes(_store().serialize_cdr(_built(interface, value), interface))
@@ -97,13 +97,13 @@ def _field(kind: tuple[Nodetype, Any], value: Any, depth: int) -> Any:
 STRING = "std_msgs/msg/String"
 LOG = "rcl_interfaces/msg/Log"
 ROSOUT = "/rosout"
-#: Observations that are no ROS messages, as JSON on topics of the grader's own.
+#: Topics for observations other than ROS messages, as JSON.
 OUTPUT, GRAPH, FAULTS, OFFERS, MARKS, CALLS = (
     f"/grader/{name}" for name in ("output", "graph", "faults", "offers", "marks", "calls")
 )
-#: Messages whose bytes nobody can decode, or of a type that has no definition here.
+#: Messages that cannot be decoded, or whose type has no known definition.
 UNDECODED = "/grader/undecoded"
-#: What is known of the whole recording, once at its beginning.
+#: Information about the whole recording, once at its beginning.
 RUN = "/grader/run"
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 _TOPICS = {
@@ -124,11 +124,11 @@ class Shown:
 
     Attributes:
         t_ns: Virtual receive time, from 0.
-        topic: Where it was seen, or a topic of the grader's own.
+        topic: Its topic, or one of the grader's own topics.
         type: Its type.
         publisher: `student` or `grader`.
         cdr: Its bytes.
-        exact: Whether `cdr` is what went over the wire, as the trace has it.
+        exact: Whether `cdr` is exactly what was sent, as in the trace.
     """
 
     t_ns: int
@@ -151,7 +151,7 @@ def shown(observations: tuple[Observation, ...]) -> Iterator[Shown]:
 
 
 def said(t_ns: int, topic: str, value: Any) -> Shown:
-    """Return a JSON value as a message on a topic of the grader's own."""
+    """Convert a JSON value to a message on one of the grader's own topics."""
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return Shown(_clamped(t_ns), topic, STRING, "grader", encode(STRING, {"data": text}))
 
@@ -179,7 +179,7 @@ def _message(message: Message | Delivery) -> Shown:
 
 
 def _check_name(topic: str) -> None:
-    """Raise Unknown for a topic that no ROS tool could have, or that would pass for one of the grader's own."""
+    """Raise Unknown for an invalid ROS topic, or one that looks like the grader's own."""
     plain_name = topic.isascii() and topic.isprintable() and topic.startswith("/") and len(topic) < 256
     if not plain_name or topic == ROSOUT or topic.startswith("/grader/"):
         raise Unknown(topic)
@@ -199,7 +199,7 @@ def _log(record: LogRecord) -> Shown:
 
 
 def _fields(observation: Observation) -> dict[str, Any]:
-    """Return an observation by the names of its fields, without its time."""
+    """Convert an observation to a dictionary by field name, without its time."""
     _, _, *values = observation_to_json(observation)
     fields = dict(zip(type(observation).__slots__[1:], values, strict=False))
     if isinstance(observation, GraphSnapshot):
@@ -210,7 +210,7 @@ def _fields(observation: Observation) -> dict[str, Any]:
 
 
 def _text(text: str) -> str:
-    """Return text that every reader of CDR strings takes: no lone surrogate, no NUL."""
+    """Replace what some readers of CDR strings reject: lone surrogates and NUL."""
     return text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
 
 

@@ -1,4 +1,4 @@
-"""Keeps a run as evidence in a folder, and reads it back: the recordings are what judging takes, nothing is run."""
+"""Writes a run to a folder as evidence, and reads it back for judging without running anything."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from grader.execution.evidence import manifest as files
 from grader.execution.evidence import manifest as kept
 from grader.execution.evidence.recording_file import place_of_trace, recording_bytes, trace_at, trace_of
 
-#: A longer recording is none that the grader wrote.
+#: The grader never writes a longer recording.
 MOST_BYTES = 512 << 20
-#: Digits of a digest that a message shows, with what comes before them.
+#: How much of a digest messages show, including its prefix.
 _SHOWN = len("sha256:") + 12
-#: Where a submission lies that nobody will run.
+#: The root of a submission that will not be run.
 _NOWHERE = Path()
 
 
@@ -34,8 +34,8 @@ class Evidence:
     """A folder of evidence whose manifest has been read.
 
     Attributes:
-        folder: Where it lies.
-        manifest: What it says of itself.
+        folder: The folder.
+        manifest: Its manifest.
     """
 
     folder: Path
@@ -48,10 +48,10 @@ class Evidence:
 
 
 def check_place(folder: Path) -> None:
-    """Make sure, before anything is run, that evidence may be kept in a folder.
+    """Check, before anything is run, that evidence can be written to a folder.
 
     Raises:
-        EvidenceError: It is no folder, or holds files under our names that are not ours.
+        EvidenceError: The path is not a folder, or it has files of the same names that the grader did not write.
     """
     if folder.exists() and not folder.is_dir():
         raise EvidenceError(f"{folder}: expected a folder for the evidence, found a file", "name another folder")
@@ -59,17 +59,17 @@ def check_place(folder: Path) -> None:
 
 
 def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapping[str, Any], report: bytes) -> None:
-    """Write a run as evidence; what an earlier run left there is replaced, what others put there stays.
+    """Write a run as evidence; files of an earlier run are replaced, other files are kept.
 
     Args:
-        folder: Created if it is not there.
-        run: What was recorded.
-        exercises: What was asked.
-        request: How grading was asked for, as JSON values; holds nothing that judging reads.
+        folder: The folder, created if it does not exist.
+        run: The run.
+        exercises: The exercises that were graded.
+        request: The request for grading, as JSON values; not read by judging.
         report: The report as JSON.
 
     Raises:
-        EvidenceError: A file cannot be written, or is not ours to replace.
+        EvidenceError: A file cannot be written, or would replace one that the grader did not write.
     """
     written: dict[str, bytes] = {}
     recordings: dict[tuple[str, str], bytes] = {}
@@ -91,10 +91,10 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
 
 
 def open_evidence(folder: Path) -> Evidence:
-    """Return the evidence that lies in a folder.
+    """Open the evidence in a folder.
 
     Raises:
-        EvidenceError: There is none, it is of another version, damaged, or was not finished.
+        EvidenceError: There is none, or it has another version, is damaged or incomplete.
     """
     path = folder / files.MANIFEST
     data = files.read(path, kept.MOST_BYTES)
@@ -108,17 +108,17 @@ def open_evidence(folder: Path) -> Evidence:
 
 
 def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = False) -> Run:
-    """Return the run that evidence holds, as far as these exercises ask for it.
+    """Read a run from evidence, as far as these exercises need it.
 
-    A scenario that the rubric describes in another way now has a trace that says so and forbids judging.
+    If the rubric has changed a scenario since then, its trace has a harness problem, which prevents judging.
 
     Args:
-        evidence: Where it lies.
-        exercises: What is asked now.
-        verify: Whether every recording is written again from what is judged, and compared with what it shows.
+        evidence: The evidence.
+        exercises: The exercises to judge now.
+        verify: Whether to write every recording again from the judged trace, and compare it with the file.
 
     Raises:
-        EvidenceError: A recording is missing or is not the one that was kept.
+        EvidenceError: A recording is missing or was changed.
     """
     manifest = evidence.manifest
     wanted = {e.id: e for e in exercises}
@@ -133,12 +133,12 @@ def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = 
 
 
 def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Mapping[tuple[str, str], Trace]) -> Run:
-    """Return the run that a manifest tells of.
+    """Build a run from a manifest.
 
     Args:
-        manifest: What was handed in, and with what it was recorded.
-        exercises: What is asked now.
-        traces: What was recorded, by exercise and scenario.
+        manifest: Describes the submission and the software that it was recorded with.
+        exercises: The exercises to judge now.
+        traces: The traces, by exercise and scenario.
     """
     return Run(
         submission=_submission(manifest),
@@ -155,7 +155,7 @@ def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Map
 
 
 def first_report(evidence: Evidence) -> Mapping[str, Any] | None:
-    """Return the report that was made when the submission was graded; None if it is gone or no report."""
+    """Return the report that was made when the submission was graded; None if it is missing or invalid."""
     try:
         report = json.loads(files.read(evidence.folder / files.REPORT, kept.MOST_BYTES))
     except (EvidenceError, ValueError, RecursionError):
@@ -164,12 +164,12 @@ def first_report(evidence: Evidence) -> Mapping[str, Any] | None:
 
 
 def is_evidence(folder: Path) -> bool:
-    """Return whether a folder says that it holds evidence."""
+    """Return whether a folder has a manifest of evidence."""
     return (folder / files.MANIFEST).is_file()
 
 
 def found_under(folder: Path) -> Sequence[Path]:
-    """Return the folders of evidence in and below a folder, sorted by path; also those that lost their manifest."""
+    """Return the folders of evidence in and below a folder, sorted by path, including those without their manifest."""
     found = []
     for root, inner, names in os.walk(folder):
         if files.MANIFEST in names or any(files.is_recording(Path(root, name)) for name in inner):
@@ -205,7 +205,7 @@ def _trace(
 def _compare(
     data: bytes, trace: Trace, evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording
 ) -> None:
-    """Raise EvidenceError if a recording shows anything else than what is judged."""
+    """Raise EvidenceError if the messages of a recording differ from the trace that is judged."""
     facts = _kept_facts(evidence.manifest, owner)
     name = Path(files.recording_name(owner.id, trace.scenario)).name
     same = recording_bytes(trace, facts, name)[0] == data
@@ -214,7 +214,7 @@ def _compare(
 
 
 def _own(folder: Path) -> tuple[str, ...]:
-    """Return the files in a folder that an earlier run wrote, by its manifest; none if there is no such manifest."""
+    """Return the files in a folder that an earlier run wrote, from its manifest; none without a manifest."""
     try:
         manifest = kept.parse(files.read(folder / files.MANIFEST, kept.MOST_BYTES))
     except EvidenceError:
@@ -223,7 +223,7 @@ def _own(folder: Path) -> tuple[str, ...]:
 
 
 def _facts(run: Run, exercise: str) -> dict[str, str]:
-    """Return what every recording says of the run; nothing that only one machine or one run has."""
+    """Return the information about the run for every recording, without values specific to one machine or run."""
     rubrics = dict(run.reproduce.rubrics)
     return _as_facts(
         exercise, run.submission.digest, rubrics.get(exercise, ""), run.seed, run.reproduce.recording, run.environment

@@ -1,1 +1,1 @@
-"""Walls around processes: what a worker and a student's process may see and reach."""
+"""Sandboxes, which restrict what a worker and a student's process can access."""

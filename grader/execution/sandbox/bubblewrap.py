@@ -1,4 +1,4 @@
-"""Isolation by nested bubblewrap: a network of its own for the worker, a file view of its own for each student."""
+"""The tiers with nested bubblewrap: a private network for the worker, a private view of files for each student."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 
 @dataclass(frozen=True, slots=True)
 class Bubblewrap:
-    """The walls that bubblewrap, seccomp and resource limits give.
+    """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits.
 
     Attributes:
         bwrap: The bubblewrap program.
         prlimit: The program of util-linux that sets resource limits.
-        setpriv: The program of util-linux that changes the user; used as root only.
-        as_root: Whether this process is root: students then run as another user instead of in a user namespace.
-        can_forbid_userns: Whether bubblewrap knows `--disable-userns` (0.8 and newer); seccomp forbids them anyway.
+        setpriv: The program of util-linux that changes the user; used only as root.
+        as_root: Whether this process is root; students then run as another user instead of in a user namespace.
+        can_forbid_userns: Whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway.
     """
 
     bwrap: Path
@@ -52,10 +52,10 @@ class Bubblewrap:
 
     @classmethod
     def here(cls) -> Bubblewrap:
-        """Return the isolation for this machine and user; whether it works is for the probe to say.
+        """Return the tier for this machine and user, without testing whether it works.
 
         Raises:
-            EnvironmentFault: A program is missing or this processor is unknown, with the command that mends it.
+            EnvironmentFault: A program is missing or this processor is unknown; the hint is a fix.
         """
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
@@ -98,8 +98,8 @@ class Bubblewrap:
     ) -> Command:
         """Return the command that starts the trusted worker.
 
-        It has its own network with only `lo`, its own processes and its own /dev/shm: what it leaves behind goes with
-        it. It is killed when the caller dies.
+        The worker has a private network with only `lo`, a private process namespace and a private /dev/shm, which all
+        disappear with it. It is killed when the caller dies.
         """
         walls = [
             *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
@@ -111,7 +111,7 @@ class Bubblewrap:
         return Command((str(self.bwrap), *walls, "--", *argv), dict(environment), tuple(pass_fds))
 
     def _workers_files(self, view: WorkerView) -> list[str]:
-        """Return the options that show a worker what it needs, the programs that start a student among them."""
+        """Return the options that make visible what a worker needs, including the programs that start students."""
         shared = taken_users() if self.as_root else ()
         read = view_of((*view.read, self.bwrap, self.prlimit, self.setpriv))
         own = view_of(view.own)
@@ -125,7 +125,7 @@ class Bubblewrap:
         for folder in view.hidden:
             options += ["--perms", "0755", "--tmpfs", str(folder)]
         for folder in parents_of(own.bound):
-            # Where bubblewrap makes a parent by itself, another user's student cannot pass through it.
+            # A parent folder that bubblewrap creates itself could not be entered by a student's other user.
             if not any(folder.is_relative_to(path) for path in read.bound):
                 options += ["--perms", "0755", "--dir", str(folder)]
         for path in own.bound:
@@ -139,8 +139,9 @@ class Bubblewrap:
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student's process, from inside the worker.
 
-        Options travel through a descriptor and bubblewrap itself starts without environment: a student reads both in
-        /proc/1. As root the staged copy is made readable by everyone, since the student is another user.
+        Options are passed through a descriptor, and bubblewrap starts without an environment, because a student could
+        read both in /proc/1. As root, the staged copy is made readable for everyone, because the student is another
+        user.
         """
         if self.as_root:
             make_readable(process.submission)
@@ -161,14 +162,15 @@ class Bubblewrap:
         shared = ["--die-with-parent", "--new-session", "--unshare-pid", "--unshare-ipc", "--unshare-uts"]
         shared += ["--unshare-cgroup-try", "--hostname", "student", "--cap-drop", "ALL"]
         if self.as_root:
-            # What setpriv needs to become another user; it gives them up on the way.
+            # The capabilities that setpriv needs to change the user; it drops them in the process.
             return [*shared, "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_SETPCAP"]
         return [*shared, "--unshare-user", *(("--disable-userns",) if self.can_forbid_userns else ())]
 
     def _entry(self, limits: Limits) -> list[str]:
-        """Return the programs that set limits and, as root, change the user before Python starts.
+        """Return the commands that set limits and, as root, change the user before Python starts.
 
-        Limits come first: the number of processes must be set inside the user namespace, where the kernel counts it.
+        Limits come first: the number of processes must be limited inside the user namespace, where the kernel counts
+        them.
         """
         seconds = limits.processor_s
         entry = [
@@ -184,17 +186,17 @@ class Bubblewrap:
     def _files(self, process: StudentProcess, limits: Limits) -> list[str]:
         view = view_of((*process.runtime.read_paths, process.runtime.executable, self.prlimit, self.setpriv))
         size = str(limits.scratch_bytes)
-        # The first process is bubblewrap, without the filter of system calls: its memory must be out of reach.
+        # Process 1 is bubblewrap, without the seccomp filter, so its memory must not be accessible.
         first = "/proc/1"
         options = ["--proc", "/proc", "--size", "4096", "--perms", "0555", "--tmpfs", first, "--remount-ro", first]
         options += ["--dev", "/dev"]
-        # Scratch first: a mount on /tmp would hide what had been bound below it.
+        # Scratch folders first: a mount on /tmp would hide anything that was bound below it before.
         for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
         for folder in (HOME, HOME / "log", WORK):
             options += ["--perms", "0777", "--dir", str(folder)]
         for folder in (*view.parents(), *parents_of((HOST,) if process.host_folder else ())):
-            # Where Python lies below /tmp, these are in the scratch folder, and a user's student owns them.
+            # If Python is installed below /tmp, these are in the scratch folder and belong to the student's user.
             options += ["--perms", "0555", "--dir", str(folder)]
         for path in view.bound:
             options += ["--ro-bind", str(path), str(path)]
@@ -204,7 +206,7 @@ class Bubblewrap:
             options += ["--size", "4096", "--tmpfs", str(folder), "--remount-ro", str(folder)]
         options += ["--ro-bind", str(process.submission), str(SUBMISSION)]
         options += ["--ro-bind", str(process.host_folder), str(HOST)] if process.host_folder else []
-        # bubblewrap's /dev is a tmpfs without limit, which its owner could fill.
+        # bubblewrap's /dev is a tmpfs without a size limit, which its owner could fill.
         return [*options, "--remount-ro", "/dev", "--remount-ro", "/"]
 
 

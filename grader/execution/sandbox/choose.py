@@ -1,4 +1,4 @@
-"""Chooses the tier of isolation by trying it, not by looking at versions."""
+"""Chooses the sandbox tier by testing it, not by comparing versions."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Fact, Property, TierReport, missing
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation
-from grader.execution.sandbox import landlock, selftest, tiers
+from grader.execution.sandbox import selftest, tiers
 from grader.execution.sandbox.memory import Memory
 from grader.execution.sandbox.properties import NOTHING, remedy_for
 from grader.execution.sandbox.protocol import Isolation
-from grader.execution.sandbox.tiers import WALLED, isolation_from_name
+from grader.execution.sandbox.tiers import ISOLATING, isolation_from_name
 from grader.execution.sandbox.trial import NO_EXCHANGE
 
 AUTO = "auto"
-#: So much of the reason against one tier is told where all of them are refused.
+#: How much of the reason against each tier is shown if all tiers are refused.
 MOST_CHARACTERS = 100
 
 
@@ -26,7 +26,7 @@ class TierChoice:
 
     Attributes:
         isolation: The tier.
-        containment: What it was seen to hold back; empty without walls.
+        containment: What the self-test found it to prevent; empty without a sandbox.
     """
 
     isolation: Isolation
@@ -34,27 +34,27 @@ class TierChoice:
 
 
 def _silent(step: str) -> None:
-    """Take no note of a step."""
+    """Ignore a progress message."""
 
 
 def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
-    """Return the isolation to record in.
+    """Choose the tier to record in.
 
     Args:
-        wanted: `auto` for the strongest tier that contains what is required; `none` for no walls; or the name of a
-            tier, which must keep what it promises.
-        ros: What students' processes will run with.
-        progress: Hears which sandbox is tried, and why what is remembered of it does not do.
+        wanted: `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
+            tier, which must have the properties that it promises.
+        ros: The ROS installation that students' processes will use.
+        progress: Called with a message when a sandbox is tested, and why the last result cannot be used.
 
     Raises:
-        EnvironmentFault: The tier asked for does not exist or does not hold here, or none does, with what mends it.
+        EnvironmentFault: The requested tier does not exist or does not work here, or no tier does; the hint is a fix.
     """
     if wanted == NO_WALLS:
         return TierChoice(isolation_from_name(wanted))
     if wanted != AUTO:
         return _named(wanted, ros, progress)
     tried: list[TierReport] = []
-    for name in WALLED:
+    for name in ISOLATING:
         tried.append(inspect_tier(name, ros, progress))
         if tried[-1].usable:
             return TierChoice(isolation_from_name(name), tried[-1].properties)
@@ -62,16 +62,16 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
 
 
 def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
-    """Try every tier anew and return what each is worth here, strongest first; the one without walls comes last."""
+    """Test every tier and return the reports, strongest first; the tier without isolation comes last."""
     open_ones = tuple(Property(name, holds=False, mechanism=NOTHING) for name in PROPERTIES)
     nothing = TierReport(NO_WALLS, TIERS[NO_WALLS], usable=False, why="it contains nothing", properties=open_ones)
-    return (*(inspect_tier(name, ros, afresh=True) for name in WALLED), nothing)
+    return (*(inspect_tier(name, ros, afresh=True) for name in ISOLATING), nothing)
 
 
 def sandbox_memory(ros: RosInstallation) -> Fact:
-    """Say whether a run would use a remembered self-test of the sandbox, or why it would repeat it."""
+    """Report whether a run would use the remembered result of a self-test, or why it would repeat it."""
     lapses = []
-    for name in WALLED:
+    for name in ISOLATING:
         memory = Memory.of(name, ros)
         found = memory.recall()
         if found is not None and found.usable:
@@ -84,12 +84,12 @@ def sandbox_memory(ros: RosInstallation) -> Fact:
 def inspect_tier(
     name: str, ros: RosInstallation, progress: Callable[[str], None] = _silent, *, afresh: bool = False
 ) -> TierReport:
-    """Return what one tier is worth here, from the last self-test if nothing that matters has changed since.
+    """Return the report on one tier, from the last self-test if nothing relevant has changed since.
 
     Args:
         name: Tier name.
-        ros: What students' processes will run with.
-        progress: Hears that it is tried, and why.
+        ros: The ROS installation that students' processes will use.
+        progress: Called with a message when the tier is tested, and why.
         afresh: Whether to test it in any case.
     """
     try:
@@ -103,11 +103,11 @@ def inspect_tier(
     progress(f"trying the sandbox {name}{'' if afresh else f' ({memory.lapse()})'}")
     report = selftest.inspect(isolation, ros)
     if report.properties and not _kept(report):
-        # A busy machine gets a second chance.
+        # The machine may have been busy: try once more.
         report = selftest.inspect(isolation, ros)
     report = replace(report, remedy=remedy_for(report))
     if _kept(report):
-        # What fails may fail because the machine is busy, or be mended in the next minute.
+        # Only a success is kept: a failure may be due to a busy machine, or may soon be fixed.
         memory.keep(report)
     return report
 
@@ -121,8 +121,8 @@ def _named(wanted: str, ros: RosInstallation, progress: Callable[[str], None]) -
 
 
 def _kept(report: TierReport) -> bool:
-    """Return whether a tier keeps what it promises: Landlock promises nothing about a network that it was given."""
-    promised = [name for name in REQUIRED if report.name != landlock.NAME or name != "net_egress"]
+    """Return whether a tier has the properties that it promises; Landlock does not promise network isolation."""
+    promised = [name for name in REQUIRED if report.name != tiers.LANDLOCK_NAME or name != "net_egress"]
     broken = [found for found in report.properties if found.name in promised and not found.holds]
     return bool(report.properties) and not broken and NO_EXCHANGE not in report.why
 
@@ -130,7 +130,7 @@ def _kept(report: TierReport) -> bool:
 def _refusal(tried: Sequence[TierReport]) -> EnvironmentFault:
     mine = [report for report in tried if not tiers.is_for_others(report.name)]
     found = "; ".join(f"{report.name}: {_shortly(report)}" for report in mine)
-    # The remedy of a tier for another user comes last: it asks for the most.
+    # The remedy of a tier for another user comes last, because it requires the most.
     remedies = [report.remedy for report in (*mine, *tried) if report.remedy]
     hint = remedies[0] if remedies else "grade doctor says what each tier lacks"
     wanted = ", ".join(REQUIRED)

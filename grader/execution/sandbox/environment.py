@@ -1,4 +1,4 @@
-"""The variables that worker and student processes start with; nothing of the caller's environment is among them."""
+"""Builds the environments of worker and student processes, without any variable of the caller's."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from grader.execution.sandbox.protocol import StudentProcess
 
 PACKAGE = Path(grader.__file__).resolve().parent
 
-# Worker and student must agree on these. With the default transports Fast DDS would look for a /dev/shm that the two do
-# not share, and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST would bring that transport back by itself: it must stay unset.
+# Worker and student must use the same values. With its default transports Fast DDS would use /dev/shm, which the two do
+# not share. ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST would enable that transport again, so it must stay unset.
 DDS_SETTINGS: Mapping[str, str] = {
     "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
@@ -22,7 +22,7 @@ DDS_SETTINGS: Mapping[str, str] = {
     "SKIP_DEFAULT_XML_FILE": "1",
 }
 
-# One arena and one thread per library: a node's memory and thread count then depend little on the machine's cores.
+# One malloc arena, and one thread per library, so that memory and threads of a node depend little on the processors.
 FEW_RESOURCES: Mapping[str, str] = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
@@ -35,8 +35,8 @@ def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
     """Return the variable that names a Fast DDS profile.
 
     Args:
-        folder: Where the process sees the profiles.
-        name: `NAME.xml` there is for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
+        folder: The folder at which the process sees the profiles.
+        name: `NAME.xml` is the profile for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
         distro: ROS release, e.g. `jazzy`.
     """
     if release_of(distro).fast_dds == 2:
@@ -45,7 +45,7 @@ def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
 
 
 def quick_discovery(host_folder: str | Path, runtime: PythonRuntime) -> dict[str, str]:
-    """Return the variable that makes Fast DDS repeat itself quickly; the profile lies in the `host` package."""
+    """Return the variable that makes Fast DDS repeat discovery quickly; the profile is in the host package."""
     return dds_profile(host_folder, "fastdds", distro_of(runtime.environment))
 
 
@@ -55,7 +55,7 @@ def distro_of(environment: Mapping[str, str]) -> str:
 
 
 def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
-    """Return what any child that uses ROS needs: the trusted worker as well as students' processes."""
+    """Return the variables that any process with ROS needs, workers and students' processes alike."""
     environment = {
         "PATH": "/usr/bin:/bin",
         "LANG": "C.UTF-8",
@@ -73,11 +73,11 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
 
 
 def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
-    """Return what a trusted worker needs: ROS, this package, and a folder for what ROS writes beside its work.
+    """Return the environment of a trusted worker, with ROS and this package.
 
     Args:
         runtime: Interpreter and ROS.
-        home: That folder.
+        home: A folder for files that ROS writes, such as logs.
     """
     environment = runtime_environment(runtime)
     python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
@@ -91,10 +91,10 @@ def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
 
 
 def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
-    """Return the whole environment of a student's process.
+    """Return the complete environment of a student's process.
 
     Args:
-        process: What is started; its own variables win.
+        process: The process to start; its own variables take precedence.
         home: A folder that the process may write to, as the process sees it.
     """
     return {
@@ -102,7 +102,7 @@ def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
         "PATH": "/usr/bin",
         "HOME": str(home),
         "ROS_LOG_DIR": str(home / "log"),
-        # An int in a float field is then an exception with a line instead of an abort.
+        # With this, an int in a float field raises an exception with a line, instead of aborting.
         "ROS_PYTHON_CHECK_FIELDS": "1",
         **process.environment,
     }

@@ -1,4 +1,4 @@
-"""Which files of this machine a student's process sees, and what of the grader it must not see."""
+"""Determines which files of this machine a student's process can see, and which of the grader's it must not see."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class View:
 
     Attributes:
         bound: Real files and folders, sorted, none inside another.
-        links: Symbolic links on the way to them, (where, target), sorted, none inside a bound folder.
+        links: Symbolic links on the way to them, (path, target), sorted, none inside a bound folder.
     """
 
     bound: tuple[Path, ...]
@@ -39,11 +39,11 @@ class View:
 
 
 def view_of(paths: Iterable[Path]) -> View:
-    """Return a view in which every path that exists can be opened under its own name.
+    """Return a view in which every existing path can be opened by its own name.
 
     Args:
         paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link
-            to a link still finds its way; a path that does not exist is left out.
+            to a link works; a path that does not exist is left out.
     """
     real: set[Path] = set()
     links: dict[Path, str] = {}
@@ -66,7 +66,7 @@ def _is_inside(path: Path, folders: Iterable[Path]) -> bool:
 
 
 def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
-    """Walk a path part by part and note each link passed; None if it leads nowhere."""
+    """Resolve a path part by part and note each link on the way; None if the path does not exist."""
     links: dict[Path, str] = {}
     done, to_do = Path("/"), list(PurePath(os.path.normpath(path)).parts[1:])
     passed = 0
@@ -89,9 +89,9 @@ def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
     return done, links
 
 
-# Where there is no user namespace, the kernel counts processes by user: students who run at the same time on one
-# machine need users of their own, or one fork bomb would take the others' threads. Numbers of 16 bits, since
-# containers map no others.
+# Without a user namespace, the kernel counts processes by user. Students that run at the same time on one machine need
+# different users, or a fork bomb would use up the threads of the others. User ids have 16 bits, because containers do
+# not map others.
 STUDENT_GROUP = 61234
 STUDENT_USERS = range(61234, 65234)
 TRIES = 1000
@@ -102,13 +102,13 @@ TAKEN = Path("/run/rclpy-grader.users")
 
 
 class StudentUsers:
-    """Hands out users that student processes may become, each to one process on this machine.
+    """Allocates users for student processes, each to one process on this machine.
 
-    A user stays taken until the process that asked for it ends. Where no note can be made of that, a user is only
-    unlikely to be another's.
+    A user stays allocated until the process that requested it ends. Without a file of locks, users are random, and two
+    processes are only unlikely to get the same one.
 
     Args:
-        taken: The file of locks, made if it is not there.
+        taken: The file of locks, created if it does not exist.
     """
 
     def __init__(self, taken: Path) -> None:
@@ -118,7 +118,7 @@ class StudentUsers:
         self._lock = threading.Lock()
 
     def next(self) -> int:
-        """Return a user that nobody else has."""
+        """Allocate a user that no other process has."""
         with self._lock:
             for _ in range(TRIES):
                 user = STUDENT_USERS.start + secrets.randbelow(len(STUDENT_USERS))
@@ -141,12 +141,12 @@ _USERS = StudentUsers(TAKEN)
 
 
 def some_user() -> int:
-    """Return a user that a student's process may become, and that no other grader on this machine uses."""
+    """Return a user for a student's process that no other grader on this machine uses."""
     return _USERS.next()
 
 
 def taken_users() -> tuple[Path, ...]:
-    """Return the file in which workers note the users they have taken, made if it is not there; nothing if neither."""
+    """Return the file in which workers lock their users, created if needed; empty if that is not possible."""
     with contextlib.suppress(OSError):
         os.close(os.open(TAKEN, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600))
         return (TAKEN,)
@@ -154,21 +154,21 @@ def taken_users() -> tuple[Path, ...]:
 
 
 def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
-    """Return the folders with rubrics and checks that would be seen through a folder that is shown."""
+    """Return the folders with rubrics and checks that are inside of a visible folder."""
     package = Path(grader.__file__).resolve().parent
     bound = tuple(bound)
-    # An editable installation keeps a copy of the rubrics among the packages, away from the code.
+    # An editable installation has a copy of the rubrics in site-packages, apart from the code.
     installed = {Path(sysconfig.get_path(name)).resolve() / "grader" for name in ("purelib", "platlib")}
     places = {package, *installed, *(folder.resolve() / "grader" for folder in runtime.python_paths)}
     return [place for place in sorted(places) if place.is_dir() and any(folder in place.parents for folder in bound)]
 
 
 def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
-    """Return what a worker sees: Python, ROS, the part of this package that it runs, and a folder for its work.
+    """Return the view of a worker: Python, ROS, the part of this package that it runs, and its working folder.
 
     Args:
         runtime: Interpreter and ROS.
-        folder: That folder; what is recorded is staged there.
+        folder: The working folder, which also contains the staged submissions.
     """
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
@@ -178,7 +178,7 @@ def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
 
 
 def make_readable(folder: Path) -> None:
-    """Let every user read a folder and what is in it; links are left alone."""
+    """Make a folder and its content readable for every user, without following links."""
     for path in (folder, *folder.rglob("*")):
         mode = path.lstat().st_mode
         wanted = 0o555 if stat.S_ISDIR(mode) else 0o444

@@ -1,4 +1,4 @@
-"""Remembers the self-tests of a login session in a file of the user's own; whatever is wrong with it, it is ignored."""
+"""Caches the results of self-tests for a login session in a private file of the user; an invalid file is ignored."""
 
 from __future__ import annotations
 
@@ -29,12 +29,11 @@ UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionE
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """The place of one tier's self-test.
+    """The cached self-test of one tier.
 
     Attributes:
-        file: A file in the user's own folder; None if there is no such folder.
-        key: Everything that a result depends on, by what it is, each as a digest: what was remembered under another
-            key is ignored.
+        file: A file in the user's private folder; None if there is no such folder.
+        key: A digest of each thing that the result depends on, by name; a result with another key is ignored.
     """
 
     file: Path | None
@@ -42,18 +41,18 @@ class Memory:
 
     @classmethod
     def of(cls, tier: str, ros: RosInstallation) -> Memory:
-        """Return the place for a tier, this machine as it is booted, this user and this ROS."""
+        """Return the cache entry for a tier, with this boot of the machine, this user and this ROS."""
         texts = {"sandbox": tier}
         for what, text in circumstances(ros):
             texts[what] = "\n".join((texts.get(what, ""), text))
         key = {what: _digest(text) for what, text in texts.items()}
         folder = own_folder()
-        # Several installations of one user are used in turn: each has a file of its own.
+        # A user may alternate between several installations, so each has its own file.
         installation = _digest(f"{Path(__file__)} {ros.runtime.executable} {ros.prefix}")[:12]
         return cls(folder / f"sandbox-{tier}-{installation}.json" if folder else None, key)
 
     def recall(self) -> TierReport | None:
-        """Return the self-test remembered, if there is one and the file is this user's alone."""
+        """Return the cached self-test, if there is one and only this user can write the file."""
         try:
             remembered = self._read()
             return report_from_json(remembered["report"]) if remembered["key"] == self.key else None
@@ -61,7 +60,7 @@ class Memory:
             return None
 
     def lapse(self) -> str:
-        """Return why no self-test is recalled, as a phrase; empty if one is."""
+        """Return why no cached self-test can be used, as a phrase; empty if one can."""
         if self.recall() is not None:
             return ""
         if self.file is None:
@@ -74,7 +73,7 @@ class Memory:
         return f"changed since: {', '.join(changed)}" if changed else "what is remembered cannot be used"
 
     def _read(self) -> Any:
-        """Return what the file holds; raises one of `UNUSABLE` if that is nothing or not this user's alone."""
+        """Read the file; raises one of `UNUSABLE` if it is invalid or other users may write it."""
         if self.file is None:
             raise FileNotFoundError
         descriptor = os.open(self.file, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -85,7 +84,7 @@ class Memory:
             return json.loads(file.read(LARGEST))
 
     def keep(self, report: TierReport) -> None:
-        """Remember a self-test, if that can be done."""
+        """Store a self-test, if possible."""
         if self.file is None:
             return
         draft = self.file.with_name(f".{secrets.token_hex(8)}")
@@ -97,7 +96,7 @@ class Memory:
 
 
 def report_from_json(values: object) -> TierReport:
-    """Return a report from what was remembered; raises ValueError, TypeError or KeyError if it is none."""
+    """Rebuild a report from the cache; raises ValueError, TypeError or KeyError if it is not valid."""
     if not isinstance(values, dict) or values["name"] not in TIERS:
         raise ValueError("a report of a tier")
     properties = tuple(Property(**found) for found in values.pop("properties"))
@@ -112,7 +111,7 @@ def report_from_json(values: object) -> TierReport:
 
 
 def own_folder() -> Path | None:
-    """Return a folder that only this user can write to, made if need be; None if there is none."""
+    """Return a folder that only this user can write to, created if needed; None if there is none."""
     given = os.environ.get("XDG_RUNTIME_DIR") or os.environ.get("XDG_CACHE_HOME")
     base = Path(given) if given else Path.home() / ".cache"
     folder = base / FOLDER
@@ -125,7 +124,7 @@ def own_folder() -> Path | None:
 
 
 def circumstances(ros: RosInstallation) -> Iterator[tuple[str, str]]:
-    """Yield what a self-test depends on, each with what it is; nothing that changes by itself while nothing does."""
+    """Yield the name and value of everything that a self-test depends on, without values that change for no reason."""
     yield "boot", _content("/proc/sys/kernel/random/boot_id")
     yield "user", f"{os.geteuid()} {os.getegid()}"
     for name in ("net", "user", "mnt", "pid"):

@@ -1,4 +1,4 @@
-"""Runs as a student's process inside a sandbox, tries what must fail and what must work, and says what it achieved.
+"""Runs as a student's process inside a sandbox, tries what must fail and what must work, and reports what succeeded.
 
 Usage: python -c SOURCE JSON; the object is that of `trial.probe_command`. Prints one JSON line, an object of property
 to what was achieved against it, empty if nothing was; then tries to outgrow its scratch folder, and prints `outgrown`
@@ -48,12 +48,12 @@ def main(request: dict[str, Any]) -> None:
     print(json.dumps(achieved), flush=True)  # noqa: T201 -- the answer
     if outgrows(request["scratch"]):
         print("outgrown", flush=True)  # noqa: T201
-    # Taking ROS down takes longer than everything else here.
+    # Shutting ROS down takes longer than everything else here.
     os._exit(0 if kept else 1)
 
 
 def works(attempt: Callable[..., Any], *arguments: Any) -> bool:
-    """Return whether an attempt is not refused."""
+    """Return whether an attempt succeeds."""
     try:
         attempt(*arguments)
     except (OSError, ValueError, OverflowError):
@@ -65,7 +65,7 @@ def works(attempt: Callable[..., Any], *arguments: Any) -> bool:
 
 
 def reads(request: dict[str, Any]) -> Iterator[str]:
-    """Open what is hidden."""
+    """Open hidden files."""
     for path in request["hidden"]:
         if works(os.listdir if os.path.isdir(path) else read, path):
             yield f"read {path}"
@@ -113,7 +113,7 @@ def status(name: str) -> int:
 
 
 def outgrows(size: int) -> bool:
-    """Write more than the scratch folder may hold, in several files; whoever is ended meanwhile does not return."""
+    """Write more than the scratch folder may hold, in several files; does not return if the process is killed."""
     block = bytes(1 << 20)
     try:
         for number in range(2 * (size >> 20)):
@@ -129,7 +129,7 @@ def outgrows(size: int) -> bool:
 
 
 def others(request: dict[str, Any]) -> set[int]:
-    """Return the numbers that other processes may have."""
+    """Return the pids that other processes may have."""
     seen = set()
     with contextlib.suppress(OSError):
         seen = {int(name) for name in os.listdir("/proc") if name.isdigit()}
@@ -137,7 +137,7 @@ def others(request: dict[str, Any]) -> set[int]:
 
 
 def sees(request: dict[str, Any]) -> Iterator[str]:
-    """Find the worker's secret, which its command line and environment hold."""
+    """Find the worker's secret, which is in its command line and environment."""
     secret = "".join(request["secret"]).encode()
     for process in sorted(others(request)):
         for name in ("cmdline", "environ"):
@@ -147,7 +147,7 @@ def sees(request: dict[str, Any]) -> Iterator[str]:
 
 
 def disturbs(request: dict[str, Any]) -> Iterator[str]:
-    """Aim at the worker; it says itself whether anything arrived."""
+    """Attack the worker, which checks itself whether anything had an effect."""
     worker = request["worker"]
     if worker == os.getpid():
         return
@@ -199,13 +199,13 @@ def send(
 
 
 def calls_out(request: dict[str, Any]) -> Iterator[str]:
-    """Send to what listens on the loopback address outside, which says itself whether anything arrived."""
+    """Send to a listener on the loopback address outside, which checks itself whether anything arrived."""
     works(send, "127.0.0.1", request["loopback"], socket.SOCK_DGRAM)
     return iter(())
 
 
 def opens_vsock(request: dict[str, Any]) -> Iterator[str]:
-    """Open a socket to the machine's hypervisor; no network namespace holds it back."""
+    """Open a socket to the machine's hypervisor, which a network namespace does not prevent."""
     del request
     if works(socket.socket, AF_VSOCK, socket.SOCK_STREAM):
         yield "opened AF_VSOCK"
@@ -232,7 +232,7 @@ def raises(which: int) -> bool:
 
 
 def hoards(request: dict[str, Any]) -> Iterator[str]:
-    """Map more memory than there is to be had."""
+    """Map more memory than the limit allows."""
     private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000  # MAP_NORESERVE: a small machine's refusal is no limit
     if raises(resource.RLIMIT_AS) or works(mmap.mmap, -1, request["memory"], private):
         yield f"mapped {request['memory'] >> 20} MiB"
@@ -277,7 +277,7 @@ def computes(request: dict[str, Any]) -> Iterator[str]:
 
 
 def exchange() -> Any:
-    """Send back what the worker's node sends, until it hangs up; return the node."""
+    """Send back what the worker's node sends, until it closes the connection; return the node."""
     import rclpy  # noqa: PLC0415 -- after the attempts: it starts threads
     from std_msgs.msg import String  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""What gives each property of a sandbox under each tier, and what to do about a tier that does not hold."""
+"""The mechanism behind each property of a sandbox in each tier, and the remedies for a tier that does not work."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _BY_TIER: Mapping[str, Mapping[str, str]] = {
 
 
 def mechanism(tier: str, name: str) -> str:
-    """Return what gives a property under a tier."""
+    """Return the mechanism that provides a property in a tier."""
     return _BY_TIER.get(tier, {}).get(name, NOTHING)
 
 
@@ -69,13 +69,13 @@ IN_CONTAINER = "start the container without a network: docker run --network none
 
 
 def install_command(package: str) -> str:
-    """Return the command that installs a package of the system."""
+    """Return the command that installs a system package."""
     installer = next((command for name, command in INSTALLERS.items() if shutil.which(name)), INSTALLERS["apt-get"])
     return f"{_sudo()}{installer} {package}"
 
 
 def remedy_for(report: TierReport) -> str:
-    """Return the command or action that would make a tier hold; empty if none is known."""
+    """Return the command or action that would make a tier work; empty if none is known."""
     if any(found.name == "net_egress" and not found.holds for found in report.properties):
         return IN_CONTAINER if confined() else ""
     if report.name.startswith("bubblewrap") and not report.properties:
@@ -84,7 +84,7 @@ def remedy_for(report: TierReport) -> str:
 
 
 def setting_command() -> str:
-    """Return the command that lets an ordinary user's bubblewrap make namespaces; empty if it may, or is confined."""
+    """Return the command that allows ordinary users to create namespaces; empty if they may, or in a container."""
     for name, bad, good in SETTINGS:
         path = Path("/proc/sys", *name.split("."))
         if path.is_file() and path.read_text(encoding="ascii").strip() == bad:
@@ -93,7 +93,7 @@ def setting_command() -> str:
 
 
 def confined() -> bool:
-    """Return whether a seccomp filter lies on this process, as containers have it."""
+    """Return whether this process has a seccomp filter, as in containers."""
     status = Path("/proc/self/status").read_text(encoding="utf-8", errors="replace")
     return any(line.split() == ["Seccomp:", "2"] for line in status.splitlines())
 

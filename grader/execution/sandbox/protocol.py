@@ -1,4 +1,4 @@
-"""The seam between recording and sandboxes: what every isolation tier offers."""
+"""The interface between recording and sandboxes, which every tier implements."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class StudentProcess:
-    """One student process to be started.
+    """One student process to start.
 
     Attributes:
         runtime: Interpreter and ROS.
-        host_folder: The folder of the `host` package, the only part of the grader that the process may read; None if it
-            is to read nothing of the grader.
-        submission: The staged copy; seen read-only by the process at `submission_seen_at`.
+        host_folder: The folder of the host package, the only part of the grader that the process may read; None if the
+            process may read no part of the grader.
+        submission: The staged copy, which the process sees read-only at `submission_seen_at`.
         arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/host/launcher.py")`; paths as the process
             sees them.
         environment: Variables beyond those of the sandbox and the runtime.
-        pass_fds: Descriptors the process inherits besides 0, 1 and 2, same numbers inside.
+        pass_fds: Descriptors that the process inherits besides 0, 1 and 2, with the same numbers.
     """
 
     runtime: PythonRuntime
@@ -44,13 +44,13 @@ class StudentProcess:
 
 @dataclass(frozen=True, slots=True)
 class WorkerView:
-    """What the trusted worker needs to see of this machine's files.
+    """The files of this machine that the trusted worker can see.
 
     Attributes:
-        read: Absolute files and folders, read-only; one that does not exist is left out.
+        read: Absolute paths of files and folders, read-only; one that does not exist is left out.
         hidden: Folders within them that it does not need.
-        own: Files and folders, read-only, that it needs all the same of what is hidden.
-        write: Folders that it may write to; what students' processes are to see of a submission lies in one.
+        own: Files and folders within the hidden ones that it does need, read-only.
+        write: Folders that it may write to; the submission that students' processes see is in one of them.
     """
 
     read: tuple[Path, ...]
@@ -61,16 +61,16 @@ class WorkerView:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A process ready for `subprocess.Popen`, once: what `opened_fds` lists is read by the start and then of no use.
+    """The arguments of `subprocess.Popen` for one process; not reusable, because the start consumes `opened_fds`.
 
-    Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches the grader and nobody else, and from
-    a thread that outlives it: the process dies with the thread that started it.
+    Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches only the grader, and from a thread
+    that outlives it: the kernel kills the process when the thread that started it ends.
 
     Attributes:
-        argv: Full argument list.
-        environment: The whole environment of the launched program.
-        pass_fds: Descriptors to be inherited.
-        opened_fds: Descriptors that the isolation opened for this start; the caller closes them afterwards.
+        argv: Complete list of arguments.
+        environment: Complete environment of the program.
+        pass_fds: Descriptors to inherit.
+        opened_fds: Descriptors that the tier opened for this start; the caller closes them afterwards.
     """
 
     argv: tuple[str, ...]
@@ -80,26 +80,26 @@ class Command:
 
 
 class Isolation(Protocol):
-    """One tier of isolation. Instances are plain values that survive a trip through JSON by their `name`."""
+    """One sandbox tier. A tier is sent to a worker by its `name`."""
 
     @property
     def name(self) -> str:
-        """Short name that reports show, e.g. `bubblewrap-root`."""
+        """Short name for reports, e.g. `bubblewrap-root`."""
         ...
 
     @property
     def shares_network(self) -> bool:
-        """Whether the worker's network is the caller's, where other graders and nodes may be."""
+        """Whether the worker uses the caller's network, where other graders and nodes may run."""
         ...
 
     @property
     def submission_seen_at(self) -> str:
-        """Absolute folder at which a student process sees its submission; empty if it sees it where it lies."""
+        """Absolute folder at which a student process sees its submission; empty if that is the real path."""
         ...
 
     @property
     def host_seen_at(self) -> str:
-        """Absolute folder at which a student process sees the `host` package; `launcher.py` lies in it."""
+        """Absolute folder at which a student process sees the host package, with `launcher.py`."""
         ...
 
     def worker_command(
@@ -113,12 +113,12 @@ class Isolation(Protocol):
 
         Args:
             argv: Program and arguments.
-            environment: Its whole environment.
-            pass_fds: Descriptors it inherits.
-            view: The files it sees, where the tier can hide any; None for all.
+            environment: Its complete environment.
+            pass_fds: Descriptors that it inherits.
+            view: The files that it sees, if the tier can hide files; None for all.
         """
         ...
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student process from inside the worker, sharing only its network."""
+        """Return the command that starts a student process inside the worker, which shares only its network."""
         ...

@@ -1,4 +1,4 @@
-"""The self-test of a tier: a probe that tries to break out of it, and what it achieved, property by property."""
+"""The self-test of a tier: runs a probe that tries to break out of it, and evaluates the result for each property."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ SIOCGIFADDR = 0x8915  # linux/sockios.h
 
 @dataclass(frozen=True, slots=True)
 class Bait:
-    """What the probe of one trial is tempted with.
+    """The bait for the probe of one trial.
 
     Attributes:
-        folder: Everything of the trial; deleted afterwards.
-        canary: A file beside the submission that everybody may read and write.
-        segment: A file in this machine's shared memory that everybody may read and write.
-        secret: What the worker's command line and environment hold.
+        folder: The folder of the trial; deleted afterwards.
+        canary: A file next to the submission that every user may read and write.
+        segment: A file in this machine's shared memory that every user may read and write.
+        secret: A text in the worker's command line and environment.
         sinks: Listeners on this machine's addresses other than the loopback.
         loopback: A listener on the loopback address.
     """
@@ -57,11 +57,11 @@ class Bait:
 
 
 def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
-    """Start a probe inside a tier and return what the tier is worth; about half a second.
+    """Run a probe inside a tier and return the report on the tier; takes about half a second.
 
     Args:
         isolation: The tier.
-        ros: What students' processes will run with.
+        ros: The ROS installation that students' processes will use.
     """
     letter = TIERS[isolation.name]
     with laid_bait() as bait:
@@ -78,14 +78,14 @@ def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
 
 
 def property_of(tier: str, name: str, achieved: list[str]) -> Property:
-    """Return a property from what was achieved against it."""
+    """Evaluate a property from what the probe achieved against it."""
     if not achieved:
         return Property(name, holds=True, mechanism=mechanism(tier, name))
     return Property(name, holds=False, mechanism=mechanism(tier, name), found=", ".join(dict.fromkeys(achieved))[:300])
 
 
 def why_not(contained: tuple[Property, ...]) -> str:
-    """Return why a tier with these properties is not to be used; empty if it may."""
+    """Return why a tier with these properties cannot be used; empty if it can."""
     if any(NO_EXCHANGE in found.found for found in contained if found.name == EXCHANGE):
         return NO_EXCHANGE
     return "; ".join(map(str, missing(contained)))
@@ -95,7 +95,7 @@ def why_not(contained: tuple[Property, ...]) -> str:
 
 
 def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
-    """Run the trial and return its answer, empty if there is none, and why there is none."""
+    """Run the trial and return its answer, or an empty one with the reason."""
     submission = bait.folder / "submission"
     request = {
         "isolation": isolation.name,
@@ -136,20 +136,20 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
 
 
 def environment(ros: RosInstallation, bait: Bait) -> Mapping[str, str]:
-    """Return the environment of the worker of a trial, which holds a secret as a worker's may."""
+    """Return the environment of a trial's worker, which contains a secret, as a real worker's may."""
     variables = worker_environment(ros.runtime, bait.folder)
     return {**variables, "PATH": os.environ.get("PATH", variables["PATH"]), "PROBE_SECRET": bait.secret}
 
 
 def asked_of_probe(bait: Bait) -> dict[str, Any]:
-    """Return what the supervisor tells the probe; the worker adds the rest."""
+    """Return the supervisor's part of the probe's arguments; the worker adds the rest."""
     hidden = (bait.canary, PACKAGE / "core" / "report.py", PACKAGE / "judging" / "__init__.py", Path("/etc/passwd"))
     return {
         "hidden": [str(path) for path in hidden],
         "closed": [*CLOSED, str(bait.folder)],
         "files": [str(bait.canary)],
         "segments": [str(bait.segment)],
-        # In two halves: the probe's own command line is to be found by nobody.
+        # In two halves, so that the probe does not find the secret in its own command line.
         "secret": [bait.secret[:16], bait.secret[16:]],
         "sinks": [sink.getsockname()[:2] for sink in bait.sinks if sink.type == socket.SOCK_STREAM],
         "loopback": bait.loopback.getsockname()[1],
@@ -161,7 +161,7 @@ def asked_of_probe(bait: Bait) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def laid_bait() -> Iterator[Bait]:
-    """Lay out bait, and clear it away."""
+    """Set up the bait for the block, and remove it."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="grade-probe-")))
         folder.chmod(0o755)
@@ -202,7 +202,7 @@ def address_of(interface: str) -> str:
 
 
 def noticed(bait: Bait, *, outgrown: bool) -> Iterator[tuple[str, str]]:
-    """Yield what the bait itself shows, by property: whatever the probe says."""
+    """Yield what the bait itself shows, by property, independent of the probe's answer."""
     with contextlib.suppress(BlockingIOError):
         if bait.loopback.recv(16):
             yield "dds_private", "programs outside share its loopback address"

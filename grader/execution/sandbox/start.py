@@ -1,14 +1,15 @@
-"""Starts a program without the help of namespaces: limits, a throw-away folder, and walls that the kernel gives anyone.
+"""Starts a program in a sandbox without namespaces: limits, a temporary folder, Landlock and seccomp.
 
-Usage: start.py JSON PROGRAM [ARGUMENT ...]. The object has `folder`, the working directory; `made`, whether it is to be
-made before the start and deleted after the end; `scratch`, the bytes it may hold then, 0 for any number; `limits`, by
-their names in `resource`; `user`, [user, group] to become, or null; `processes`, how many processes and threads may be
-added to those that the user has already, 0 for any number; and `walls`, null or an object of `read` and `devices`,
-paths that may be read, or also written; `hidden`, folders among them that may not; `tcp`, whether TCP is allowed;
-`reach`, whether folders that are closed to the user are on the way; `filter`, a seccomp program in hexadecimal.
+Usage: start.py JSON PROGRAM [ARGUMENT ...]. The object has `folder`, the working directory; `made`, whether to create
+it before the start and delete it after the end; `scratch`, its maximum size in bytes if it is created, 0 for unlimited;
+`limits`, by their names in `resource`; `user`, [user, group] to run as, or null; `processes`, how many processes and
+threads may be added to those that the user has already, 0 for unlimited; and `walls`, null or an object of `read` and
+`devices`, paths that may be read, or also written; `hidden`, folders among them that may not be read; `tcp`, whether
+TCP is allowed; `reach`, whether the paths lead through folders that are closed to the user; `filter`, a seccomp program
+in hexadecimal.
 
-It imports nothing of grader, since it runs before anything of it can be found. Landlock's calls and rights: Linux,
-Documentation/userspace-api/landlock.rst; the filter: Documentation/userspace-api/seccomp_filter.rst.
+It does not import grader, because it runs before grader can be found. For Landlock's calls and rights see Linux,
+Documentation/userspace-api/landlock.rst; for the filter Documentation/userspace-api/seccomp_filter.rst.
 """
 
 # It starts before every student process, and pathlib would be half of its imports.
@@ -60,12 +61,12 @@ LOOK_S, MOST_FILES = 0.05, 10_000
 
 
 def main(arguments: list[str]) -> None:
-    """Prepare this process and become the program."""
+    """Prepare this process and execute the program."""
     request: dict[str, Any] = json.loads(arguments[0])
     system = ctypes.CDLL(None, use_errno=True)
     parent = os.getppid()
     if os.getsid(0) != os.getpid():
-        # Fails for the leader of a group, whose group is then as good as a session of its own.
+        # Fails for the leader of a process group, but such a group serves the same purpose as a session.
         with contextlib.suppress(PermissionError):
             os.setsid()
     enter_folder(request)
@@ -77,12 +78,12 @@ def main(arguments: list[str]) -> None:
     rules = ruleset(system, walls, request["folder"]) if walls else -1
     if request["user"]:
         become(system, *request["user"], reach=bool(walls and walls["reach"]))
-    # Changing the user forgets this: it comes after.
+    # Changing the user resets this, so it has to come afterwards.
     call(system.prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
     if walls:
-        wall_in(system, rules, bytes.fromhex(walls["filter"]))
+        restrict(system, rules, bytes.fromhex(walls["filter"]))
     os.execv(arguments[1], arguments[1:])  # noqa: S606 -- becoming the program is the purpose
 
 
@@ -90,7 +91,7 @@ def main(arguments: list[str]) -> None:
 
 
 def enter_folder(request: dict[str, Any]) -> None:
-    """Make the folder, if it is to be made, and go there."""
+    """Create the folder, if requested, and change to it."""
     folder = request["folder"]
     if not request["made"]:
         os.chdir(folder)
@@ -104,14 +105,14 @@ def enter_folder(request: dict[str, Any]) -> None:
 
 
 def limit(which: int, value: int) -> None:
-    """Lower a limit; one that is lower already stays."""
+    """Lower a limit, unless it is already lower."""
     _, most = resource.getrlimit(which)
     value = value if most == resource.RLIM_INFINITY else min(value, most)
     resource.setrlimit(which, (value, value))
 
 
 def running() -> int:
-    """Return how many processes and threads this user has: the kernel counts them together."""
+    """Return how many processes and threads this user has, which the kernel counts together."""
     count, user = 0, os.getuid()
     for process in filter(str.isdigit, os.listdir("/proc")):
         with contextlib.suppress(OSError):
@@ -121,10 +122,10 @@ def running() -> int:
 
 
 def clean_up_after_end(folder: str, scratch: int) -> None:
-    """Leave a small process behind that ends what this one started and deletes the folder, however this one ends.
+    """Start a small process that kills what this one has started and deletes the folder, however this one ends.
 
-    It also ends this one after its parent, whatever the program thinks of that, and where the folder outgrows its size
-    if that is not 0.
+    It also kills this process when its parent ends, even if the program tries to prevent that, and when the folder
+    exceeds its size, if that is not 0.
     """
     process = os.getpid()
     watched = [os.pidfd_open(process), os.pidfd_open(os.getppid())]
@@ -134,7 +135,8 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
         for descriptor in watched:
             os.close(descriptor)
         return
-    # Nobody's child and in nobody's session: what kills the others must not keep the folder from being deleted.
+    # It has its own session and another parent, so that killing the others does not prevent it from deleting the
+    # folder.
     os.setsid()
     if os.fork():
         os._exit(0)
@@ -144,7 +146,7 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
     os.closerange(2, os.sysconf("SC_OPEN_MAX"))
     while not select.select([0, 1], [], [], LOOK_S if scratch else None)[0]:
         if outgrown(folder, scratch):
-            # Told apart from every other end; a program that catches it gains nothing.
+            # The signal distinguishes this end from all others; a program gains nothing by catching it.
             with contextlib.suppress(OSError):
                 os.kill(process, OUTGROWN)
             select.select([0, 1], [], [], LOOK_S)
@@ -155,13 +157,13 @@ def clean_up_after_end(folder: str, scratch: int) -> None:
 
 
 def end_group(leader: int) -> None:
-    """End a process and everything in its group."""
+    """Kill a process and everything in its group."""
     with contextlib.suppress(OSError):
         os.killpg(leader, signal.SIGKILL)
 
 
 def outgrown(folder: str, size: int) -> bool:
-    """Return whether the files of a folder take more than so many bytes, or are too many to count."""
+    """Return whether the files in a folder exceed a size, or are too many to count."""
     used = 0
     for number, entry in enumerate(entries(folder)):
         with contextlib.suppress(OSError):
@@ -186,13 +188,13 @@ def entries(folder: str) -> Iterator[os.DirEntry[str]]:
 
 
 def become(system: Any, user: int, group: int, *, reach: bool) -> None:
-    """Become another user without privileges.
+    """Change to another user without privileges.
 
     Args:
         system: The C library.
-        user: Its number.
-        group: Its only group.
-        reach: Whether to keep the privilege to enter folders that are closed to it; Landlock still says which.
+        user: User id.
+        group: Id of its only group.
+        reach: Whether to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
     """
     for capability in range(LAST_CAPABILITY + 1):
         if capability != CAP_DAC_READ_SEARCH or not reach:
@@ -210,17 +212,17 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
         checked(raised, "an ambient capability")
 
 
-# --- walls ---
+# --- Landlock and seccomp ---
 
 
 def landlock_version(system: Any = None) -> int:
-    """Return which version of Landlock this kernel has; 0 if none, or if it is switched off."""
+    """Return the Landlock version of this kernel; 0 if it has none or it is disabled."""
     system = system or ctypes.CDLL(None, use_errno=True)
     return max(0, call(system.syscall, CREATE_RULESET, None, 0, ASK_VERSION))
 
 
 def ruleset(system: Any, walls: dict[str, Any], folder: str) -> int:
-    """Return a descriptor of the rules: what may be read, and the folder that may be written to."""
+    """Create the Landlock rules, with readable paths and the writable folder, and return their descriptor."""
     version = landlock_version(system)
     if version < 1:
         raise OSError("Landlock: expected version 1 or newer, found none")
@@ -238,12 +240,12 @@ def ruleset(system: Any, walls: dict[str, Any], folder: str) -> int:
 
 
 def allow(system: Any, rules: int, path: str, rights: int, hidden: tuple[str, ...]) -> None:
-    """Allow rights on a file, or on a folder and everything below it but the hidden folders."""
+    """Allow rights on a file, or on a folder and everything below it except the hidden folders."""
     if not os.path.exists(path) or path in hidden:
         return
     is_folder = os.path.isdir(path)
     if is_folder and any(place.startswith(path.rstrip("/") + "/") for place in hidden):
-        # Rights go down to everything below, and names are no secret.
+        # Rights extend to everything below; file names are not secret.
         add_rule(system, rules, path, rights & READ_DIR)
         with os.scandir(path) as found:
             for entry in found:
@@ -254,7 +256,7 @@ def allow(system: Any, rules: int, path: str, rights: int, hidden: tuple[str, ..
 
 
 def add_rule(system: Any, rules: int, path: str, rights: int) -> None:
-    """Add one rule; the path is followed through links."""
+    """Add one rule; links in the path are followed."""
     place = os.open(path, os.O_PATH | os.O_CLOEXEC)
     try:
         rule = struct.pack("=Qi", rights, place)
@@ -263,8 +265,8 @@ def add_rule(system: Any, rules: int, path: str, rights: int) -> None:
         os.close(place)
 
 
-def wall_in(system: Any, rules: int, program: bytes) -> None:
-    """Put the walls around this process for good."""
+def restrict(system: Any, rules: int, program: bytes) -> None:
+    """Apply Landlock and the seccomp filter to this process, irrevocably."""
     checked(call(system.prctl, NO_NEW_PRIVILEGES, 1, 0, 0, 0), "no new privileges")
     checked(call(system.syscall, RESTRICT_SELF, rules, 0), "Landlock")
     os.close(rules)
@@ -272,7 +274,7 @@ def wall_in(system: Any, rules: int, program: bytes) -> None:
 
 
 def load_filter(system: Any, program: bytes) -> None:
-    """Load a seccomp program, with the number of this process where it asks for it."""
+    """Load a seccomp program, with its placeholder for the pid replaced by that of this process."""
     words = list(struct.iter_unpack("=HBBI", program))
     own = os.getpid()
     given = {OWN_PROCESS: own, -OWN_PROCESS & 0xFFFFFFFF: -own & 0xFFFFFFFF}
@@ -283,12 +285,12 @@ def load_filter(system: Any, program: bytes) -> None:
 
 
 def call(function: Any, *arguments: int | bytes | None) -> int:
-    """Call the C library with numbers of the width of a register, as calls with any number of arguments need."""
+    """Call the C library with register-sized integers, as variadic functions require."""
     return int(function(*(ctypes.c_long(value) if isinstance(value, int) else value for value in arguments)))
 
 
 def checked(result: int, what: str) -> int:
-    """Return the result of a call, or raise what went wrong."""
+    """Return the result of a call, or raise its errno as OSError."""
     if result < 0:
         error = ctypes.get_errno()
         raise OSError(error, f"{what}: {os.strerror(error)}")

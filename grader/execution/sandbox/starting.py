@@ -1,4 +1,4 @@
-"""Commands that go through `start.py`: limits and walls for a process that no namespace surrounds."""
+"""Builds commands that go through `start.py`, which sandboxes and limits a process without namespaces."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from grader.execution.sandbox.start import landlock_version
 HERE = Path(__file__).parent
 HOST = PACKAGE / "student_host"
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
-#: From this version on Landlock has a say over signals.
+#: The first Landlock version that restricts signals.
 WITH_SIGNALS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Where a walled process stands.
+    """The surroundings of a sandboxed process.
 
     Attributes:
-        scratch: The folder that its folder is made in; any user may enter it.
-        loopback: Whether Fast DDS has to be kept to the loopback address, because the network is shared with others.
-        as_root: Whether this process is root: the student's then becomes another user.
+        scratch: The folder in which its own folder is created; any user may enter it.
+        loopback: Whether to restrict Fast DDS to the loopback address, because the network is shared.
+        as_root: Whether this process is root; the student's then runs as another user.
     """
 
     scratch: Path
@@ -85,7 +85,7 @@ def require_domain(process: StudentProcess, tier: str) -> None:
         raise HarnessError(f"isolation {tier}: expected ROS_DOMAIN_ID for a student's process, found none")
 
 
-def require_walls() -> None:
+def require_landlock() -> None:
     """Raise EnvironmentFault if this kernel has no Landlock or this processor is unknown to the filter."""
     if not seccomp.supports(platform.machine()):
         raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
@@ -96,7 +96,7 @@ def require_walls() -> None:
         )
 
 
-def walled_command(process: StudentProcess, limits: Limits, ground: Ground) -> Command:
+def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -> Command:
     """Return the command of a student's process behind Landlock and a filter, in the caller's own namespaces.
 
     As root the process becomes another user, and the staged copy is made readable by everyone.

@@ -1,4 +1,4 @@
-"""The worker of a self-test: starts a probe as it would start a student, talks to it over DDS, and notes what it felt.
+"""The worker of a self-test: starts a probe like a student's process, exchanges messages, and records its effects.
 
 Usage: python -m grader.execution.sandbox.trial JSON, with an object of `isolation`, `runtime`, `submission` and a
 file `staged` in it, `domain`, and `probe`, what the probe is to try. Prints one JSON line: `achieved`, by property;
@@ -36,7 +36,7 @@ EXCHANGE, NO_EXCHANGE = "dds_private", "no ROS message came back"
 
 
 def main() -> None:
-    """Conduct the trial that the command line describes."""
+    """Run the trial that the command line describes."""
     request: dict[str, Any] = json.loads(sys.argv[1])
     segment = Path("/dev/shm") / f"grade-probe-{os.getpid()}"  # noqa: S108
     segment.write_bytes(b"segment")
@@ -46,7 +46,7 @@ def main() -> None:
     finally:
         segment.unlink()
     print(json.dumps(answer), flush=True)  # noqa: T201 -- the answer
-    # Taking ROS down takes longer than everything else here.
+    # Shutting ROS down takes longer than everything else here.
     os._exit(0)
 
 
@@ -80,7 +80,7 @@ def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
 
 
 def condition() -> Mapping[str, object]:
-    """Return what of this process another one could change."""
+    """Return the properties of this process that another process could change."""
     return {
         "limit": resource.getrlimit(resource.RLIMIT_MSGQUEUE),
         "priority": os.getpriority(os.PRIO_PROCESS, 0),
@@ -129,7 +129,7 @@ def exchange(process: subprocess.Popen[bytes], domain: int) -> tuple[bool, Any]:
     forth = node.create_publisher(String, "probe_forth", 10)
     deadline, again = time.monotonic() + EXCHANGE_S, 0.0
     while nonce not in heard and process.poll() is None and (now := time.monotonic()) < deadline:
-        # Whoever is not matched yet loses what is sent.
+        # An endpoint that is not matched yet does not receive messages.
         if now >= again and forth.get_subscription_count():
             forth.publish(String(data=nonce))
             again = now + AGAIN_S

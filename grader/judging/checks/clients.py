@@ -9,8 +9,7 @@ from typing import Any, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
-from grader.core.names import Pattern
-from grader.core.quantities import NS_PER_S, DurationNs, seconds
+from grader.core.quantities import NS_PER_S, DurationNs, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT, complained
 from grader.judging.findings import (

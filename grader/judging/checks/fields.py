@@ -10,8 +10,7 @@ from typing import Any, Literal
 
 from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
-from grader.core.names import Formula
-from grader.core.quantities import SLACK, seconds, within
+from grader.core.quantities import SLACK, Formula, seconds, within
 from grader.core.trace import Message, Trace
 from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met

@@ -10,8 +10,7 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from grader.core.exercise import Finding, Location
-from grader.core.names import Pattern
-from grader.core.quantities import DurationNs, seconds, within
+from grader.core.quantities import DurationNs, Pattern, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.findings import (
     explain_fault,

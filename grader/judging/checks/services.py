@@ -9,8 +9,7 @@ from typing import Any
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
-from grader.core.names import Pattern, ServiceType
-from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
+from grader.core.quantities import NS_PER_S, DurationNs, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
