@@ -1,4 +1,4 @@
-"""Explanations of criteria and checks, as text and as JSON."""
+"""Renders explanations of criteria and checks, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _VALUE = 32
 
 
 def render_explanations(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
-    """Return explanations as text, one after the other, no line longer than `width` where words allow it."""
+    """Return explanations as text, one after the other, no line longer than `width` if words allow it."""
     parts = [_criterion(e, width) if isinstance(e, CriterionExplanation) else _check(e, width) for e in found]
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
 
@@ -34,7 +34,7 @@ def explanations_to_json(found: Sequence[CriterionExplanation | CheckExplanation
 
 
 def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
-    """Return the checks among explanations as a list: name, and what it asks."""
+    """Return the checks among the explanations as a list: name and purpose."""
     checks = [e for e in found if isinstance(e, CheckExplanation)]
     column = max((len(e.name) for e in checks), default=0) + 2
     lines = (line for e in checks for line in _wrapped(f"{e.name:<{column}}", shown(e.asks), width, after=column))

@@ -1,4 +1,4 @@
-"""The live ROS graph as rqt_graph would draw it, in text and as a Mermaid flowchart."""
+"""Draws the live ROS graph like rqt_graph, as text and as a Mermaid flowchart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.reporting.escape import mermaid_label, shown
 
 #: Topics that every node has.
 _EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
-#: Stands for a side of a topic where no node is.
+#: Stands for a side of a topic without nodes.
 NOBODY = "(nobody)"
 #: More edges than this are counted, not drawn.
 MOST_EDGES = 40
@@ -21,10 +21,10 @@ Edge = tuple[str, str, str, str]
 
 
 def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
-    """Return the lines of the drawing, each edge on one line, or on two where `width` columns do not hold it.
+    """Return the lines of the drawing; an edge takes one line, or two if it is wider than `width` columns.
 
-    A topic that only one side knows leads from or to `(nobody)`; a topic whose two sides disagree on the type is
-    marked, for no message goes through it.
+    A topic with only one side leads from or to `(nobody)`. A topic whose two sides have different types is marked,
+    because no message passes.
     """
     edges = graph_edges(graph)
     lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
@@ -38,7 +38,7 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
 
 
 def service_edges(graph: GraphSnapshot) -> list[tuple[str, str, str]]:
-    """Return every client with every server that it may call, and those that have nobody; without parts of actions."""
+    """Return every client with each server that it may call or with nobody, without the parts of actions."""
     ends = [end for end in graph.services if not _hidden(end.service)]
     clients = [end for end in ends if end.kind == "client"]
     servers = [end for end in ends if end.kind == "service"]
@@ -60,12 +60,12 @@ def _called(client: str, service: str, server: str) -> str:
 
 
 def graph_edges(graph: GraphSnapshot) -> list[Edge]:
-    """Return every edge once: source node, topic, target node, and what keeps messages from going through it."""
+    """Return every edge once: source node, topic, target node, and what prevents messages from passing."""
     return list(dict.fromkeys(_edges(graph)))
 
 
 def lonely_nodes(graph: GraphSnapshot) -> list[str]:
-    """Return the nodes that no edge joins."""
+    """Return the nodes without edges."""
     joined = {name for source, _, target, _ in graph_edges(graph) for name in (source, target)}
     return [node for node in graph.nodes if node not in joined]
 
@@ -106,7 +106,7 @@ _MERMAID_NAME_LIMIT = 100
 
 
 def draw_mermaid(graph: GraphSnapshot) -> str:
-    """Return the lines of a flowchart; an edge that carries no message because the types differ is dotted."""
+    """Return the lines of a flowchart; an edge without messages, because the types differ, is dotted."""
     edges = graph_edges(graph)
     kept, left_out = edges[:MOST_EDGES], len(edges) - MOST_EDGES
     drawing = _Drawing()
@@ -121,7 +121,7 @@ def draw_mermaid(graph: GraphSnapshot) -> str:
 
 
 class _Drawing:
-    """The boxes drawn so far; names stand only in their labels, never where they could be syntax."""
+    """The boxes drawn so far; names appear only in labels, where they cannot be syntax."""
 
     def __init__(self) -> None:
         self.boxes: list[str] = []

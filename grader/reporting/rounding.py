@@ -1,4 +1,4 @@
-"""Whole points for platforms that know no others: rounded so that the rows still add up."""
+"""Rounds scores to whole points so that the rows still add up."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from math import floor
 
 
 def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> list[tuple[int, int]]:
-    """Return score and maximum of each row as whole numbers by the method of the largest remainder.
+    """Return whole-number score and maximum of each row, by the largest remainder method.
 
-    The totals are the exact ones rounded, half a point up, and the rows add up to them. No row earns more than its
-    maximum, and only a score without any loss is shown as the full one.
+    The totals are the exact ones rounded half up, and the rows add up to them. No row earns more than its maximum, and
+    only a score without any loss becomes the full one.
     """
     tops = largest_remainder(max_scores, _rounded(sum(max_scores, Fraction(0))), [floor(m) + 1 for m in max_scores])
     exact = sum(scores, Fraction(0))
@@ -23,15 +23,15 @@ def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> 
 
 
 def largest_remainder(shares: Sequence[Fraction], total: int, most: Sequence[int]) -> list[int]:
-    """Return whole numbers near `shares` that add up to `total`.
+    """Return whole numbers close to `shares` that add up to `total`.
 
-    Each share is rounded down, and what is missing goes to the largest remainders, the first of equals first; where the
-    shares together are more than the total, the smallest remainders give.
+    Each share is rounded down, and the missing points go to the largest remainders, the first of equal ones first. If
+    the rounded shares exceed the total, the smallest remainders lose points.
 
     Args:
-        shares: At least 0.
+        shares: Exact values, at least 0.
         total: At most the sum of `most`.
-        most: The most each may get.
+        most: Maximum of each row.
     """
     found = [min(floor(share), top) for share, top in zip(shares, most, strict=True)]
     by_remainder = sorted(range(len(found)), key=lambda row: (found[row] - shares[row], row))

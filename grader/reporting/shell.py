@@ -1,4 +1,4 @@
-"""Commands as a shell reads them."""
+"""Quotes commands for a shell."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 
 def command_line(words: Sequence[str]) -> str:
-    """Return words as one line that a POSIX shell, or bash where a name is unprintable, reads as they are."""
+    """Return words as one line for a POSIX shell, or for bash where a word is unprintable."""
     return " ".join(map(quoted, words))
 
 
 def quoted(word: str) -> str:
-    """Return a word as a shell reads it; one with unprintable characters in bash's own quotes, on one line."""
+    """Return a word quoted for a shell, on one line; unprintable characters use the quotes of bash."""
     if word.isprintable():
         return shlex.quote(word)
     return f"$'{''.join(map(_in_bash_quotes, word))}'"
@@ -23,7 +23,7 @@ def _in_bash_quotes(character: str) -> str:
         return f"\\{character}"
     if character.isprintable():
         return character
-    # Bytes that are no UTF-8 came in as lone surrogates; one that stands for no byte has no better name.
+    # Bytes that are not UTF-8 arrive as lone surrogates; other surrogates are written as they are.
     return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", _surrogates(character)))
 
 

@@ -1,4 +1,4 @@
-"""The values that an exercise has for one student, as a part of a task sheet and as JSON."""
+"""Renders one student's values of an exercise, as part of a task sheet and as JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SCHEMA = "grader/variant/v1"
 
 
 def render_sheet(exercise: Exercise) -> str:
-    """Return the values as a table in Markdown; an exercise that is the same for everybody says so."""
+    """Return the values as a Markdown table, or a sentence if the exercise is the same for everybody."""
     title = f"## Exercise {markdown(exercise.number)}: {markdown(exercise.title)}\n"
     variant = exercise.variant
     if variant is None:

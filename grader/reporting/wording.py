@@ -1,4 +1,4 @@
-"""The words that every format uses: outcomes, points, places, faults, and what a reader must know first."""
+"""Words that all formats share: outcomes, points, places, faults, and warnings that belong to the score."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from grader.reporting.shell import quoted
 #: More faults or notes than this are counted, not shown.
 MOST_FAULTS = 10
 MOST_NOTES = 20
-#: Longest name of a submission, a scenario or a node that is shown.
+#: Longest name of a submission, a scenario or a node that is shown, in characters.
 NAME_LIMIT = 100
-# No path is longer; a word that was cut would make another command.
+# No path is longer; cutting a word would change the command.
 _WORD_LIMIT = 20_000
 _DIGEST_LENGTH = len("sha256:") + 12
-#: Words carry the outcome, so that nothing is lost without colour.
+#: Words state the outcome, so that nothing is lost without colour.
 OUTCOME_WORDS = {
     Outcome.MET: "met",
     Outcome.PARTLY: "partly",
@@ -37,17 +37,17 @@ _WHAT_HAPPENED = {
     "hung": "did not come back",
     "killed": "was ended",
 }
-# The first frames say where it began, the last where it broke; a deep recursion repeats itself between.
+# The first frames show where the failure began, the last where it ended; deep recursion repeats in between.
 _FIRST_FRAMES, _LAST_FRAMES = 3, 5
 
 
 def points(value: Fraction) -> str:
-    """Return points with two digits at most, and none where they would be zero."""
+    """Return points with at most two decimals, and none if they are zero."""
     return f"{float(value):.2f}".rstrip("0").rstrip(".")
 
 
 def headline(report: Report) -> str:
-    """Return whose report it is and the score; safe to show as a line of text."""
+    """Return the submission's name and the score; safe to show as a line of text."""
     return f"{shown(report.name, limit=NAME_LIMIT)}: {score_line(report)}"
 
 
@@ -64,7 +64,7 @@ def exercise_line(exercise: ExerciseReport) -> str:
 
 
 def warnings(report: Report) -> list[str]:
-    """Return what must be read with the score: that the report is partial or not final, or had no walls."""
+    """Return warnings that belong to the score: the report is partial or not final, or there was no sandbox."""
     said = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
@@ -74,7 +74,7 @@ def warnings(report: Report) -> list[str]:
 
 
 def summary(report: Report) -> str:
-    """Return how many criteria came to which outcome."""
+    """Return how many criteria have each outcome."""
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     counts = Counter(verdict.outcome for verdict in verdicts)
     parts = [f"{counts[outcome]} {word}" for outcome, word in OUTCOME_WORDS.items() if counts[outcome]]
@@ -83,12 +83,12 @@ def summary(report: Report) -> str:
 
 
 def reason(verdict: Verdict) -> str:
-    """Return a verdict's reason; of a blocked one only what it needs. Not yet safe to show."""
+    """Return a verdict's reason; for a blocked criterion, only what it needs. Not yet safe to show."""
     return verdict.reason.removeprefix(NOT_JUDGED) if verdict.outcome is Outcome.BLOCKED else verdict.reason
 
 
 def explanation(verdict: Verdict) -> list[str]:
-    """Return why a verdict is what it is, what to do and where; each safe to show as a line of text."""
+    """Return the reason, the hint and the place of a verdict; each safe to show as a line of text."""
     said = [shown(reason(verdict))]
     if verdict.hint:
         said.append(f"hint: {shown(verdict.hint)}")
@@ -111,7 +111,7 @@ def opening(report: Report) -> list[str]:
 
 
 def remarks(exercise: ExerciseReport) -> list[str]:
-    """Return what an exercise's criteria do not say: faults, clock and notes; each safe to show as a line of text."""
+    """Return faults, clock and notes of an exercise; each safe to show as a line of text."""
     faults = [f"fault: {happened(fault)}: {shown(fault.text)}" for fault in exercise.faults]
     notes = [f"note: {shown(note)}" for note in exercise.notes]
     clock_note = f"note: judged on the wall clock: {shown(exercise.clock_reason)}"
@@ -123,7 +123,7 @@ def remarks(exercise: ExerciseReport) -> list[str]:
 
 
 def ending(report: Report) -> list[str]:
-    """Return what gives the report again, the command last; each safe to show as a line of text."""
+    """Return what reproduces the report, the command last; each safe to show as a line of text."""
     rows = [f"{name}: {value}" for name, value in reproduction(report)]
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
 
@@ -134,12 +134,12 @@ def _capped(lines: list[str], most: int, what: str) -> list[str]:
 
 
 def place(file: str, line: int) -> str:
-    """Return a place as people click on it; safe to show as a line of text."""
+    """Return a place in the form that terminals make clickable; safe to show as a line of text."""
     return f"{shown(file)}:{line}" if line else shown(file)
 
 
 def happened(fault: ReportedFault) -> str:
-    """Return what happened where and when, without the fault's own words; safe to show as a line of text."""
+    """Return what happened where and when, without the text of the fault; safe to show as a line of text."""
     what = _WHAT_HAPPENED.get(fault.kind, shown(fault.kind))
     when = f" at t = {seconds(fault.t_ns):.3f} s" if fault.t_ns else ""
     where = place(fault.file, fault.line) or "the node"
@@ -156,7 +156,7 @@ def frames(all_frames: Sequence[str]) -> list[str]:
 
 
 def versions(report: Report) -> str:
-    """Return what the report was made with."""
+    """Return the versions that made the report."""
     made_with = report.environment
     return (
         f"grader {made_with.grader}, rclpy {made_with.rclpy} ({made_with.ros_distro}), "
@@ -174,7 +174,7 @@ def clock(report: Report) -> str:
 
 
 def isolation(report: Report) -> str:
-    """Return what held the student's code back; loud if nothing did."""
+    """Return how the student's code was isolated, in capitals if it was not."""
     return summarised(report.environment.isolation, report.environment.containment)
 
 
@@ -184,7 +184,7 @@ def without_walls(report: Report) -> bool:
 
 
 def run_line(report: Report) -> str:
-    """Return what belongs to this run alone, so that nothing else in a report differs between two runs."""
+    """Return the path and the duration: the only line that differs between two runs."""
     return f"graded {shown(report.path)} in {report.duration_s:.1f} s"
 
 
@@ -195,7 +195,7 @@ def starts(report: Report) -> list[str]:
 
 
 def reproduction(report: Report) -> list[tuple[str, str]]:
-    """Return name and value of all that gives the report again, except the command; safe to show as lines of text."""
+    """Return names and values that reproduce the report, except the command; safe to show as lines of text."""
     rows = [("versions", versions(report)), ("isolation", isolation(report))]
     rows[:0] = [] if report.seed is None else [("seed", str(report.seed))]
     rows.append(("clock", clock(report)))
@@ -207,9 +207,9 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
 
 
 def command(report: Report) -> list[str]:
-    """Return the command that gives the report again, quoted for a shell and safe to show as text.
+    """Return the command that reproduces the report, quoted for a shell and safe to show as text.
 
-    Its pieces are to be joined by spaces; an option and its value are one piece.
+    Join the pieces with spaces; an option and its value are one piece.
     """
     pieces: list[str] = []
     for word in report.reproduce.command:
@@ -222,7 +222,7 @@ def command(report: Report) -> list[str]:
 
 
 def _short(digest: str) -> str:
-    """Return as much of a digest as tells files apart; all of it is in the JSON report."""
+    """Return the part of a digest that tells files apart; the JSON report has all of it."""
     return digest[:_DIGEST_LENGTH]
 
 

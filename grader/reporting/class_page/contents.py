@@ -1,4 +1,4 @@
-"""What the page of a class is made of: plain values, all text in them still as it came."""
+"""The data of the page of a class: plain values, their text not yet escaped."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ LOST = (Outcome.NOT_MET.value, Outcome.PARTLY.value)
 
 
 class RowTone(str, Enum):
-    """How a status is to be taken."""
+    """How to present a status."""
 
     FINE = "fine"
-    OURS = "ours"  # undecided or failed, through no fault of the student
-    THEIRS = "theirs"  # what was handed in cannot be used
-    NOTHING = "nothing"  # there is nothing, or not yet
+    OURS = "ours"  # undecided or failed, not the student's fault
+    THEIRS = "theirs"  # the submission cannot be used
+    NOTHING = "nothing"  # nothing submitted, or not graded yet
 
 
 @dataclass(frozen=True, slots=True)
 class StudentRow:
-    """One submission, or somebody who handed in nothing.
+    """One submission, or a student without one.
 
     Attributes:
         folder: Name of the folder below `students/` with the results; empty if there is none.
-        name: The person, or what the submission is called.
-        also: What else tells who it is: name of the submission, user name, number, address of the roster.
-        status: How it stands, in a word or two.
-        tone: How that is to be taken.
-        raw: Points of the grader, final or not; None if there are none.
-        max_score: Points to be had; None without a report.
-        final: What counts in the end; None for no score.
-        adjustments: What was decided, one sentence each, e.g. the penalty for late days.
-        remarks: What somebody who reads the row must know.
+        name: The student, or the name of the submission.
+        also: Further identification: submission name, user name, number, address in the roster.
+        status: The state in a word or two.
+        tone: How to present the status.
+        raw: Points as graded, final or not; None if there are none.
+        max_score: Maximum points; None without a report.
+        final: Points that count in the end; None without a score.
+        adjustments: Decisions that changed the score, one sentence each, e.g. the penalty for late days.
+        remarks: Notes for readers of the row.
         report: The report; None if there is none.
-        less: Whether students get to see less than the report.
-        counts: Whether it counts at all.
+        less: Whether students see less than the report.
+        counts: Whether the submission counts.
     """
 
     folder: str
@@ -65,9 +65,9 @@ class PageEntry:
     """A line of a list.
 
     Attributes:
-        text: What is said.
-        student: Index of the student it is about; None if it is about nobody in the table.
-        exercise: Exercise of the report that the line leads to; empty for the report as a whole.
+        text: The text of the line.
+        student: Index of the student it refers to; None if that is nobody in the table.
+        exercise: Exercise of the report that the line links to; empty for the whole report.
     """
 
     text: str
@@ -77,7 +77,7 @@ class PageEntry:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """Something to look through, under a title."""
+    """A titled list of entries that need attention."""
 
     id: str
     title: str
@@ -87,12 +87,12 @@ class Listing:
 
 @dataclass(frozen=True, slots=True)
 class PageLink:
-    """A link to another page in the folder for results.
+    """A link to another page in the results folder.
 
     Attributes:
-        title: What it leads to.
-        path: Path relative to the folder, with `/` between the parts, not encoded.
-        note: A few words beside it, such as how many pairs there are.
+        title: Title of the page.
+        path: Path relative to the folder, with `/` as separator, not percent-encoded.
+        note: A short note beside it, such as the number of pairs.
     """
 
     title: str
@@ -102,12 +102,12 @@ class PageLink:
 
 @dataclass(frozen=True, slots=True)
 class RunFacts:
-    """What belongs to the run that wrote the page; nothing else in the page differs between runs.
+    """Facts about the run that wrote the page; nothing else in the page differs between runs.
 
     Attributes:
-        line: One sentence that is always in sight.
-        rows: Name and value.
-        warnings: What must be read with everything else.
+        line: One sentence that is always visible.
+        rows: Names and values.
+        warnings: Warnings that apply to the whole page.
     """
 
     line: str = ""
@@ -117,13 +117,13 @@ class RunFacts:
 
 @dataclass(frozen=True, slots=True)
 class ClassPage:
-    """The page of a class.
+    """The data of the page.
 
     Attributes:
-        title: What the class is called.
-        run: What belongs to the run.
-        students: In the order of the table.
-        listings: What needs a look.
+        title: Name of the class.
+        run: Facts about the run.
+        students: Rows in the order of the table.
+        listings: Lists of entries that need attention.
         links: Other pages of the class.
     """
 

@@ -1,4 +1,4 @@
-"""The figures of a class: how scores are distributed, and how often each criterion came to which outcome."""
+"""Statistics of a class: the distribution of scores, and the outcomes of each criterion."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from fractions import Fraction
 from grader.core.exercise import Outcome
 from grader.reporting.class_page.contents import ReportData, StudentRow
 
-#: Parts of the scale, without the last one, which is the full score alone.
+#: Number of bins, without the last one, which holds only the full score.
 _PARTS = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """A part of the scale.
+    """One bin of the score distribution.
 
     Attributes:
-        label: In percent of the points to be had.
+        label: In percent of the maximum points.
         low: Lowest share in it, from 0 to 1.
-        high: The share where the next one begins; the last one has no end.
-        raw: How many have so many points of the grader.
-        final: How many have so many points in the end.
+        high: Share where the next bin begins; the last bin is open.
+        raw: Number of scores in it as graded.
+        final: Number of scores in it after adjustments.
     """
 
     label: str
@@ -36,14 +36,14 @@ class Bin:
 
 @dataclass(frozen=True, slots=True)
 class Distribution:
-    """How scores are distributed.
+    """The distribution of scores.
 
     Attributes:
-        bins: From nothing to the full score.
-        raw: Mean, median, least and most in percent, as graded; empty without scores.
-        final: The same for what counts in the end.
-        changed: Whether any score is another one in the end.
-        max_score: Points to be had; 0 if nobody has a report.
+        bins: From zero to the full score.
+        raw: Mean, median, minimum and maximum in percent, as graded; empty without scores.
+        final: The same after adjustments.
+        changed: Whether adjustments changed any score.
+        max_score: Maximum points; 0 without reports.
     """
 
     bins: tuple[Bin, ...]
@@ -55,13 +55,13 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class CriterionCount:
-    """How often a criterion came to which outcome.
+    """How often a criterion had each outcome.
 
     Attributes:
         exercise: Id of its exercise.
         id: Its id.
         title: Its title.
-        outcomes: Outcome -> how many; every outcome is there.
+        outcomes: Outcome -> number of students; contains every outcome.
     """
 
     exercise: str
@@ -71,7 +71,7 @@ class CriterionCount:
 
     @property
     def total(self) -> int:
-        """How many were asked."""
+        """Number of students whose reports have the criterion."""
         return sum(self.outcomes.values())
 
 
@@ -87,7 +87,7 @@ class ExerciseCount:
 
 
 def distribution(students: Sequence[StudentRow]) -> Distribution:
-    """Return how the scores of those that count are distributed; scores that are not final are left out."""
+    """Return the distribution of the scores that count and are final."""
     counted = [student for student in students if student.counts]
     most = max((s.max_score for s in counted if s.max_score), default=Fraction(0))
     raw = [s.raw / s.max_score for s in counted if s.raw is not None and s.max_score and _is_final(s)]
@@ -98,7 +98,7 @@ def distribution(students: Sequence[StudentRow]) -> Distribution:
 
 
 def exercise_counts(reports: Iterable[ReportData]) -> tuple[ExerciseCount, ...]:
-    """Return all exercises and criteria that occur, in the order of the reports."""
+    """Return all exercises and criteria in the reports, in their order."""
     heads: dict[str, tuple[str, str, Fraction]] = {}
     titles: dict[tuple[str, str], str] = {}
     counts: Counter[tuple[str, str, str]] = Counter()
@@ -123,7 +123,7 @@ def _is_final(student: StudentRow) -> bool:
 
 
 def _part(share: Fraction) -> int:
-    """Return the part of the scale that a share lies in; more than everything counts as everything."""
+    """Return the bin of a share; more than everything counts as everything."""
     return max(0, min(_PARTS, int(share * _PARTS)))
 
 
