@@ -1,4 +1,4 @@
-"""Dataclasses read by their annotations: pydantic models of the parameters of checks, of stimuli and of limits."""
+"""Builds pydantic models from the annotations of dataclasses: parameters of checks, stimuli and limits."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ from grader.rubrics.units import format_quantity
 
 T = TypeVar("T")
 
-#: Dynamic fields carry a prefix, so that a check may call a parameter `copy` or `json` without hiding pydantic's own.
+#: Prefix of dynamic fields, so that a check may have a parameter `copy` or `json` without hiding pydantic's own.
 _PREFIX = "p_"
 
-#: What a parameter of a certain name has to look like, beyond being text.
+#: Required form of parameters by their name, beyond being text.
 _BY_NAME: Mapping[str, Any] = {
     **dict.fromkeys(
         ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
@@ -96,10 +96,10 @@ class _Parameters(Shape):
     made: ClassVar[type]
 
     def built(self) -> Any:
-        """Return the dataclass that the mapping describes; what the rubric leaves out keeps its default.
+        """Return the dataclass that the mapping describes; omitted fields keep their defaults.
 
         Raises:
-            ValueError: The dataclass itself refuses the values.
+            ValueError: The dataclass itself rejects the values.
         """
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
         return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
@@ -109,7 +109,7 @@ class _Parameters(Shape):
 
 
 def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Choice]:
-    """Return the model of a mapping whose one key names a dataclass or a shape, and whose value is described by it."""
+    """Return the model of a mapping with one key, which selects the dataclass or shape of its value."""
     shapes: dict[str, Any] = {k: cls if issubclass(cls, Shape) else _parameters(cls) for k, cls in options.items()}
     fields: dict[str, Any] = {f"{_PREFIX}{key}": (shapes[key], Field(default=None, alias=key)) for key in options}
     return create_model(name, __base__=Choice, __doc__=summary, **fields)
@@ -117,7 +117,7 @@ def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Ch
 
 @lru_cache(maxsize=256)
 def _parameters(cls: Any) -> type[Shape]:
-    """Return the model of a check: a rubric calls the fields of the dataclass what they are called in Python."""
+    """Return the model of a check; its fields have the same names in rubrics as in Python."""
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
@@ -128,14 +128,14 @@ def _parameters(cls: Any) -> type[Shape]:
 
 
 def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usual: Any) -> type[Shape]:
-    """Return the model of a dataclass that is part of a scenario: a rubric leaves out the units in names of fields.
+    """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
     Args:
         cls: The dataclass.
-        name: What the model is called in the JSON Schema.
-        aliases: What a rubric calls a field, where it is not that.
-        usual: What the JSON Schema says of a field that a rubric leaves out, where it is not what the dataclass says;
-            a field that the dataclass requires has this value.
+        name: Name of the model in the JSON Schema.
+        aliases: Rubric names of fields, where they differ.
+        usual: Defaults shown in the JSON Schema, where they differ from those of the dataclass; a required field gets
+            this default.
     """
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
@@ -161,7 +161,7 @@ def _is_required(field: dataclasses.Field[Any]) -> bool:
 
 
 def _accepted(annotation: object, name: str = "") -> object:
-    """Return what a rubric may hold for a dataclass field: the field's annotation, made strict and given units."""
+    """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units."""
     if annotation is str:
         return _BY_NAME.get(name, Text)
     for known, accepted in _BY_ANNOTATION:
@@ -192,7 +192,7 @@ def _accepted_generic(annotation: object, name: str) -> object:
 
 
 def _mark(annotation: object, kind: type[T]) -> T | None:
-    """Return the mark of a kind that an annotation carries."""
+    """Return the mark of the given type in an annotation."""
     return next((mark for mark in getattr(annotation, "__metadata__", ()) if isinstance(mark, kind)), None)
 
 

@@ -1,4 +1,4 @@
-"""The `feedback` of a rubric and of a criterion: its shape as a pydantic model, and the policy it comes to."""
+"""The `feedback` key of a rubric and of a criterion: its pydantic model, and the resulting policy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _until(value: object) -> str:
     if text in _EVENTS:
         return text
     try:
-        # Only this form: Python reads others too, and they would not sort.
+        # Only this form is accepted: Python reads others too, but they do not sort.
         if date.fromisoformat(text).isoformat() != text:
             raise ValueError
     except ValueError:
@@ -72,14 +72,14 @@ def _kind(value: object) -> Literal["mapping", "word"]:
     return "mapping" if isinstance(value, dict) else "word"
 
 
-#: What may stand behind `feedback:`.
+#: Value of the key `feedback`.
 FeedbackField = Annotated[
     Annotated[_Words, Tag("word")] | Annotated[FeedbackShape, Tag("mapping")], Discriminator(_kind)
 ]
 
 
 def feedback_of(written: str | FeedbackShape | None, usual: Feedback = OPEN) -> Feedback:
-    """Return the policy that is written, or the usual one where none is."""
+    """Return the policy as written, or the usual one if none is."""
     if written is None:
         return usual
     if isinstance(written, FeedbackShape):

@@ -1,4 +1,4 @@
-"""The manual of a check: its docstring, read as what it asks, how it measures, and what its parameters mean."""
+"""Manuals of checks, read from their docstrings: what is asked, how it is measured, and the parameters."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _HEADING = "Attributes:"
 
 @dataclass(frozen=True, slots=True)
 class Manual:
-    """What a docstring says.
+    """The parts of a docstring.
 
     Attributes:
-        summary: Its first paragraph, on one line.
-        details: The other paragraphs before the attributes, each on one line, with a line break between them.
+        summary: The first paragraph, on one line.
+        details: The other paragraphs before the attributes, one per line.
         parameters: Attribute -> its meaning, on one line.
     """
 
@@ -27,9 +27,9 @@ class Manual:
 
 
 def manual_of(kind: type) -> Manual:
-    """Return the manual of a class; empty where it has no docstring."""
+    """Return the manual of a class; empty if it has no docstring."""
     written = kind.__doc__ or ""
-    # a dataclass without a docstring is given its signature for one
+    # Without a docstring, a dataclass gets its signature as one.
     known = "" if written.startswith(f"{kind.__name__}(") else written
     text, _, attributes = inspect.cleandoc(known).partition(_HEADING)
     paragraphs = [" ".join(p.split()) for p in text.split("\n\n") if p.strip()]

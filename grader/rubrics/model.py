@@ -26,7 +26,7 @@ from grader.rubrics.stimuli import ParameterShape, StateShape, TransitionShape
 from grader.rubrics.types import CheckFile, Choice, Id, LongDuration, Number, Points, PythonFile, Shape, Text, YesNo
 from grader.rubrics.variants import VariantsField
 
-#: What rubrics call the limits whose fields have other names.
+#: Rubric names of limits whose fields have other names.
 _LIMITS = {
     "processor_ns": "processor_time",
     "file_bytes": "file_size",
@@ -44,7 +44,7 @@ _STIMULI: Mapping[str, type[Shape]] = {
     "state": StateShape,
     "goal": part_model(ActionGoal, "GoalShape", goal={}, cancel_after=None),
 }
-if TYPE_CHECKING:  # made at run time; pydantic reads those below
+if TYPE_CHECKING:  # created at run time; pydantic reads those below
     LimitsShape = Shape
     ObserveShape = Shape
     StimulusShape = Choice
