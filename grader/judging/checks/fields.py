@@ -1,4 +1,4 @@
-"""Checks on the numbers in the messages on a topic: their values, their range, a formula, or chance."""
+"""Checks on the numbers in a topic's messages: their values, their range, a formula, or randomness."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from grader.judging.wording import counted, moment, number, numbers, quote, unit
 
 @dataclass(frozen=True, slots=True)
 class FieldEqual:
-    """Every message on a topic holds what is expected in each field named: numbers, texts, truth values or lists.
+    """Every message on a topic has the expected value in each named field: numbers, texts, truth values or lists.
 
     Attributes:
         topic: Topic name as on the wire.
         fields: What is expected by field path: a value, or `{equals, items, tolerance, low, high, pattern, example}`.
-        tolerance: Largest difference of a number that is given without a tolerance of its own.
-        at_least: How many messages there must be to tell.
+        tolerance: Largest difference of a number without a tolerance of its own.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -77,7 +77,7 @@ class FieldInRange:
         low: Smallest value allowed; none if left out.
         high: Largest value allowed; none if left out.
         field: Path of the number.
-        at_least: How many messages there must be to tell.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -120,8 +120,8 @@ class FieldMonotone:
         topic: Topic name as on the wire.
         direction: `rising` or `falling`.
         field: Path of the number.
-        strictly: Whether equal neighbours are a mistake; a series that never moves always is.
-        at_least: How many messages there must be to tell.
+        strictly: Whether equal neighbours are a mistake; a constant series always is.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -173,7 +173,7 @@ def _numbers(messages: Sequence[Message], path: str) -> Finding | tuple[float, .
 
 
 def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Finding:
-    """Return no credit and why there are not enough messages on a topic."""
+    """Return no credit with the reason why a topic has too few messages."""
     if found == 0:
         return explain_no_message(trace, topic)
     reason = f"{topic}: {counted(found, 'message')}, expected at least {wanted}"
@@ -192,8 +192,8 @@ class FieldFunction:
         formula: What the field holds, e.g. `sin(0.1 * n)`.
         field: Path of the field, e.g. `data` or `linear.x`.
         tolerance: Largest difference, unit of the field.
-        start_tolerance: How many messages may have been lost before the first one was seen.
-        at_least: How many messages there must be to tell.
+        start_tolerance: Number of messages that may be lost before the first one received.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -241,7 +241,7 @@ class FieldFunction:
         return met(reason, evidence)
 
     def _best_start(self, wanted: Curve, samples: Sequence[Sample], jitter_s: float) -> tuple[int, list[Sample]]:
-        """Return the number of the first message that leaves the fewest wrong, 0 unless another is better."""
+        """Return the number of the first message that gives the fewest errors; 0 unless another is better."""
         starts = range(max(0, self.start_tolerance) + 1)
         ways = [[s for s in samples if not self._right(wanted, s, jitter_s, start)] for start in starts]
         best = min(starts, key=lambda start: len(ways[start]))
@@ -284,17 +284,17 @@ class FieldFunction:
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5
-#: So many equal values or fewer may have been drawn: whole numbers repeat.
+#: Up to this many equal values may be random: whole numbers repeat.
 _FEWEST_FOR_CONSTANT = 5
 _RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high})"
 
 
 @dataclass(frozen=True, slots=True)
 class RandomInRange:
-    """Every number on a topic lies in a range, and the numbers are drawn: no constant, cycle, ramp or smooth curve.
+    """Every number on a topic is in a range, and the numbers are random: no constant, cycle, ramp or smooth curve.
 
     Attributes:
-        topic: Topic name as on the wire; its messages carry one number, as `data` or `temperature`.
+        topic: Topic name as on the wire; its messages hold one number, as `data` or `temperature`.
         low: Smallest value allowed, the edge inside.
         high: Largest value allowed, the edge inside.
     """
@@ -310,7 +310,7 @@ class RandomInRange:
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside and the values may have been drawn."""
+        """Return full credit if no value is outside and the values may be random."""
         messages = published(trace, self.topic)
         if not messages:
             silent = explain_no_message(trace, self.topic)
@@ -375,7 +375,7 @@ class RandomInRange:
         return met(reason, self._evidence(values))
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers on a topic in the range that they may come from, or None without numbers."""
+        """Return the numbers on a topic with their range, or None without numbers."""
         values = published_numbers(trace, self.topic)
         if not values:
             return None

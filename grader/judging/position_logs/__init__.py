@@ -1,1 +1,1 @@
-"""Recognises logged positions: text to numbers, numbers to labels, labelled numbers to the pose that was current."""
+"""Recognises logged positions: reads numbers and labels from text, and compares them with the current pose."""
