@@ -1,4 +1,4 @@
-"""The charts of an exercise: those of its checks, the graph, a timeline of each scenario, and lines of the source."""
+"""Makes the figures of an exercise: charts of its checks, the graph, timelines, and lines of the source."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def illustrated(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> ExerciseReport:
-    """Return the report with what a reader wants to look at: figures, lines of the source, and what was expected.
+    """Return the report with figures, lines of the source, and the expected results.
 
     Args:
-        report: What judging came to.
-        exercise: What was asked.
-        traces: Scenario id -> what was recorded.
-        submission: Says which files were found.
+        report: The judged report.
+        exercise: The exercise.
+        traces: Scenario id -> trace.
+        submission: Tells which files were found.
         sources: Wanted file name -> its text.
     """
     return replace(
@@ -44,13 +44,13 @@ def illustrated(
 
 
 def expectation(check: Check) -> str:
-    """Return what a check expects, without a full stop; empty if it does not say."""
+    """Return what a check expects, without a full stop; empty if it does not define it."""
     own = getattr(check, "expected", "")
     return own if isinstance(own, str) else ""
 
 
 def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure, ...]:
-    """Return the pictures of an exercise in rubric order, then the graph, then a timeline of each scenario."""
+    """Return the charts of an exercise in rubric order, then the graph, then a timeline of each scenario."""
     drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
@@ -65,14 +65,14 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace]) -> Iterable[Chart]
     maker, trace = getattr(criterion.check, "chart", None), traces.get(criterion.scenario)
     try:
         chart = maker(trace) if callable(maker) and trace else None
-    except Exception:  # a picture that cannot be drawn must not cost the report that it would be in
+    except Exception:  # a failing chart must not cost the report
         chart = None
     if isinstance(chart, Chart):
         yield replace(chart, id=f"{criterion.scenario} {chart.id}", criteria=(criterion.id,))
 
 
 def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
-    """Join charts of one id: two questions about the same thing make one picture."""
+    """Merge charts with one id: two criteria about the same data share one chart."""
     joined: dict[str, Chart] = {}
     for chart in charts:
         other = joined.get(chart.id)
@@ -99,15 +99,15 @@ def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Char
     return charts
 
 
-#: Lines shown before and after the one that is meant.
+#: Lines shown before and after the referenced one.
 AROUND = 3
-#: A line of a source may be a megabyte long.
+#: Longest line shown, in characters; a source line may be a megabyte long.
 _LONGEST_LINE = 400
 _TAB = 4
 
 
 def excerpts_for(report: ExerciseReport, submission: Submission, sources: Mapping[str, str]) -> tuple[Excerpt, ...]:
-    """Return the source around each place that a verdict or a fault names, each once; unknown places have none."""
+    """Return the source around each place that a verdict or a fault names, without duplicates."""
     places = [v.location for v in report.verdicts if v.location is not None]
     places += [Location(f.file, f.line) for f in report.faults if f.file and f.line > 0]
     texts = {file.found: sources[wanted] for wanted, file in submission.files.items() if wanted in sources}
@@ -125,7 +125,7 @@ def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
 
 
 def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:
-    """Return the graph in every situation that tells something new, or None if no node ever appeared."""
+    """Return the graph in every situation with new information, or None if no node ever appeared."""
     stages = [stage for s in exercise.scenarios if s.id in traces for stage in _stages(s, exercise, traces[s.id])]
     told: dict[tuple[object, ...], Stage] = {}
     for stage in stages:
@@ -148,7 +148,7 @@ def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]
 
 
 def _own(graph: GraphSnapshot) -> GraphSnapshot:
-    """Return the graph with what the student's nodes made themselves, at no particular time."""
+    """Return the graph of the student's own endpoints, without a time."""
     return replace(graph, t_ns=0, endpoints=tuple(e for e in graph.endpoints if on_student_topic(e)))
 
 
@@ -175,13 +175,13 @@ def _said(graph: GraphSnapshot) -> str:
     return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
 
 
-#: Lanes for services; a node's parameters and an action are several.
+#: Number of lanes for services; a node's parameters and an action need several.
 MOST_SERVICES = 6
 _TONES = {"DEBUG": Tone.FAINT, "INFO": Tone.MAIN, "WARN": Tone.WARNING, "ERROR": Tone.BAD, "FATAL": Tone.BAD}
 
 
 def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
-    """Return the picture of a scenario; there is always one, a silent node included."""
+    """Return the timeline of a scenario; it exists even for a silent node."""
     lanes: list[str] = []
     rows: list[Series] = []
     for process in processes:
@@ -222,7 +222,7 @@ def _prints(trace: Trace, process: str, lanes: list[str], rows: list[Series]) ->
 
 
 def _exchanges(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
-    """Add a lane for each service that was called: its requests and responses, with what they say."""
+    """Add a lane for each called service, with its requests and responses."""
     sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
     exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
     for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:

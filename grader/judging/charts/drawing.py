@@ -1,4 +1,4 @@
-"""Small tools that the makers of figures share."""
+"""Helpers for making charts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from grader.judging.texts import clean
 from grader.judging.values import Reading
 from grader.judging.wording import number, quote, unit_of
 
-#: Most points of a series: more than a screen has columns are not seen, and a flood must not swell a report.
+#: Maximum number of points of a series: a screen shows no more, and a flood must not enlarge the report.
 MOST_POINTS = 1200
-#: Most points that carry a text.
+#: Maximum number of points with a text.
 MOST_TEXTS = 400
 _TEXT_LENGTH = 160
 
@@ -27,7 +27,7 @@ def series(  # noqa: PLR0913  what a series consists of
     texts: Sequence[str] = (),
     most: int = MOST_POINTS,
 ) -> Series:
-    """Return a series with no more points than can be seen; the extremes of each stretch stay."""
+    """Return a series reduced to a visible number of points; the extremes of each stretch stay."""
     most = min(most, MOST_TEXTS) if texts else most
     kept = kept_indices([y for _, y in points], most)
     said = tuple(quote(texts[k], _TEXT_LENGTH) for k in kept) if texts else ()
@@ -35,7 +35,7 @@ def series(  # noqa: PLR0913  what a series consists of
 
 
 def kept_indices(values: Sequence[float], most: int) -> list[int]:
-    """Return the indices of at most about `most` values, first, last and the extremes of each stretch among them."""
+    """Return about `most` indices of values, including the first, the last and the extremes of each stretch."""
     if len(values) <= most:
         return list(range(len(values)))
     stretch = -(-2 * len(values) // most)
@@ -47,7 +47,7 @@ def kept_indices(values: Sequence[float], most: int) -> list[int]:
 
 
 def written_in_lane(name: str, items: Sequence[LogRecord | OutputLine], lane: int, tone: Tone) -> Series:
-    """Return what was written as dots in a row of its own, each with its text."""
+    """Return output as dots in a lane of its own, each with its text."""
     points = [(seconds(o.t_ns), float(lane)) for o in items]
     return series(name, points, look=Look.DOTS, tone=tone, texts=[clean(o.text) for o in items])
 
@@ -65,7 +65,7 @@ _MOST_FAULTS = 5
 
 
 def plain_topic(topic: str) -> str:
-    """Return a topic's name as a title: `/fan_speed` is `fan speed`."""
+    """Return a topic's name as a title: `/fan_speed` becomes `fan speed`."""
     return quote(topic.strip("/").replace("/", " ").replace("_", " "), 40) or topic
 
 
@@ -75,21 +75,21 @@ def time_chart(id_: str, title: str, about: str, panels: tuple[Panel, ...], mome
 
 
 def input_panel(topic: str, values: Sequence[Reading], threshold: float, look: Look) -> Panel:
-    """Return the panel of the numbers that a controller gets, with its threshold."""
+    """Return a panel with the inputs of a controller and its threshold."""
     level = Level(threshold, f"{number(threshold)}{unit_of(topic)}")
     name = plain_topic(topic)
     return Panel(name, unit_of(topic).strip(), (series(name, points_of(values), look=look),), levels=(level,))
 
 
 def answer_panel(topic: str, answers: Sequence[Reading], expected: Series) -> Panel:
-    """Return the panel of what a controller answers, and should."""
+    """Return a panel with a controller's answers and the expected ones."""
     name = plain_topic(topic)
     dots = series(name, points_of(answers), look=Look.STEP, tone=Tone.SECOND)
     return Panel(name, unit_of(topic).strip(), (expected, dots))
 
 
 def which_answers(answers: Sequence[Reading]) -> str:
-    """Return which answers there are, for text."""
+    """Return which answers occur, for text."""
     values = sorted({r.value for r in answers})
     if not values:
         return ""
