@@ -82,7 +82,7 @@ MessageCases: Any = Annotated[MessageCasesOrNone, Field(min_length=1)]
 
 
 class ParameterShape(Shape):
-    """A stimulus: one parameter of the student's node is set, or asked for; without a node the only one."""
+    """A stimulus: sets or reads a parameter of the student's node; without `node`, of the only one."""
 
     node: Topic | None = None
     name: Text
@@ -98,7 +98,7 @@ class ParameterShape(Shape):
 
 
 class TransitionShape(Shape):
-    """A stimulus: the student's lifecycle node is asked for a transition; without a node the only one."""
+    """A stimulus: requests a transition of the student's lifecycle node; without `node`, of the only one."""
 
     node: Topic | None = None
     to: Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
@@ -112,7 +112,7 @@ class TransitionShape(Shape):
 
 
 class StateShape(Shape):
-    """A stimulus: the student's lifecycle node is asked for its state; without a node the only one."""
+    """A stimulus: asks the student's lifecycle node for its state; without `node`, the only one."""
 
     node: Topic | None = None
     start: SomeTime = 0
