@@ -2,7 +2,7 @@
 
 Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`, `obeyed_by_none`.
 Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML:
-`xml_text`. CSV: `csv_cell`. JSON: `json_value`.
+`xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ import html
 import json
 import math
 import re
+import shlex
 import string
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
 from typing import Any
@@ -270,3 +271,28 @@ def _cut(pieces: list[str], length: int, limit: int) -> str:
     while pieces and length > limit - len(ELLIPSIS):
         length -= len(pieces.pop())
     return "".join(pieces) + ELLIPSIS
+
+
+def command_line(words: Sequence[str]) -> str:
+    """Return words as one line for a POSIX shell, or for bash where a word is unprintable."""
+    return " ".join(map(quoted, words))
+
+
+def quoted(word: str) -> str:
+    """Return a word quoted for a shell, on one line; unprintable characters use the quotes of bash."""
+    if word.isprintable():
+        return shlex.quote(word)
+    return f"$'{''.join(map(_in_bash_quotes, word))}'"
+
+
+def _in_bash_quotes(character: str) -> str:
+    if character in "\\'":
+        return f"\\{character}"
+    if character.isprintable():
+        return character
+    # Bytes that are not UTF-8 arrive as lone surrogates; other surrogates are written as they are.
+    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", _surrogates(character)))
+
+
+def _surrogates(character: str) -> str:
+    return "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"

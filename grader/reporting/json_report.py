@@ -15,8 +15,7 @@ from grader.core.checkup import Property, described
 from grader.core.exercise import Location, Variant
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
-from grader.reporting.escape import valid_unicode
-from grader.reporting.shell import command_line
+from grader.reporting.escape import command_line, valid_unicode
 
 #: Decimal places of every score and duration.
 DIGITS = 6

@@ -1,10 +1,13 @@
-"""Builds pydantic models from the annotations of dataclasses: parameters of checks, stimuli and limits."""
+"""Reads checks and stimuli as dataclasses: pydantic models from their annotations, manuals from their docstrings."""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 import types
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -88,6 +91,9 @@ _BY_KIND: Mapping[str, Any] = {
 }
 
 _ALIKE: Mapping[str, str] = {}
+
+_PARAMETER = re.compile(r"^ {4}(?P<name>\w+): (?P<meaning>.*)$")
+_HEADING = "Attributes:"
 
 
 class _Parameters(Shape):
@@ -201,3 +207,43 @@ def _at_least(least: int, unit: Unit | None, value: int) -> int:
         words = format_quantity(least, unit) if unit else f"{least}"
         raise wrong(f"at least {words}, which a node that does nothing needs")
     return value
+
+
+@dataclass(frozen=True, slots=True)
+class Manual:
+    """The parts of a docstring.
+
+    Attributes:
+        summary: The first paragraph, on one line.
+        details: The other paragraphs before the attributes, one per line.
+        parameters: Attribute -> its meaning, on one line.
+    """
+
+    summary: str
+    details: str
+    parameters: Mapping[str, str]
+
+
+def manual_of(kind: type) -> Manual:
+    """Return the manual of a class; empty if it has no docstring."""
+    written = kind.__doc__ or ""
+    # Without a docstring, a dataclass gets its signature as one.
+    known = "" if written.startswith(f"{kind.__name__}(") else written
+    text, _, attributes = inspect.cleandoc(known).partition(_HEADING)
+    paragraphs = [" ".join(p.split()) for p in text.split("\n\n") if p.strip()]
+    return Manual(paragraphs[0] if paragraphs else "", "\n".join(paragraphs[1:]), _parameter_meanings(attributes))
+
+
+def _parameter_meanings(text: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    name = ""
+    for line in text.split("\n"):
+        start = _PARAMETER.match(line)
+        if start is not None:
+            name = start["name"]
+            found[name] = start["meaning"].strip()
+        elif name and line.startswith(" " * 8):
+            found[name] += f" {line.strip()}"
+        elif line.strip():
+            name = ""
+    return found

@@ -28,9 +28,8 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
-from grader.rubrics.feedback import feedback_of
 from grader.rubrics.mistakes import mistakes_of, nearest
-from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, rubric_model
+from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
 from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
 from grader.rubrics.types import CHECK_FILE, build
 from grader.rubrics.variants import (

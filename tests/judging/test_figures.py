@@ -25,8 +25,7 @@ from grader.core.chart import Chart, GraphFigure, Look, Tone
 from grader.core.exercise import Exercise
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Mark, Request, Response, Trace
-from grader.judging.charts import expectation, figures_of, illustrated
-from grader.judging.charts.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
+from grader.judging.charts import MOST_POINTS, MOST_TEXTS, expectation, figures_of, illustrated, kept_indices
 from grader.judging.checks import CHECKS
 from grader.judging.checks.rate import TopicRate
 from grader.judging.judge_run import judge_exercise

@@ -16,8 +16,16 @@ from urllib.parse import unquote
 import class_reports
 import pytest
 
-from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RunFacts, StudentRow
-from grader.reporting.class_page.counts import distribution, exercise_counts
+from grader.reporting.class_page.contents import (
+    ClassPage,
+    Listing,
+    PageEntry,
+    PageLink,
+    RunFacts,
+    StudentRow,
+    distribution,
+    exercise_counts,
+)
 from grader.reporting.class_page.render import class_assets, page_link, render_class, result_link
 from grader.reporting.json_report import report_to_json
 

@@ -13,7 +13,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Trace
-from grader.judging.charts.drawing import (
+from grader.judging.charts import (
     answer_panel,
     happenings,
     input_panel,

@@ -13,7 +13,7 @@ from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.names import Formula
 from grader.core.quantities import SLACK, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart
+from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (

@@ -13,11 +13,12 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.checks.logs import complained
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
 from grader.judging.output import printed_lines, student_records, written
-from grader.judging.position_logs.analysis import (
+from grader.judging.position_causes import cause_of
+from grader.judging.position_logs import (
     Analysis,
     Group,
     Track,
@@ -29,7 +30,6 @@ from grader.judging.position_logs.analysis import (
     printed_positions,
     track_of,
 )
-from grader.judging.position_logs.causes import cause_of
 from grader.judging.wording import counted, moment, number, quote, span
 
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"

@@ -12,7 +12,7 @@ from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import counted, moment, number, quote, span

@@ -12,7 +12,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.core.trace import Endpoint, Trace
-from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart, written_in_lane
+from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
 from grader.judging.output import (

@@ -11,7 +11,7 @@ from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding
 from grader.core.quantities import SLACK, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
 from grader.judging.values import field, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote

@@ -17,8 +17,16 @@ from markupsafe import Markup
 from grader.core.exercise import Outcome, exercise_name
 from grader.reporting import wording
 from grader.reporting.class_page.causes import CommonCause, causes
-from grader.reporting.class_page.contents import ClassPage, PageLink, ReportData, StudentRow
-from grader.reporting.class_page.counts import Distribution, ExerciseCount, distribution, exercise_counts
+from grader.reporting.class_page.contents import (
+    ClassPage,
+    Distribution,
+    ExerciseCount,
+    PageLink,
+    ReportData,
+    StudentRow,
+    distribution,
+    exercise_counts,
+)
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
 

@@ -17,7 +17,7 @@ from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, log_lines, shown
-from grader.reporting.rounding import whole_points
+from grader.reporting.wording import whole_points
 
 #: With more rows than this, scores are rounded to whole points.
 MOST_ROWS = 500

@@ -10,7 +10,7 @@ from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
-from grader.reporting.rounding import whole_points
+from grader.reporting.wording import whole_points
 
 SCHEMA = "classroom50/result/v1"
 

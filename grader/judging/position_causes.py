@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.judging.position_logs.analysis import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
+from grader.judging.position_logs import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
 from grader.judging.texts import Pair, Printed
 from grader.judging.wording import counted, moment, number, quote, span
 

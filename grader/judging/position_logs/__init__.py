@@ -1,1 +1,0 @@
-"""Recognises logged positions: reads numbers and labels from text, and compares them with the current pose."""
