@@ -237,7 +237,7 @@ def _numbers(value: Mapping[str, Any], above: str = "") -> list[tuple[str, float
     return found[:FIELDS]
 
 
-# --- what a program makes of what it is told ---
+# --- answers to stimuli ---
 
 
 def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:

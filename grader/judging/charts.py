@@ -152,7 +152,7 @@ def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure
     distinct = [stage for stage in told.values() if stage.graph.nodes]
     if not distinct:
         return None
-    return GraphFigure("graph", "The live ROS graph", _told_graphs(distinct), (), tuple(distinct))
+    return GraphFigure("graph", "The live ROS graph", _describe_graphs(distinct), (), tuple(distinct))
 
 
 def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]:
@@ -175,7 +175,7 @@ def _size(graph: GraphSnapshot) -> int:
     return len(graph.endpoints) + len(graph.services)
 
 
-def _told_graphs(stages: list[Stage]) -> str:
+def _describe_graphs(stages: list[Stage]) -> str:
     return " ".join(f"{s.title.capitalize()}: {_said(s.graph)}." for s in stages)
 
 

@@ -243,7 +243,7 @@ def standing(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[i
     return frozenset(found)
 
 
-def crowd(outputs: Sequence[Output], one: Sought) -> str:
+def surroundings(outputs: Sequence[Output], one: Sought) -> str:
     """Return a clause about the other numbers in the texts that show a value."""
     texts = [o.text for o, _ in _active(outputs, [one])]
     count = sum(len(_readings(text)[0][1]) for text in texts)
@@ -337,7 +337,7 @@ _FOR_DEGREES: tuple[tuple[float, str], ...] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class LoggedNumbers:
     """The numbers logged for one message.
 
     Attributes:
@@ -349,7 +349,7 @@ class Heard:
     numbers: tuple[Printed, ...]
 
 
-def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[float]) -> tuple[str, str]:
+def wrong_conversion(heard: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
     """Return what is logged instead of a converted value, as a clause, and a hint; both empty if unclear.
 
     Args:
@@ -361,7 +361,7 @@ def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[flo
     telling = [h for h in heard if h.numbers and abs(h.value) > _SMALL * largest]
     if len(telling) < _FEWEST:
         return "", ""
-    left = [Heard(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
+    left = [LoggedNumbers(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
     if _share(left, lambda h, n: n.step >= 1 and n.shows(factor * h.value)) >= _SURE:
         return "it is logged as a whole number", "keep some decimals, as in f'{angle:.3f}'"
     lost = [h for h in left if factor * h.value < 0]
@@ -371,7 +371,7 @@ def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[flo
     return _factor(left, factor)
 
 
-def _factor(left: Sequence[Heard], factor: float) -> tuple[str, str]:
+def _factor(left: Sequence[LoggedNumbers], factor: float) -> tuple[str, str]:
     first = max(left, key=lambda h: abs(h.value))
     for candidate in (n.value / first.value for n in first.numbers if math.isfinite(n.value) and n.value != 0):
         known = _known(candidate, factor)
@@ -382,7 +382,7 @@ def _factor(left: Sequence[Heard], factor: float) -> tuple[str, str]:
     return "", ""
 
 
-def _scaled(left: Sequence[Heard], factor: float) -> float:
+def _scaled(left: Sequence[LoggedNumbers], factor: float) -> float:
     return _share(left, lambda h, n: _shows_value(n, factor * h.value, 0.01))
 
 
@@ -396,9 +396,9 @@ def _shows_value(printed: Printed, value: float, relative: float = CONVERSION) -
     return shows_about(printed, value, coarsest=abs(value) / 3, relative=relative)
 
 
-def _explained(printed: Printed, heard: Heard, factors: Sequence[float]) -> bool:
+def _explained(printed: Printed, heard: LoggedNumbers, factors: Sequence[float]) -> bool:
     return any(_shows_value(printed, f * heard.value) for f in factors)
 
 
-def _share(heard: Sequence[Heard], fits: Callable[[Heard, Printed], bool]) -> float:
+def _share(heard: Sequence[LoggedNumbers], fits: Callable[[LoggedNumbers, Printed], bool]) -> float:
     return sum(any(fits(h, n) for n in h.numbers) for h in heard) / len(heard)

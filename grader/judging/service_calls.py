@@ -52,7 +52,7 @@ _TYPES: Mapping[int, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Got:
+class ReportedParameter:
     """A parameter as a node reported it.
 
     Attributes:
@@ -70,7 +70,7 @@ class Got:
 
 
 @dataclass(frozen=True, slots=True)
-class Set:
+class ParameterSetting:
     """An attempt to set a parameter.
 
     Attributes:
@@ -102,7 +102,7 @@ def asked_for(trace: Trace, name: str, node: str | None = None) -> list[Call]:
     return [c for c in _parameter_calls(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
 
 
-def got(call: Call, name: str) -> Got | None:
+def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
     """Return a parameter as a response reported it; None without a response."""
     if call.response is None:
         return None
@@ -111,10 +111,10 @@ def got(call: Call, name: str) -> Got | None:
     place = _list(call.request.value, "names").index(name)
     found = values[place] if place < len(values) else None
     type_, value = _typed(found)
-    return Got(call.response.t_ns, node, type_, value)
+    return ReportedParameter(call.response.t_ns, node, type_, value)
 
 
-def settings(trace: Trace, name: str, node: str | None = None) -> list[Set]:
+def settings(trace: Trace, name: str, node: str | None = None) -> list[ParameterSetting]:
     """Return the attempts to set a parameter, in order."""
     found = []
     for call in _parameter_calls(trace, node, "set_parameters"):
@@ -124,16 +124,16 @@ def settings(trace: Trace, name: str, node: str | None = None) -> list[Set]:
     return sorted(found, key=lambda s: s.t_ns)
 
 
-def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> Set:
+def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> ParameterSetting:
     node = call.request.service.rpartition("/")[0]
     value = _typed(parameter.get("value"))[1]
     if call.response is None:
-        return Set(call.request.t_ns, node, value, answered=False, taken=False, why="")
+        return ParameterSetting(call.request.t_ns, node, value, answered=False, taken=False, why="")
     results = _list(call.response.value, "results")
     result = results[place] if place < len(results) else {}
     taken = isinstance(result, Mapping) and result.get("successful") is True
     why = str(result.get("reason", "")) if isinstance(result, Mapping) else ""
-    return Set(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
+    return ParameterSetting(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
 
 
 def _typed(value: object) -> tuple[str, Any]:

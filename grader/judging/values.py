@@ -325,7 +325,7 @@ def shown(value: object) -> str:
     return number(got) if got is not None else quote(str(value), 80)
 
 
-def told(rules: Mapping[str, RuleOrValue]) -> str:
+def rules_text(rules: Mapping[str, RuleOrValue]) -> str:
     """Return rules as text: `success true, message a text such as ...`."""
     return ", ".join(f"{path} {as_rule(rule).wanted}" for path, rule in rules.items())
 

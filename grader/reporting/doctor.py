@@ -71,10 +71,10 @@ def _fact(page: Page, fact: Fact) -> None:
     style = "" if fact.fits else _BAD
     page.put(shown(fact.value), prefix=Text(f"  {fact.name:{_NAME_WIDTH}}", style=style), indent=6)
     if fact.remedy:
-        _mend(page, fact.remedy, _NAME_WIDTH)
+        _remedy(page, fact.remedy, _NAME_WIDTH)
 
 
-def _mend(page: Page, remedy: str, column: int) -> None:
+def _remedy(page: Page, remedy: str, column: int) -> None:
     page.put(shown(remedy), prefix=f"  {'':{column}}mend: ", indent=6)
 
 
@@ -98,7 +98,7 @@ def _tier(page: Page, tier: TierReport, *, used: bool) -> None:
     else:
         page.put(f"not here: {_why(tier)}", prefix=head)
         if tier.remedy:
-            _mend(page, tier.remedy, _TIER_WIDTH - 2)
+            _remedy(page, tier.remedy, _TIER_WIDTH - 2)
 
 
 def _why(tier: TierReport) -> str:

@@ -1,8 +1,8 @@
 """Makes text that a student controls harmless in each output: one small function per output.
 
-Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`, `obeyed_by_none`.
-Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML:
-`xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
+Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`,
+`without_workflow_commands`. Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML:
+`html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
 """
 
 from __future__ import annotations
@@ -126,10 +126,10 @@ def log_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
         text: Whole lines, including everything that is printed before foreign text in them.
         limit: Maximum number of characters shown.
     """
-    return obeyed_by_none(shown_lines(text, limit=limit))
+    return without_workflow_commands(shown_lines(text, limit=limit))
 
 
-def obeyed_by_none(text: str) -> str:
+def without_workflow_commands(text: str) -> str:
     """Return lines that are otherwise safe with every GitHub workflow command defused."""
     return _COMMAND.sub(r"\g<0>\\", text)
 

@@ -33,7 +33,7 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     calls = service_edges(graph)
     lines += [_called(*edge) for edge in calls[:MOST_EDGES]]
     joined = {name for client, _, server in calls for name in (client, server)}
-    lonely = [node for node in lonely_nodes(graph) if node not in joined]
+    lonely = [node for node in isolated_nodes(graph) if node not in joined]
     return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely]
 
 
@@ -64,7 +64,7 @@ def graph_edges(graph: GraphSnapshot) -> list[Edge]:
     return list(dict.fromkeys(_edges(graph)))
 
 
-def lonely_nodes(graph: GraphSnapshot) -> list[str]:
+def isolated_nodes(graph: GraphSnapshot) -> list[str]:
     """Return the nodes without edges."""
     joined = {name for source, _, target, _ in graph_edges(graph) for name in (source, target)}
     return [node for node in graph.nodes if node not in joined]
@@ -77,7 +77,7 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
     for publisher in publishers:
         takers = [s for s in subscriptions if s.topic == publisher.topic]
         for taker in takers:
-            yield publisher.node, publisher.topic, taker.node, _quarrel(publisher, taker)
+            yield publisher.node, publisher.topic, taker.node, _type_conflict(publisher, taker)
         if not takers:
             yield publisher.node, publisher.topic, NOBODY, ""
     served = {p.topic for p in publishers}
@@ -90,7 +90,7 @@ def _hidden(topic: str) -> bool:
     return topic in _EVERYWHERE or "/_" in topic
 
 
-def _quarrel(publisher: Endpoint, taker: Endpoint) -> str:
+def _type_conflict(publisher: Endpoint, taker: Endpoint) -> str:
     return "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
 
 
@@ -111,7 +111,7 @@ def draw_mermaid(graph: GraphSnapshot) -> str:
     kept, left_out = edges[:MOST_EDGES], len(edges) - MOST_EDGES
     drawing = _Drawing()
     lines = list(dict.fromkeys(line for edge in kept for line in drawing.edge(edge)))
-    lonely = [drawing.node(name) for name in lonely_nodes(graph)[:MOST_EDGES]]
+    lonely = [drawing.node(name) for name in isolated_nodes(graph)[:MOST_EDGES]]
     more = [f'more["and {left_out} more"]'] if left_out > 0 else []
     return (
         "\n".join(["flowchart LR", *(f"    {line}" for line in (*drawing.boxes, *lines, *more))])

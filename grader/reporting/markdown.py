@@ -74,7 +74,7 @@ def _rendered(report: Report, detail: Detail) -> str:
 def _head(report: Report, detail: Detail) -> list[str]:
     lines = [f"# {markdown(report.name, limit=wording.NAME_LIMIT)}: {wording.score_line(report)}\n"]
     lines += [f"> [!WARNING]\n> {markdown(warning)}\n" for warning in wording.warnings(report)]
-    if wording.without_walls(report):
+    if wording.ran_without_sandbox(report):
         lines.append(f"> [!CAUTION]\n> isolation: {markdown(wording.isolation(report))}\n")
     lines += [f"**{markdown(wording.summary(report))}**\n", f"{markdown(wording.run_line(report))}\n"]
     lines += [_LEFT_OUT] if detail != _ALL else []

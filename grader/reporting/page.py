@@ -8,7 +8,7 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
-from grader.reporting.escape import obeyed_by_none
+from grader.reporting.escape import without_workflow_commands
 
 #: Narrowest page that can be laid out, in columns.
 NARROWEST = 20
@@ -38,7 +38,7 @@ class Page:
 
     def text(self) -> str:
         """Return the text so far; no line of it is a GitHub workflow command, even after wrapping."""
-        return obeyed_by_none(self._out.getvalue())
+        return without_workflow_commands(self._out.getvalue())
 
     def blank(self) -> None:
         """Write an empty line, unless the page is empty."""

@@ -132,7 +132,7 @@ def _more(page: Page, count: int, what: str, *, indent: str = "  ") -> None:
 
 def _foot(page: Page, report: Report) -> None:
     for name, value in wording.reproduction(report):
-        loud = name == "isolation" and wording.without_walls(report)
+        loud = name == "isolation" and wording.ran_without_sandbox(report)
         page.put(value, prefix=_row(name), style="bold red" if loud else "dim")
     prefix = _row("reproduce")
     for line in _command_lines(wording.command(report), page.width - prefix.cell_len):

@@ -178,7 +178,7 @@ def isolation(report: Report) -> str:
     return summarised(report.environment.isolation, report.environment.containment)
 
 
-def without_walls(report: Report) -> bool:
+def ran_without_sandbox(report: Report) -> bool:
     """Return whether the student's code ran without a sandbox."""
     return report.environment.isolation == NO_WALLS
 

@@ -28,8 +28,8 @@ from grader.submissions.collected import (
     collision,
     folders_of,
     generated_folders,
-    objection,
-    passed_over,
+    is_skipped,
+    name_problem,
     shown,
 )
 
@@ -407,10 +407,10 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
         name = _relative(member)
         if not name:  # the top folder itself
             continue
-        problem = objection(name)
+        problem = name_problem(name)
         if problem:
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
-        if passed_over(name if member.kind != FOLDER else f"{name}/x"):
+        if is_skipped(name if member.kind != FOLDER else f"{name}/x"):
             continue
         if member.kind == FOLDER:
             continue

@@ -65,32 +65,32 @@ _OBJECTIONS: dict[str, Callable[[str], object]] = {
 }
 
 
-def passed_over_folder(name: str) -> bool:
+def is_skipped_folder(name: str) -> bool:
     """Return whether a folder of this name is skipped: caches, environments, version control."""
     return name in _SKIPPED_FOLDERS or name.startswith(".")
 
 
-def passed_over_file(name: str) -> bool:
+def is_skipped_file(name: str) -> bool:
     """Return whether an operating system created a file of this name."""
     return name in _SKIPPED_FILES or name.startswith("._")
 
 
-def unnoticed(name: str, *, is_folder: bool) -> str:
+def why_skipped(name: str, *, is_folder: bool) -> str:
     """Return why a submission of this name would be skipped, as a phrase.
 
     Empty if it would not be, or if a system or interpreter created it: then nobody expects it to be found.
     """
-    if passed_over_file(name) or (is_folder and name in _BY_SYSTEMS):
+    if is_skipped_file(name) or (is_folder and name in _BY_SYSTEMS):
         return ""
     if name.startswith("."):
         return "its name begins with a dot"
-    return "its name is that of a tool's folder" if is_folder and passed_over_folder(name) else ""
+    return "its name is that of a tool's folder" if is_folder and is_skipped_folder(name) else ""
 
 
-def passed_over(path: str) -> bool:
+def is_skipped(path: str) -> bool:
     """Return whether a relative path, with `/`, is or lies in something that is skipped."""
     *folders, name = path.split("/")
-    return passed_over_file(name) or any(map(passed_over_folder, folders))
+    return is_skipped_file(name) or any(map(is_skipped_folder, folders))
 
 
 def generated_folders(paths: Iterable[str]) -> dict[str, str]:
@@ -112,7 +112,7 @@ def folders_of(path: str) -> Iterator[str]:
         at = path.find("/", at + 1)
 
 
-def objection(path: str) -> str:
+def name_problem(path: str) -> str:
     """Return what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
     return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
 

@@ -21,8 +21,8 @@ from grader.submissions.collected import (
     MAX_TOTAL_BYTES,
     Collected,
     LeftOut,
-    passed_over_file,
-    passed_over_folder,
+    is_skipped_file,
+    is_skipped_folder,
 )
 
 _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -135,7 +135,7 @@ class _Walk:
         return names
 
     def _file(self, relative: str, name: str) -> Iterator[str]:
-        if passed_over_file(name):
+        if is_skipped_file(name):
             return
         if len(os.fsencode(relative)) > MAX_PATH_BYTES:
             self.left.add("the path is too long", relative)
@@ -146,7 +146,7 @@ class _Walk:
         yield relative
 
     def _folder(self, parent: int, name: str, relative: str, depth: int, info: os.stat_result) -> Iterator[str]:
-        if passed_over_folder(name) or _identity(info) == self.own:
+        if is_skipped_folder(name) or _identity(info) == self.own:
             return
         if depth > MAX_DEPTH:
             raise _too_much(self.where, f"{MAX_DEPTH} folders inside each other")

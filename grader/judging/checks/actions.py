@@ -23,8 +23,8 @@ from grader.judging.values import (
     breach,
     broken_rules,
     published,
+    rules_text,
     shown,
-    told,
     value_at,
 )
 from grader.judging.wording import counted, listed, moment, nearest, number, quote, span
@@ -65,7 +65,7 @@ class ActionResult:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        result = f" with {told(self.result)}" if self.result else ""
+        result = f" with {rules_text(self.result)}" if self.result else ""
         within = "" if self.within is None else f" within {number(seconds(self.within))} s"
         return f"every goal for {self.action} {self.status}{result}{within}"
 
@@ -82,7 +82,7 @@ class ActionResult:
                 reason = f"{moment(goal.request.t_ns)}, {self.action}, goal {place}: {flaw}"
                 return _unless_crashed(trace, not_met(reason, evidence, hint=hint), goal)
         reason = f"{self.action}: {counted(len(goals), 'goal')} {self.status}"
-        return met(f"{reason}{', ' + told(self.result) if self.result else ''}", evidence)
+        return met(f"{reason}{', ' + rules_text(self.result) if self.result else ''}", evidence)
 
     def _flaw(self, trace: Trace, goal: Call, results: Sequence[Call]) -> tuple[str, str]:
         """Return what is wrong with the end of a goal, and a hint; empty if nothing is."""
@@ -146,7 +146,7 @@ class ActionFeedback:
     def expected(self) -> str:
         """What is expected, in one phrase."""
         grows = f", {self.grows} growing" if self.grows else ""
-        each = f", in each {told(self.fields)}" if self.fields else ""
+        each = f", in each {rules_text(self.fields)}" if self.fields else ""
         return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
 
     def judge(self, trace: Trace) -> Finding:

@@ -26,7 +26,7 @@ from grader.judging.values import (
     number_at,
     published,
     published_numbers,
-    told,
+    rules_text,
 )
 from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
 
@@ -50,7 +50,7 @@ class FieldEqual:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        return f"{told(self.fields)} in every message on {self.topic}"
+        return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if no message differs; the reason names the first that does."""
@@ -60,7 +60,7 @@ class FieldEqual:
         wrong = [m for m in messages if broken_rules(m.value, self.fields, self.tolerance)]
         evidence = {"topic": self.topic, "messages": len(messages), "wrong": len(wrong)}
         if not wrong:
-            return met(f"{self.topic}: {told(self.fields)} in {counted(len(messages), 'message')}", evidence)
+            return met(f"{self.topic}: {rules_text(self.fields)} in {counted(len(messages), 'message')}", evidence)
         path = broken_rules(wrong[0].value, self.fields, self.tolerance)[0]
         clause = breach(wrong[0].value, path, as_rule(self.fields[path], self.tolerance))
         reason = f"{moment(wrong[0].t_ns)}, {self.topic}: {clause}; wrong in {len(wrong)} of "

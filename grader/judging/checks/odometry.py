@@ -136,7 +136,7 @@ class LogsPosition:
         return Chart(
             id=f"path {self.topic}",
             title=f"The path on {self.topic} and the logged positions",
-            about=_told_path(self.topic, track, pairs, len(pairs) - len(shown)),
+            about=_describe_path(self.topic, track, pairs, len(pairs) - len(shown)),
             criteria=(),
             x_title="x",
             x_unit="m",
@@ -264,7 +264,7 @@ class LogPeriod:
         return time_chart(
             f"period {self.topic}",
             "When positions were logged",
-            _told_period(times, self),
+            _describe_period(times, self),
             (
                 Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
                 Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
@@ -379,7 +379,7 @@ def _dots(name: str, pairs: Sequence[_LoggedPair], tone: Tone) -> list[Series]:
     return [series(name, [p.point for p in pairs], look=Look.DOTS, tone=tone, texts=[p.text for p in pairs])]
 
 
-def _told_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
+def _describe_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
     right = sum(p.right for p in pairs)
     first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
     said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
@@ -394,7 +394,7 @@ def _place(x: float, y: float) -> str:
     return f"({x:.2f}, {y:.2f}) m"
 
 
-def _told_period(times: Sequence[int], check: LogPeriod) -> str:
+def _describe_period(times: Sequence[int], check: LogPeriod) -> str:
     wanted = f"Expected: one every {number(seconds(check.period))} s ± {number(100 * check.tolerance)} % on average."
     if len(times) < 2:
         return f"One log, at {moment(times[0])}. {wanted}"

@@ -21,7 +21,14 @@ from grader.judging.findings import (
     met,
     not_met,
 )
-from grader.judging.service_calls import LATENESS_NS, Got, Set, asked_for, got, settings
+from grader.judging.service_calls import (
+    LATENESS_NS,
+    ParameterSetting,
+    ReportedParameter,
+    asked_for,
+    reported_parameter,
+    settings,
+)
 from grader.judging.source import Source, read, subtree
 from grader.judging.values import FieldRule, as_number, published, shown, value_at
 from grader.judging.wording import counted, listed, moment, number, quote, span
@@ -60,7 +67,7 @@ class ParameterDeclared:
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if the first response for the parameter fits."""
         calls = asked_for(trace, self.name, self.node)
-        answers = [found for call in calls if (found := got(call, self.name)) is not None]
+        answers = [found for call in calls if (found := reported_parameter(call, self.name)) is not None]
         if not answers:
             return _unanswered(trace, self.name, self.node, asked=bool(calls))
         found = min(answers, key=lambda a: a.t_ns)
@@ -72,7 +79,7 @@ class ParameterDeclared:
         said = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
         return not_met(f"{said}, expected {flaw}", evidence) if flaw else met(said, evidence)
 
-    def _flaw(self, found: Got) -> str:
+    def _flaw(self, found: ReportedParameter) -> str:
         if self.type not in (None, found.type):
             return f"type {self.type}"
         if self.value is None or FieldRule(equals=self.value, tolerance=self.tolerance).allows(found.value):
@@ -152,7 +159,7 @@ class ParameterTakesEffect:
         values = ", ".join(shown(s.value) for s in tries)
         return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
 
-    def _flaw(self, one: Set, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
+    def _flaw(self, one: ParameterSetting, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
         """Return what is wrong after a value was set, and a hint; empty if nothing is."""
         if not one.answered:
             return "no answer", "spin the node: rclpy.spin(node)"
@@ -167,7 +174,7 @@ class ParameterTakesEffect:
             return self._field_flaw(one, after), hint
         return self._pace_flaw(one, after), hint
 
-    def _field_flaw(self, one: Set, after: Sequence[Message]) -> str:
+    def _field_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
         if not after:
             return f"no message on {self.topic} afterwards"
         if isinstance(one.value, (list, tuple)):
@@ -179,7 +186,7 @@ class ParameterTakesEffect:
             return ""
         return f"{self.field} is {shown(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
 
-    def _pace_flaw(self, one: Set, after: Sequence[Message]) -> str:
+    def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
         wanted = as_number(one.value)
         if wanted is None or not wanted > 0:
             raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")

@@ -203,7 +203,7 @@ class TopicRate:
         return time_chart(
             f"rate {self.topic}",
             f"How often {self.topic} came",
-            _told_rate(self, inside),
+            _describe_rate(self, inside),
             (_rate_panel(self, times), _interval_panel(self, times)),
             happenings(trace),
         )
@@ -265,7 +265,7 @@ def _rates(times: Sequence[int], trailing_ns: int) -> list[Point]:
     return points
 
 
-def _told_rate(check: TopicRate, times: Sequence[int]) -> str:
+def _describe_rate(check: TopicRate, times: Sequence[int]) -> str:
     gaps = [(b - a) / NS_PER_MS for a, b in pairwise(times)]
     if len(times) < 2 or times[-1] == times[0]:
         return f"{counted(len(times), 'message')} on {check.topic} in the window."

@@ -16,10 +16,9 @@ from grader.judging.charts import happenings, plain_topic, points_of, series, ti
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
 from grader.judging.output import (
-    Heard,
+    LoggedNumbers,
     Output,
     Sought,
-    crowd,
     followed,
     in_window,
     numbers_in,
@@ -27,6 +26,7 @@ from grader.judging.output import (
     shows_about,
     standing,
     student_records,
+    surroundings,
     times,
     wrong_conversion,
 )
@@ -116,7 +116,7 @@ class LogsValues:
             return faulted(fault, lost, evidence)
         if hidden:
             first = unlogged[0]
-            among = crowd(records, self._sought([first], [first.stop_ns])[0])
+            among = surroundings(records, self._sought([first], [first.stop_ns])[0])
             share = f"{len(unlogged)} of {counted(len(received), 'message')}"
             return _hidden(self, share, (first.value, first.t_ns), among, evidence)
         outputs = records if any(numbers_in(r.text) for r in records) else lines
@@ -205,7 +205,7 @@ class LogsValues:
             return "", rule
         if len(silent) > len(received) / 2:
             return f"nothing is logged at {len(silent)} of the messages", rule
-        heard = [Heard(r.value, self._numbers(r, outputs)) for r in received]
+        heard = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         largest = max(abs(r.value) for r in received)
         right = [f for f in self.unit_factors if self._mostly(heard, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
@@ -219,7 +219,7 @@ class LogsValues:
     def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Any, ...]:
         return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
 
-    def _mostly(self, heard: Sequence[Heard], factor: float, coarsest: float) -> bool:
+    def _mostly(self, heard: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
         hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
         return hits > 0.8 * len(heard)
 
@@ -283,7 +283,7 @@ class LogsReceived:
             return faulted(fault, lost, evidence)
         if absent:
             return self._unlogged(subscriptions, values, absent, evidence)
-        among = crowd(records, sought[values.index(unlogged[0])])
+        among = surroundings(records, sought[values.index(unlogged[0])])
         share = f"{len(unlogged)} of {len(values)} values"
         return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
 

@@ -15,7 +15,7 @@ from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import FieldRule, breach, broken_rules, number_at, text_at, told
+from grader.judging.values import FieldRule, breach, broken_rules, number_at, rules_text, text_at
 from grader.judging.wording import counted, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
@@ -124,7 +124,7 @@ class ServiceResponse:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        return f"in every response of {self.service}: {told(self.fields)}"
+        return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if no response differs; the reason names the first that does."""
@@ -134,7 +134,7 @@ class ServiceResponse:
         wrong = [(k, r) for k, r in enumerate(found, 1) if broken_rules(r.value, self.fields)]
         evidence = {"service": self.service, "responses": len(found), "wrong": len(wrong)}
         if not wrong:
-            return met(f"{self.service}: {told(self.fields)} in {counted(len(found), 'response')}", evidence)
+            return met(f"{self.service}: {rules_text(self.fields)} in {counted(len(found), 'response')}", evidence)
         place, first = wrong[0]
         path = broken_rules(first.value, self.fields)[0]
         reason = f"{moment(first.t_ns)}, {self.service}: {breach(first.value, path, self.fields[path])} in response "

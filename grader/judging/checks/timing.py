@@ -34,8 +34,8 @@ from grader.judging.values import (
     broken_rules,
     heard_from_ns,
     published,
+    rules_text,
     student_endpoints,
-    told,
     value_at,
 )
 from grader.judging.wording import counted, listed, moment, number, quote, span
@@ -365,7 +365,7 @@ class Reaction:
             took = seconds(late.t_ns - asked.given.t_ns)
             return f"the right message came after {took:.3f} s, expected within {span(self.within)}"
         if not asked.outputs:
-            return f"no message within {span(self.within)}, expected {told(rules)}"
+            return f"no message within {span(self.within)}, expected {rules_text(rules)}"
         return self._difference(asked.outputs[-1], rules)
 
     def _difference(self, output: Message, rules: Mapping[str, RuleOrValue]) -> str:
@@ -392,7 +392,7 @@ class Reaction:
 
     def _untried(self, trace: Trace, missing: Sequence[ReactionCase]) -> Finding:
         fault = first_fault(trace)
-        case = told(missing[0].when)
+        case = rules_text(missing[0].when)
         if fault is not None:
             return faulted(fault, f"{self.input} with {case} did not come before")
         if not trace.deliveries(self.input):

@@ -198,7 +198,7 @@ class FieldValues:
         return time_chart(
             f"fields {self.topic}",
             f"{title} on {self.topic}",
-            _told_fields(self, messages),
+            _describe_fields(self, messages),
             (_field_panel(self, messages, group),),
             happenings(trace),
         )
@@ -241,7 +241,7 @@ def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) 
     return Panel(group if same else "value", _UNITS.get(group, "") if same else "", tuple(lines), levels=levels)
 
 
-def _told_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
+def _describe_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
     parts = []
     for path, want in check.values.items():
         got = [g for g in (field(m.value, path) for m in messages) if g is not None]

@@ -52,7 +52,7 @@ def diagnose(
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    said = _Said(exercise)
+    said = _Reporter(exercise)
     return tuple(said.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
 
 
@@ -73,7 +73,7 @@ def clue_for(case: Case) -> tuple[str, Clue] | None:
 
 
 @dataclass(slots=True)
-class _Said:
+class _Reporter:
     """Remembers the criterion with which each cause was reported, so that none is reported twice."""
 
     exercise: Exercise

@@ -37,7 +37,7 @@ _ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)
 
 
 @dataclass(frozen=True, slots=True)
-class _Hearer:
+class _Subscriber:
     """A file that subscribes to a controller's input and answers, and the code of its callback."""
 
     source: Source
@@ -56,23 +56,23 @@ class _Controller:
     check: ThresholdResponse | AnswersTogether
 
 
-def _hearers(case: Case) -> Iterator[_Hearer]:
+def _subscribers(case: Case) -> Iterator[_Subscriber]:
     """Yield the files that subscribe to the input and answer."""
     for source in case.sources.values():
         item = made_for(source, "subscription", case.check.input)
         if item is not None and made_for(source, "publisher", case.check.output) is not None:
-            yield _Hearer(source, list(reached(source, roots(source, item.callback))))
+            yield _Subscriber(source, list(reached(source, roots(source, item.callback))))
 
 
-def _late(case: Case) -> _Hearer | None:
+def _late(case: Case) -> _Subscriber | None:
     """Return the controller, if its answers are late."""
     late = case.evidence("lag_s") is not None or case.evidence("behind") is not None
-    return next(_hearers(case), None) if late else None
+    return next(_subscribers(case), None) if late else None
 
 
 def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
     """Yield the two-sided comparisons in the code of the controller's callback."""
-    yield from ((h.source, n) for h in _hearers(case) for n in h.comparisons() if len(n.ops) == 1)
+    yield from ((h.source, n) for h in _subscribers(case) for n in h.comparisons() if len(n.ops) == 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def _wrong_inputs(case: Case) -> list[float]:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _stored_late(late: _Hearer) -> Clue | None:
+def _stored_late(late: _Subscriber) -> Clue | None:
     """An attribute is compared before it gets the new value."""
     source = late.source
     for test in late.comparisons():
@@ -140,7 +140,7 @@ def _stored_late(late: _Hearer) -> Clue | None:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _oldest_compared(late: _Hearer) -> Clue | None:
+def _oldest_compared(late: _Subscriber) -> Clue | None:
     """The oldest of several stored values is compared."""
     source = late.source
     for test in late.comparisons():
@@ -158,7 +158,7 @@ def _grows(source: Source, values: ast.expr) -> bool:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _put_off(late: _Hearer) -> Clue | None:
+def _put_off(late: _Subscriber) -> Clue | None:
     """The answer is left to a timer, or the callback sleeps before it answers."""
     source = late.source
     for node in late.reached:
