@@ -63,7 +63,7 @@ def illustrated(
 
 
 def expectation(check: Check) -> str:
-    """Return what a check expects, without a full stop; empty if it does not define it."""
+    """Return the phrase for a check's expectation, without a full stop; empty if it has none."""
     own = getattr(check, "expected", "")
     return own if isinstance(own, str) else ""
 

@@ -102,7 +102,7 @@ def faults_before_stop(trace: Trace, process: str | None = None) -> list[Fault]:
 
 
 def fault_hint(fault: Fault) -> str:
-    """Return what to do about a fault if that is clear; empty otherwise."""
+    """Return a hint about a fault if the remedy is clear; empty otherwise."""
     if fault.exit_code != 0:
         return ""
     return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT

@@ -296,7 +296,7 @@ def _without_points(
 
 
 def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
-    """Return what identifies a fault across scenarios, or None if the finding rests on none."""
+    """Return a key that identifies a fault across scenarios, or None if the finding rests on none."""
     fault = finding.evidence.get(FAULT_KEY)
     if not isinstance(fault, Mapping):
         return None

@@ -350,7 +350,7 @@ class LoggedNumbers:
 
 
 def wrong_conversion(heard: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
-    """Return what is logged instead of a converted value, as a clause, and a hint; both empty if unclear.
+    """Return a clause about what is logged instead of a converted value, and a hint; both empty if unclear.
 
     Args:
         heard: One entry for each message with a log.

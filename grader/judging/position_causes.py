@@ -83,7 +83,7 @@ _SINGLES = (
 
 
 def cause_of(analysis: Analysis, track: Track) -> Cause:
-    """Return what the texts show instead of the position, or at least where they first differ."""
+    """Return the cause that explains what the texts show, or at least where they first differ."""
     if analysis.by_chance:
         return _chance(analysis)
     sampled = [_sample(g) for g in analysis.groups]

@@ -50,7 +50,7 @@ def run_check(
     submission: Submission,
     sources: Mapping[str, str] | None = None,
 ) -> Answer:
-    """Return what the criterion's check finds in the trace of its scenario, or in the source of its files."""
+    """Run the criterion's check on the trace of its scenario, or on the source of its files."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
     if missing:
@@ -144,7 +144,7 @@ _DEEPEST = 12
 
 
 def breach(finding: object) -> str:
-    """Return what is wrong with a check's return value, as the end of a sentence; empty if it is a valid finding."""
+    """Describe what is wrong with a check's return value, as the end of a sentence; empty if it is a valid finding."""
     if not isinstance(finding, Finding):
         return f"returned a {type(finding).__name__}, expected a Finding"
     if isinstance(finding.credit, bool) or not isinstance(finding.credit, (int, Fraction)):

@@ -177,7 +177,7 @@ _Wanted = Callable[[Sample], float]
 
 
 def followed_instead(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead:
-    """Return what a series follows instead of a formula, if that is clear.
+    """Find what a series follows instead of a formula, if that is clear.
 
     Args:
         wanted: The expected formula.

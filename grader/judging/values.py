@@ -81,7 +81,7 @@ def carries_number(type_: str) -> bool:
 
 
 def published(trace: Trace, topic: str) -> tuple[Message, ...]:
-    """Return what the student's nodes published on a topic during the observation."""
+    """Return the messages of the student's nodes on a topic during the observation."""
     return trace.once((published, topic), lambda: _observed(trace, trace.messages(topic)))
 
 
@@ -90,7 +90,7 @@ def _observed(trace: Trace, messages: tuple[Carrier, ...]) -> tuple[Carrier, ...
 
 
 def delivered(trace: Trace, topic: str) -> tuple[Delivery, ...]:
-    """Return what the grader published on a topic during the observation."""
+    """Return the grader's messages on a topic during the observation."""
     return trace.once((delivered, topic), lambda: _observed(trace, trace.deliveries(topic)))
 
 

@@ -127,7 +127,7 @@ def _matrix(page: Page, checkup: Checkup) -> None:
 
 
 def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
-    """Return what provides a property in the tier that is used; empty if nothing does."""
+    """Return the mechanism that provides a property in the used tier; empty if there is none."""
     found = (found for tier in tiers if tier.name == used for found in tier.properties)
     return next((one.mechanism for one in found if one.name == name and one.holds), "")
 

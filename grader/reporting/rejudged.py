@@ -67,7 +67,7 @@ class ReportChange:
 
 
 def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> ReportChange:
-    """Return what changed between two JSON reports, for the exercises in the second one.
+    """Compare two JSON reports, for the exercises in the second one.
 
     Raises:
         KeyError, TypeError, ValueError: `before` is not a report.

@@ -47,7 +47,7 @@ def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
 
 
 def handed_in(environment: Mapping[str, str]) -> HandedIn:
-    """Return what Classroom 50 knows about the submission.
+    """Return the metadata of the submission from Classroom 50.
 
     Raises:
         GraderError: A value that a result needs is missing.

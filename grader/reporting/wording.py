@@ -99,7 +99,7 @@ def explanation(verdict: Verdict) -> list[str]:
 
 
 def opening(report: Report) -> list[str]:
-    """Return what a reader must know before the criteria; each safe to show as a line of text."""
+    """Return the lines before the criteria; each safe to show as a line of text."""
     blocked = any(v.outcome is Outcome.BLOCKED for e in report.exercises for v in e.verdicts)
     return [
         headline(report),
@@ -123,7 +123,7 @@ def remarks(exercise: ExerciseReport) -> list[str]:
 
 
 def ending(report: Report) -> list[str]:
-    """Return what reproduces the report, the command last; each safe to show as a line of text."""
+    """Return the lines that help to reproduce the report, the command last; each safe to show as a line of text."""
     rows = [f"{name}: {value}" for name, value in reproduction(report)]
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
 
@@ -139,7 +139,7 @@ def place(file: str, line: int) -> str:
 
 
 def happened(fault: ReportedFault) -> str:
-    """Return what happened where and when, without the text of the fault; safe to show as a line of text."""
+    """Return kind, place and time of a fault, without its text; safe to show as a line of text."""
     what = _WHAT_HAPPENED.get(fault.kind, shown(fault.kind))
     when = f" at t = {seconds(fault.t_ns):.3f} s" if fault.t_ns else ""
     where = place(fault.file, fault.line) or "the node"

@@ -113,7 +113,7 @@ def folders_of(path: str) -> Iterator[str]:
 
 
 def name_problem(path: str) -> str:
-    """Return what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
+    """Describe what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
     return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
 
 

@@ -85,7 +85,7 @@ class ActionResult:
         return met(f"{reason}{', ' + rules_text(self.result) if self.result else ''}", evidence)
 
     def _flaw(self, trace: Trace, goal: Call, results: Sequence[Call]) -> tuple[str, str]:
-        """Return what is wrong with the end of a goal, and a hint; empty if nothing is."""
+        """Describe what is wrong with the end of a goal, and a hint; empty if nothing is."""
         if goal.response is None:
             return "no answer to the goal", "spin the node, and return a GoalResponse from its goal callback"
         accepted = goal.response.value.get("accepted") is True

@@ -271,7 +271,7 @@ class ReactsToResponses:
         return self._explain(trace, wrong, evidence)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
-        """Return what is wrong with the reaction to a response; empty if nothing is."""
+        """Describe what is wrong with the reaction to a response; empty if nothing is."""
         if episode.kind is CallKind.LOW:
             return "" if complaints(episode.outputs) else "no record of severity WARN"
         before = episodes[episode.place - 2] if episode.place > 1 else None

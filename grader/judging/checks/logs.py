@@ -270,7 +270,7 @@ class LogsEvery:
         return hits >= _SHOWING * len(group)
 
     def _flaw(self, found: _Rhythm, messages: Sequence[Message]) -> str:
-        """Return what is wrong with the spacing, as a clause; empty if nothing is."""
+        """Describe what is wrong with the spacing, as a clause; empty if nothing is."""
         places, last = found.places, len(messages) - 1
         if len(places) < 2:
             return f"only with message {places[0] + 1}"

@@ -160,7 +160,7 @@ class ParameterTakesEffect:
         return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
 
     def _flaw(self, one: ParameterSetting, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
-        """Return what is wrong after a value was set, and a hint; empty if nothing is."""
+        """Describe what is wrong after a value was set, and a hint; empty if nothing is."""
         if not one.answered:
             return "no answer", "spin the node: rclpy.spin(node)"
         if not one.taken:

@@ -151,7 +151,7 @@ class LogsValues:
         return [r for k, r in enumerate(received) if not found >= set(range(k * many, (k + 1) * many))]
 
     def _sought(self, received: Sequence[_Received], stops_ns: Sequence[int]) -> list[Sought]:
-        """Return what must be logged: one value per factor for each message."""
+        """Return the values that must be logged: one per factor for each message."""
         largest = max(abs(r.value) for r in received)
         return [
             Sought(r.t_ns, stop_ns, f * r.value, abs(f) * largest, partial(_shows, f * r.value, abs(f) * largest))

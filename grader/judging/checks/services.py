@@ -306,7 +306,7 @@ class ServiceSequence:
         return f"no field {self.field} with a number" if text is None else f"no number in {quote(text, 60)!r}"
 
     def _instead(self, got: Sequence[float | None], place: int) -> tuple[str, str]:
-        """Return what the numbers do instead, and a hint; both empty if that is unclear."""
+        """Return a clause about what the numbers do instead, and a hint; both empty if unclear."""
         values = [v for v in got if v is not None]
         if len(values) < max(3, len(got)):
             return "", ""

@@ -347,7 +347,7 @@ class Reaction:
         return found
 
     def _wrong(self, trace: Trace, asked: _Asked) -> str:
-        """Return what is wrong with the outputs after an input; empty if nothing is."""
+        """Describe what is wrong with the outputs after an input; empty if nothing is."""
         if asked.case.silent:
             return f"{moment(asked.outputs[0].t_ns)}: a message came, expected none" if asked.outputs else ""
         rules = asked.case.rules(asked.given.value)

@@ -340,7 +340,7 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
 
 
 def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
-    """Return what is offered and what is requested if they are incompatible; None otherwise."""
+    """Return the offered and the requested policy if they are incompatible; None otherwise."""
     if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
         return "best_effort reliability", "reliable"
     if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):

@@ -85,7 +85,7 @@ class Subscribes:
 
 
 def _demand(subscription: Endpoint) -> str:
-    """Return what a subscription requests that an ordinary publisher does not offer; empty if nothing."""
+    """Return the policy that a subscription requests and an ordinary publisher does not offer; empty if none."""
     if subscription.durability == "transient_local":
         return "transient_local durability, which a volatile publisher does not offer"
     if subscription.deadline_ns:
