@@ -19,8 +19,8 @@ from grader.core.exercise import Exercise
 from grader.core.report import CheckExplanation, CriterionExplanation
 from grader.judging.checks import CHECKS
 from grader.rubrics.builtin import builtin_rubrics
+from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.loader import read_rubric
-from grader.rubrics.manuals import manual_of
 
 CRITERIA = [(e.id, c.id) for path in builtin_rubrics().values() for e in [read_rubric(path)] for c in e.criteria]
 

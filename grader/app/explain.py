@@ -32,8 +32,8 @@ from grader.core.scenario import (
 )
 from grader.judging.checks import CHECKS
 from grader.judging.run_check import check_name
+from grader.rubrics.check_parameters import Manual, manual_of
 from grader.rubrics.loader import own_checks
-from grader.rubrics.manuals import Manual, manual_of
 from grader.rubrics.units import format_quantity
 from grader.rubrics.variants import First
 

@@ -29,7 +29,7 @@ from grader.submissions.archives import (
     unpacked,
     zip_members,
 )
-from grader.submissions.collected import collision, listed, objection, passed_over, shown, unnoticed
+from grader.submissions.collected import collision, is_skipped, listed, name_problem, shown, why_skipped
 
 #: Groups that a pattern may have; `file` makes several files of one student one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")
@@ -264,12 +264,12 @@ def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
         part, below, _ = name.partition("/")
         if name in ("", ".") or f"{whole}/" == around:
             continue
-        if objection(part) or not whole.startswith(around):
-            found.strays.append(f"{shown(whole)} ({objection(part) or 'beside the folder of all others'})")
-        elif objection(name) or not passed_over(name if member.kind != FOLDER else f"{name}/x"):
+        if name_problem(part) or not whole.startswith(around):
+            found.strays.append(f"{shown(whole)} ({name_problem(part) or 'beside the folder of all others'})")
+        elif name_problem(name) or not is_skipped(name if member.kind != FOLDER else f"{name}/x"):
             by_part.setdefault(part, []).append((name, member))
-        elif unnoticed(part, is_folder=bool(below) or member.kind == FOLDER):
-            overlooked[part] = unnoticed(part, is_folder=bool(below) or member.kind == FOLDER)
+        elif why_skipped(part, is_folder=bool(below) or member.kind == FOLDER):
+            overlooked[part] = why_skipped(part, is_folder=bool(below) or member.kind == FOLDER)
     found.strays += [f"{shown(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
     left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
@@ -286,8 +286,8 @@ def _around(files: Iterable[str]) -> str:
 
     A folder with several folders or archives, and no program of its own, is nobody's submission.
     """
-    paths = [name.split("/") for name in files if not passed_over(name)]
-    if not paths or len({path[0] for path in paths}) != 1 or objection(paths[0][0]):
+    paths = [name.split("/") for name in files if not is_skipped(name)]
+    if not paths or len({path[0] for path in paths}) != 1 or name_problem(paths[0][0]):
         return ""
     inside = {path[1] for path in paths if len(path) > 2 or path[-1].casefold().endswith(ARCHIVE_SUFFIXES)}
     programs = any(len(path) == 2 and path[1].casefold().endswith(".py") for path in paths)
@@ -303,7 +303,7 @@ def _remove(path: Path) -> None:
 
 def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tuple[str, int]:
     """Write what belongs to one student; return why it cannot be used, if so, and how many bytes were read."""
-    problem = _objection(inside)
+    problem = _name_problem(inside)
     if problem:
         return problem, 0
     total = 0
@@ -323,9 +323,9 @@ def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tupl
     return "", total
 
 
-def _objection(inside: list[tuple[str, Member]]) -> str:
+def _name_problem(inside: list[tuple[str, Member]]) -> str:
     for name, member in inside:
-        problem = objection(name)
+        problem = name_problem(name)
         if problem:
             return f"expected plain relative names, found {problem}: {shown(name)}"
         if member.kind not in (FILE, FOLDER):

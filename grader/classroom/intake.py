@@ -15,7 +15,7 @@ from pathlib import Path
 from grader.classroom.downloads import AUTO, PATTERNS, DownloadLayout, Named, layout_of, unpack_download
 from grader.core.errors import ClassError, HarnessError, SubmissionError
 from grader.submissions.archives import ARCHIVE_SUFFIXES
-from grader.submissions.collected import objection, passed_over_file, passed_over_folder, shown, unnoticed
+from grader.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, shown, why_skipped
 from grader.submissions.staging import read_start
 
 #: Longest name, in bytes of UTF-8; room is left for a mark that tells two apart.
@@ -216,7 +216,7 @@ def _entry(one: _Found, name: str, results: Path) -> HandedInEntry:
 def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
     """Copy the files of one student into a folder under their own names; return why that cannot be, if so."""
     counted = Counter(name for name, _ in files if name)
-    wrong = next((f"found {objection(name)}: {shown(name)}" for name, _ in files if name and objection(name)), "")
+    wrong = next((f"found {name_problem(name)}: {shown(name)}" for name, _ in files if name and name_problem(name)), "")
     twice = next((f"found {shown(name)} twice" for name, count in counted.items() if count > 1), "")
     if wrong or twice:
         return f"expected files with different plain names, {wrong or twice}"
@@ -251,10 +251,10 @@ def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
     for name in names:
         path = folder / name
         is_folder = path.is_dir()
-        why = unnoticed(name, is_folder=is_folder)
+        why = why_skipped(name, is_folder=is_folder)
         if why:
             strays.append(f"{shown(str(path), 200)}: {why}, so it is not graded")
-        elif not (passed_over_folder(name) if is_folder else passed_over_file(name)):
+        elif not (is_skipped_folder(name) if is_folder else is_skipped_file(name)):
             yield path
 
 

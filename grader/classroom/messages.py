@@ -14,7 +14,7 @@ from grader.classroom.cache_key import Conditions
 from grader.core.errors import HarnessError
 from grader.core.exercise import Drawn
 from grader.reporting.delivery import write_whole
-from grader.submissions.collected import Collected, objection
+from grader.submissions.collected import Collected, name_problem
 
 #: Most that one answer may hold, and most files in it.
 MAX_ANSWER_BYTES = 512 << 20
@@ -166,7 +166,7 @@ def write_answer(files: Iterable[tuple[bytes, bytes]], into: Path, allowed: froz
         OSError: They cannot be written.
     """
     named = [(os.fsdecode(name), content) for name, content in files]
-    if len(named) > MAX_ANSWER_FILES or any(objection(n) or n.split("/")[0] not in allowed for n, _ in named):
+    if len(named) > MAX_ANSWER_FILES or any(name_problem(n) or n.split("/")[0] not in allowed for n, _ in named):
         raise HarnessError("answer: expected the files of a result, found others")
     into.mkdir()
     for name, content in named:

@@ -68,7 +68,7 @@ def _schema(*, rubric: Path | None) -> int:
 def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
     from grader.app.variants import sheet  # noqa: PLC0415
-    from grader.reporting.task_sheet import render_sheet, sheet_to_json  # noqa: PLC0415  as above
+    from grader.reporting.explained import render_sheet, sheet_to_json  # noqa: PLC0415  as above
 
     exercise = sheet(rubric, key, student)
     show(lambda _: sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise), for_people=False)

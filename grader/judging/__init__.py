@@ -1,1 +1,1 @@
-"""Turns traces into verdicts; pure functions over plain data."""
+"""Turns traces into verdicts; pure functions on plain data."""

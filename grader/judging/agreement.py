@@ -1,8 +1,8 @@
-"""Whether a program did the same on two clocks: the same plan recorded in virtual time and on the wall clock; pure.
+"""Compares two recordings of the same plan, in virtual time and on the wall clock; pure.
 
-The wall clock's recording is shorter, loses what is sent before anybody listens, and comes from a machine that others
-use as well. What may differ for these reasons, by chance or with the time of day, is no difference: rates and counts
-have wide bands, numbers that vary are not compared, and what happened near an edge of the window is left out.
+The recording on the wall clock is shorter, misses messages sent before discovery, and comes from a shared machine.
+Differences that this, chance or the time of day can explain are ignored: rates and counts have wide bands, varying
+numbers are not compared, and events near an edge of the window are left out.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds, within
 from grader.core.trace import ClockKind, Delivery, Fault, LogRecord, Message, Request, Response, Trace
 from grader.judging.findings import faults_before_stop
 
-#: Rates and counts agree within this share, and so many more or fewer.
+#: Rates and counts agree within this share, plus the absolute number below.
 SHARE, COUNT = 0.3, 4
-#: Fewer messages or records than this say nothing.
+#: Fewer messages or records than this are not compared.
 FEW = 4
-#: What begins, ends or changes nearer to an edge of the window than this may fall on its other side.
+#: Events closer to an edge of the window than this may fall on its other side.
 EDGE_NS = 2 * NS_PER_S
-#: Numbers that never vary agree within this share of them, and so much more.
+#: Constant numbers agree within this share of them, plus the absolute difference below.
 NUMBER_SHARE, NUMBER_SLACK = 0.3, 0.01
-#: So large a share of messages may hold another number than all others: the first or last of a program.
+#: Share of messages that may differ from all others: a program's first or last message.
 ODD_SHARE = 0.2
-#: A value has to be held for so long before what a program makes of it is compared, so long before the next one.
+#: How long a value must be held before the program's answer is compared, and how long before the next value.
 HELD_NS, BEFORE_NEXT_NS = NS_PER_S, 50 * NS_PER_MS
-#: Values that end no further apart than this are the same one.
+#: Values whose ends differ by at most this are the same one.
 SAME_NS = 300 * NS_PER_MS
-#: More different numbers than this are not a decision.
+#: More distinct numbers than this are not a decision.
 DECISIONS = 3
-#: Numbers under these names tell the time.
+#: Fields with these names hold the time.
 CLOCK_FIELDS = frozenset({"stamp", "sec", "nanosec", "time", "duration"})
-#: Fields of one message that are compared at most.
+#: Maximum number of fields of a message that are compared.
 FIELDS = 64
 
 
 class Aspect(str, Enum):
-    """In what two recordings differ."""
+    """The aspect in which two recordings differ."""
 
     SILENT = "silent"
     RATE = "rate"
@@ -55,13 +55,13 @@ class Aspect(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One thing that a program did on one clock only.
+    """A difference between what a program did on two clocks.
 
     Attributes:
-        aspect: What it is.
+        aspect: What differs.
         name: Topic, field, service or file.
-        virtual: How it was in virtual time: a rate in Hz, a number, a count, a word.
-        wall: How it was on the wall clock.
+        virtual: Result in virtual time: a rate in Hz, a number, a count, a word.
+        wall: Result on the wall clock.
     """
 
     aspect: Aspect
@@ -72,7 +72,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """The part of a recording that both have."""
+    """The part of a recording that both recordings cover."""
 
     trace: Trace
     start_ns: int
@@ -86,12 +86,12 @@ class _Window:
 
 
 def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tuple[Difference, ...]:
-    """Return what a program did on one clock only, the plainest first; empty if the recordings agree.
+    """Return the differences between two recordings, the most obvious first; empty if they agree.
 
     Args:
         virtual: The whole recording in virtual time.
-        wall: The beginning of the same plan on the wall clock, by a machine that kept up.
-        first_message_on: The topic whose first message begins the observation; empty if it begins at once.
+        wall: The beginning of the same plan on the wall clock, from a machine that kept up.
+        first_message_on: Topic whose first message starts the observation; empty if it starts at once.
     """
     span_ns = wall.stop_ns - _start(wall, first_message_on)
     windows = [_Window(t, start, start + span_ns) for t in (virtual, wall) for start in [_start(t, first_message_on)]]
@@ -101,11 +101,11 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
 
 
 def sentence(difference: Difference, clock: ClockKind) -> str:
-    """Say how two recordings disagree, for the reason of a clock.
+    """Return a sentence about a difference, for the report's reason of a clock.
 
     Args:
-        difference: How.
-        clock: The clock of the first one; on the wall clock it differs in what runs beside the program.
+        difference: The difference.
+        clock: Clock of the first recording; on the wall clock, the difference comes from what runs beside the program.
     """
     name = difference.name[:200]
     first, second = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
@@ -121,7 +121,7 @@ def sentence(difference: Difference, clock: ClockKind) -> str:
     return f"the node behaved differently {where[1]}: {what}"
 
 
-#: What stands between the name of what differs and how it was.
+#: Text between the name of what differs and the two results.
 _VERBS = {
     Aspect.SILENT: "had ",
     Aspect.RATE: "had ",
@@ -166,7 +166,7 @@ def _traffic(virtual: _Window, wall: _Window) -> Iterator[Difference]:
 
 
 def differ_in_count(one: int, other: int) -> bool:
-    """Return whether two counts are further apart than chance, jitter and a late start explain."""
+    """Return whether two counts differ by more than chance, jitter and a late start explain."""
     return abs(one - other) > COUNT + SHARE * max(one, other)
 
 
@@ -178,7 +178,7 @@ def _differ_in_rate(before: Sequence[Message], after: Sequence[Message]) -> bool
 
 
 def _is_regular(messages: Sequence[Message]) -> bool:
-    """Return whether messages come from a timer: what follows chance or the input has no rate to compare."""
+    """Return whether messages come from a timer; messages that follow input or chance have no rate to compare."""
     gaps = [after.t_ns - before.t_ns for before, after in pairwise(messages)]
     mean = sum(gaps) / len(gaps)
     return all(abs(gap - mean) <= SHARE * mean for gap in gaps)
@@ -190,7 +190,7 @@ def _rate(messages: Sequence[Message]) -> float:
 
 
 def _rates(virtual: _Window, wall: _Window, before: Sequence[Message], after: Sequence[Message]) -> tuple[float, float]:
-    """Return both rates over the whole window, so that pauses count."""
+    """Return both rates over the whole window, including pauses."""
     return tuple(  # type: ignore[return-value]
         len(found) / max(seconds(window.stop_ns - window.start_ns), 1e-9)
         for window, found in ((virtual, before), (wall, after))
@@ -217,7 +217,7 @@ def _alike(want: float, got: float) -> bool:
 
 
 def _columns(messages: Sequence[Message]) -> dict[str, list[float]]:
-    """Return the numbers of each field that every message has, by its path."""
+    """Return the numbers of each field that is in every message, by field path."""
     columns: dict[str, list[float]] = {}
     for message in messages:
         for path, number in _numbers(message.value):
@@ -237,7 +237,7 @@ def _numbers(value: Mapping[str, Any], above: str = "") -> list[tuple[str, float
     return found[:FIELDS]
 
 
-# --- what a program makes of what it is told ---
+# --- answers to stimuli ---
 
 
 def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
@@ -253,9 +253,9 @@ def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
 
 
 def _paired(before: Sequence[_Decision], after: Sequence[_Decision]) -> Iterator[tuple[float, float]]:
-    """Yield what was decided on both clocks for the same value, which ends at the same time in both recordings.
+    """Yield the decisions on both clocks for the same value, which ends at the same time in both recordings.
 
-    The first value may be sent in another type until the program's own is known.
+    The first value may be sent with another type until the program's own type is known.
     """
     for one in before:
         for other in after:
@@ -269,7 +269,7 @@ def _are_decisions(window: _Window, topic: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Decision:
-    """What a program published last while a value was held, and until when since the window began."""
+    """The last answer published while a value was held, and when the value ended, since the start of the window."""
 
     stop_ns: int
     given: Mapping[str, Any]
@@ -277,7 +277,7 @@ class _Decision:
 
 
 def _decided(window: _Window, given: str, output: str) -> list[_Decision]:
-    """Return what a program made of each value; only where it stood long enough, and the answer stood."""
+    """Return the program's answer to each value, if the value was held and the answer was stable long enough."""
     messages = window.trace.messages(output)
     found: list[_Decision] = []
     for start_ns, stop_ns, value in _held(window, given):
@@ -293,7 +293,7 @@ def _decided(window: _Window, given: str, output: str) -> list[_Decision]:
 
 
 def _held(window: _Window, topic: str) -> list[tuple[int, int, Mapping[str, Any]]]:
-    """Return when each value of a stimulus began and ended, inside the window."""
+    """Return start, end and content of each value of a stimulus, inside the window."""
     spans: list[tuple[int, int, Mapping[str, Any]]] = []
     for delivery in window.trace.deliveries(topic):
         if not window.holds(delivery.t_ns):

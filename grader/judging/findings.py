@@ -1,4 +1,4 @@
-"""Findings in short: what was met, what a fault brought about, and what the nodes did instead of what is missing."""
+"""Makes findings: credit, the effects of a fault, and what nodes did instead of what is missing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, T
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.judging.wording import counted, listed, nearest, quote, span
 
-#: Evidence key under which a finding names the fault that it rests on; judging an exercise counts each fault once.
+#: Evidence key for the fault that a finding rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"
 HALF = Fraction(1, 2)
 _URGENCY = {
@@ -26,17 +26,17 @@ _URGENCY = {
 }
 _SPIN_HINT = "a node lives as long as it spins: call rclpy.spin(node) at the end of main()"
 _RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
-#: An exit up to here is one of a node that never waited for anything.
+#: A node that exits within this time never waited for anything.
 AT_ONCE_NS = NS_PER_S
 
 
 def met(reason: str, evidence: Mapping[str, Any] | None = None) -> Finding:
-    """Return full credit."""
+    """Return a finding with full credit."""
     return Finding(Fraction(1), reason, evidence or {})
 
 
 def partly(reason: str, evidence: Mapping[str, Any] | None = None, *, hint: str = "") -> Finding:
-    """Return half credit."""
+    """Return a finding with half credit."""
     return Finding(HALF, reason, evidence or {}, hint=hint)
 
 
@@ -49,15 +49,15 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     blocked_by: str | None = None,
     problem: Problem | None = None,
 ) -> Finding:
-    """Return no credit.
+    """Return a finding without credit.
 
     Args:
         reason: What was found, what was expected.
         evidence: Plain JSON values behind it.
         hint: One thing to do.
-        fault: The fault that explains it; becomes the location and part of the evidence.
-        blocked_by: Criterion id, or name of a check in the same scenario, without which this cannot be asked.
-        problem: What is wrong, where diagnosis can say more about it.
+        fault: The fault that explains it; it becomes the location and part of the evidence.
+        blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
+        problem: The kind of problem, if diagnosis can add details.
     """
     known = dict(evidence or {})
     if fault is not None:
@@ -67,12 +67,12 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
 
 
 def waiting_for(needed: str, finding: Finding) -> Finding:
-    """Return a finding as one that waits for a criterion or check, without its place."""
+    """Return a finding that waits for a criterion or check, without its location."""
     return not_met(finding.reason, finding.evidence, hint=finding.hint, blocked_by=needed)
 
 
 def fault_location(fault: Fault) -> Location | None:
-    """Return the student's own line at which a fault arose, if it is known."""
+    """Return the student's own line at which a fault arose, if known."""
     return Location(fault.file, fault.line) if fault.file and fault.line > 0 else None
 
 
@@ -89,33 +89,33 @@ def fault_evidence(fault: Fault) -> dict[str, Any]:
 
 
 def first_fault(trace: Trace, process: str | None = None) -> Fault | None:
-    """Return the fault that came first; of one instant the one that says most. What follows Ctrl-C is none here."""
-    # a recording that a fault cut short stops at the instant of the fault
+    """Return the earliest fault, or the most informative one of its instant. Faults after Ctrl-C are ignored."""
+    # a recording that a fault cut short ends at the instant of the fault
     found = [f for f in faults_before_stop(trace, process) if f.t_ns <= trace.stop_ns]
     return min(found, key=lambda f: (f.t_ns, _URGENCY[f.kind]), default=None)
 
 
 def faults_before_stop(trace: Trace, process: str | None = None) -> list[Fault]:
-    """Return the faults of processes that had not been told to stop by then."""
+    """Return the faults of processes that had not yet been told to stop."""
     told = {m.detail: m.t_ns for m in reversed(trace.marks("stop_signal"))}
     return [f for f in trace.faults(process) if f.process not in told or f.t_ns < told[f.process]]
 
 
 def fault_hint(fault: Fault) -> str:
-    """Return what to do about a fault where that is plain; empty otherwise."""
+    """Return a hint about a fault if the remedy is clear; empty otherwise."""
     if fault.exit_code != 0:
         return ""
     return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
 
 
 def faulted(fault: Fault, said: str, evidence: Mapping[str, Any] | None = None, *, last: bool = False) -> Finding:
-    """Return no credit for what a fault brought about.
+    """Return a finding without credit for the effect of a fault.
 
     Args:
         fault: The fault.
-        said: What came of it, or what was found.
+        said: The effect, or what was found.
         evidence: Plain JSON values behind it.
-        last: Whether the fault is told after `said` and not before it.
+        last: Whether the fault is named after `said` instead of before.
     """
     clauses = (said, fault_sentence(fault)) if last else (fault_sentence(fault), said)
     return not_met("; ".join(clauses), evidence, hint=fault_hint(fault), fault=fault)
@@ -129,7 +129,7 @@ def explain_fault(
     process: str | None = None,
     last: bool = False,
 ) -> Finding | None:
-    """Return no credit for what the first fault of a process, or of any, brought about; None if there was none."""
+    """Return a finding without credit for the effect of the first fault, of one process or any; None without one."""
     fault = first_fault(trace, process)
     return None if fault is None else faulted(fault, said, evidence, last=last)
 
@@ -144,7 +144,7 @@ def fault_sentence(fault: Fault) -> str:
 
 
 def _own_words(fault: Fault) -> str:
-    """Return what a fault says, an exception's message in quotation marks where it could be taken for ours."""
+    """Return the text of a fault; an exception's message is quoted if it could be mistaken for the grader's words."""
     text = quote(fault.text)
     kind, colon, message = text.partition(": ")
     if fault.kind is not FaultKind.EXCEPTION or ";" not in text:
@@ -155,13 +155,13 @@ def _own_words(fault: Fault) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Wording:
-    """How the absence of an endpoint is told; `{name}` is the topic or service, `{type}` the type expected.
+    """Phrases for a missing endpoint; `{name}` is the topic or service, `{type}` the expected type.
 
     Attributes:
-        lacks: What is not there, after a fault.
-        none: What is not there at all.
-        instead: What a node does with another name.
-        typed: What a node does with the right name, before the type that it uses.
+        lacks: The endpoint is missing, after a fault.
+        none: There is no such endpoint at all.
+        instead: A node uses another name.
+        typed: A node uses the right name with another type; followed by that type.
         name_hint: What to do about another name.
         type_hint: What to do about another type.
     """
@@ -194,18 +194,18 @@ _WORDINGS = {
 
 
 def explain_no_subscription(trace: Trace, topic: str, type_: str | None = None) -> Finding:
-    """Return no credit and why nothing subscribes to `topic`, with `type_` if one is asked for."""
+    """Return no credit with the reason why nothing subscribes to `topic`, with `type_` if given."""
     found = _explain(trace, "subscription", student_endpoints(trace, "subscription"), topic, type_)
     return found or _nothing(trace, topic, "subscription")
 
 
 def explain_no_server(trace: Trace, service: str, type_: str | None = None) -> Finding:
-    """Return no credit and why no student's node answers on `service`, with `type_` if one is asked for."""
+    """Return no credit with the reason why no student's node is a server of `service`, with `type_` if given."""
     return _explain_service(trace, "service", service, type_)
 
 
 def explain_no_client(trace: Trace, service: str, type_: str | None = None) -> Finding:
-    """Return no credit and why no student's node asks on `service`, with `type_` if one is asked for."""
+    """Return no credit with the reason why no student's node is a client of `service`, with `type_` if given."""
     return _explain_service(trace, "client", service, type_)
 
 
@@ -222,7 +222,7 @@ def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -
 def _explain(
     trace: Trace, kind: str, ends: Sequence[Endpoint] | Sequence[ServiceEnd], name: str, type_: str | None
 ) -> Finding | None:
-    """Return which end of another type or name there is instead, or the fault that came first; None without either."""
+    """Return a finding about an endpoint of another type or name, or the first fault; None without either."""
     words, key = _WORDINGS[kind], "topic" if kind == "subscription" else "service"
     named = [(e, e.topic if isinstance(e, Endpoint) else e.service) for e in ends]
     typed = next((e for e, n in named if n == name and e.type != type_), None)
@@ -241,12 +241,12 @@ def _explain(
 
 
 def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> str | None:
-    """Return the name that was very likely meant: one of the same type if there is any."""
+    """Return the name that was very likely meant, preferably one of the same type."""
     return nearest(name, same_type) or next(iter(same_type), None) or nearest(name, others)
 
 
 def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Finding:
-    """Return no credit and why there is no message on `topic`, of `type_` if one is asked for."""
+    """Return no credit with the reason why there is no message on `topic`, of `type_` if given."""
     messages = [m for m in trace.messages() if m.t_ns < trace.stop_ns and m.topic not in HIDDEN_TOPICS]
     return (
         _other_type(messages, topic, type_)

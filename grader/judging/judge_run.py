@@ -1,4 +1,4 @@
-"""Judges a run: checks become verdicts, verdicts a report; and sums a trace up that nobody judges."""
+"""Judges a run: turns findings into verdicts and a report; also summarises a trace without judging it."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def judge_run(
     """Return the report of a run; pure, so the same run and the same exercises give the same report.
 
     Args:
-        exercises: What is asked, in the order of the report.
-        run: What was recorded for them.
-        pictures: Whether to draw figures as well, which takes about as long as judging and only some formats show.
-        pending: Ids of the exercises that are still being recorded; the report is then a partial one.
+        exercises: The exercises, in the order of the report.
+        run: The recordings.
+        pictures: Whether to draw figures, which takes about as long as judging and only some formats show.
+        pending: Ids of the exercises that are not yet recorded; the report is then partial.
     """
     return Report(
         name=run.submission.name,
@@ -68,14 +68,14 @@ def judge_exercise(
     """Return the report of one exercise; pure.
 
     Args:
-        exercise: What is asked.
-        traces: Scenario id -> what was recorded; scenarios with a missing file have none.
-        submission: Says which files were found, and what was found instead.
-        sources: Wanted file name -> its text, to find the causes of lost points in; None leaves them unexplained.
+        exercise: The exercise.
+        traces: Scenario id -> trace; scenarios with a missing file have none.
+        submission: Tells which files were found, and similar names for missing ones.
+        sources: Wanted file name -> its text, for finding the causes of lost points; None skips that.
 
-    One cause costs one criterion: a criterion that fails for a file, a fault or another criterion that has been named
-    before is blocked by it, not lost once more. A check that raises, and a recording that failed, leave a criterion
-    undecided.
+    One cause costs one criterion: a criterion that fails because of a file, a fault or another criterion that was
+    already reported is blocked, and loses no points of its own. If a check raises, or a recording failed, the criterion
+    is undecided.
     """
     answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}
     builder = VerdictBuilder(exercise, answers, submission)
@@ -118,12 +118,12 @@ def _notes(
 
 
 def started(trace: Trace) -> tuple[str, ...]:
-    """Return which files were started in another way than `python3 FILE`, and in which."""
+    """Return the files that were not started as `python3 FILE`, and how they were started."""
     return tuple(f"{s.file}: run {s.words}" for s in trace.starts if s.way is not StartWay.SCRIPT)
 
 
 def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
-    """Return the faults of all scenarios; the same one in several scenarios once."""
+    """Return the faults of all scenarios, without duplicates."""
     first: dict[tuple[str, str, str, int, str], tuple[str, Fault]] = {}
     for scenario, trace in recorded:
         for fault in trace.faults():
@@ -136,7 +136,7 @@ def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
 
 
 def _graph(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphSnapshot | None:
-    """Return the fullest graph, the last of equals, of the last scenario in which all files ran."""
+    """Return the graph with most edges, the last of equals, from the last scenario with all files."""
     whole = [s for s in exercise.scenarios if set(s.processes) == set(exercise.files) and s.id in traces]
     graphs = traces[whole[-1].id].graphs() if whole else ()
     return max(reversed(graphs), key=_edge_count, default=None)
@@ -159,7 +159,7 @@ _SAID = {
 
 @dataclass(slots=True)
 class VerdictBuilder:
-    """Goes through one exercise's answers in rubric order and remembers which causes were named already."""
+    """Processes an exercise's findings in rubric order and remembers the causes already reported."""
 
     exercise: Exercise
     answers: Mapping[str, Answer]
@@ -180,7 +180,7 @@ class VerdictBuilder:
             return self._missing(criterion, answer.missing)
         needed = next((n for n in criterion.needs if self._outcome(n) not in _EARNED), None)
         known = answer.finding is not None
-        # A question that could not be answered waits for what it needs, if that is known to be the student's to mend.
+        # A criterion that could not be judged is blocked by what it needs, if the student has to fix that.
         if needed is not None and (known or self._outcome(needed) is not Outcome.UNDECIDED):
             return self._blocked(criterion, needed, self._outcome(needed))
         if answer.finding is None:
@@ -204,7 +204,7 @@ class VerdictBuilder:
         return _earned(criterion, finding)
 
     def _outcome(self, id_: str) -> Outcome:
-        """Return what a criterion came to, or by its own finding will come to if it is still ahead."""
+        """Return the outcome of a criterion; if it is still ahead, the outcome of its own finding."""
         if id_ in self.done:
             return self.done[id_].outcome
         answer = self.answers.get(id_)
@@ -215,7 +215,7 @@ class VerdictBuilder:
         return _outcome_of(answer.finding)
 
     def _blocker(self, criterion: Criterion, finding: Finding) -> str | None:
-        """Return the criterion that a finding waits for, unless that one is met, is unknown, or waits for this one."""
+        """Return the criterion that a finding waits for, unless that is met, unknown, or waits for this one."""
         if finding.blocked_by is None:
             return None
         target = self._named(criterion, finding.blocked_by)
@@ -227,9 +227,9 @@ class VerdictBuilder:
         return None if ahead and back is not None and back.id == criterion.id else target.id
 
     def _named(self, criterion: Criterion, name: str) -> Criterion | None:
-        """Return the criterion of that id, else the first whose check has that name, nearest scenarios first.
+        """Return the criterion with that id, else the first whose check has that name, in the nearest scenarios.
 
-        These are the criterion's own, and then those in which the same processes run.
+        These are the criterion's own scenario, then those in which the same processes run.
         """
         criteria = self.exercise.criteria
         by_id = next((c for c in criteria if c.id == name), None)
@@ -269,7 +269,7 @@ def _outcome_of(finding: Finding) -> Outcome:
 
 def _earned(criterion: Criterion, finding: Finding) -> Verdict:
     outcome = _outcome_of(finding)
-    # a fault is its own cause: what the rubric supposes is then beside the point
+    # a fault is its own cause: then the criterion's needs do not matter
     supposed = "" if FAULT_KEY in finding.evidence else criterion.hint
     hint = "" if outcome is Outcome.MET else finding.hint or supposed
     return Verdict(
@@ -295,7 +295,7 @@ def _without_points(
 
 
 def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
-    """Return what makes a fault the same one in another scenario, or None if the finding rests on none."""
+    """Return a key that identifies a fault across scenarios, or None if the finding rests on none."""
     fault = finding.evidence.get(FAULT_KEY)
     if not isinstance(fault, Mapping):
         return None
@@ -303,7 +303,7 @@ def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
 
 
 def not_graded_yet(exercise: Exercise) -> ExerciseReport:
-    """Return a report in which every criterion is undecided, so that no part of it is taken for a result."""
+    """Return a report with every criterion undecided, so that no part of it looks like a result."""
     verdicts = (
         Verdict(c.id, c.title, Outcome.UNDECIDED, Fraction(0), c.points, "not graded yet") for c in exercise.criteria
     )
@@ -323,10 +323,10 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
 
 
 def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
-    """Return what the nodes of a trace did.
+    """Return a summary of what the nodes of a trace did.
 
     Args:
-        trace: What was recorded.
+        trace: The trace.
         processes: Names of the files that ran.
         isolation: The sandbox tier.
     """
@@ -384,7 +384,7 @@ def _ranges(messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
 
 
 def _numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:
-    """Yield the finite numbers of a message by their dotted names; lists are left out, they have no names."""
+    """Yield the finite numbers of a message by dotted name; lists are left out, because they have no names."""
     if isinstance(value, Mapping):
         for key, field in value.items():
             yield from _numbers(field, f"{name}.{key}" if name else key)

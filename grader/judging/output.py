@@ -1,4 +1,4 @@
-"""What a process wrote: log records and printed lines, the numbers in them, and which values these show."""
+"""The output of a process: log records and printed lines, the numbers in them, and the values that these show."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
 from grader.judging.wording import counted, number, quote
 
-#: Warnings that rclpy writes through the node's own logger when a counterpart's QoS does not fit.
+#: Warnings that rclpy writes through the node's own logger when QoS policies are incompatible.
 _RCLPY_TEXT = re.compile(r"New (publisher|subscription) discovered on (topic|service) .*incompatible QoS", re.DOTALL)
-#: Loggers of the layers below rclpy, which write when something of theirs fails.
+#: Loggers of the layers below rclpy, which report their own failures.
 _MIDDLEWARE = re.compile(r"(rmw|rcl|rcutils|rosidl|rcl_\w+|rmw_\w+|rosidl_\w+)(\.|$)")
 _TRACEBACK_HEAD = re.compile(r"\s*(Traceback \(most recent call last\):|Exception in thread .*|Exception ignored .*)$")
 _BETWEEN_TRACEBACKS = re.compile(r"(The above exception was|During handling of the above exception)")
@@ -32,7 +32,7 @@ _INTERPRETER = re.compile(
 
 
 def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
-    """Return the records of a process without those that rclpy or what is below it wrote."""
+    """Return the records of a process without those of rclpy and the layers below it."""
     return trace.once((student_records, process), lambda: _student_records(trace, process))
 
 
@@ -47,14 +47,14 @@ def _of_ros(record: LogRecord) -> bool:
 
 
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
-    """Return the lines that a process printed; tracebacks, interpreter warnings and blank lines are not printing."""
+    """Return the lines that a process printed, without tracebacks, interpreter warnings and blank lines."""
     return trace.once((printed_lines, process), lambda: _printed_lines(trace, process))
 
 
 def _printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     faults = [" ".join(f.text.split()) for f in trace.faults(process)]
     lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
-    # the text of an exception may go on over several lines, at the margin like printed ones
+    # the text of an exception may continue over several lines, without indentation like printed ones
     lines = [o for o in lines if o.stream != "stderr" or not any(" ".join(o.text.split()) in f for f in faults)]
     outs = [o for o in lines if o.stream != "stderr"]
     errs = _without_interpreter_noise([o for o in lines if o.stream == "stderr"])
@@ -73,7 +73,7 @@ def is_no_node(trace: Trace, process: str) -> bool:
 
 
 def written(trace: Trace, process: str) -> tuple[LogRecord | OutputLine, ...]:
-    """Return the records of a process, then the lines that it printed."""
+    """Return the records of a process, followed by the lines that it printed."""
     return (*student_records(trace, process), *printed_lines(trace, process))
 
 
@@ -92,7 +92,7 @@ def _without_interpreter_noise(lines: Iterable[OutputLine]) -> list[OutputLine]:
         if _TRACEBACK_HEAD.match(line.text) or _BETWEEN_TRACEBACKS.match(line.text):
             inside_traceback = True
         elif inside_traceback:
-            inside_traceback = indented  # the first line at the margin is the exception itself
+            inside_traceback = indented  # the first unindented line is the exception itself
         elif _INTERPRETER.match(line.text[:400]):
             after_warning = True
         elif not (after_warning and indented):
@@ -102,13 +102,13 @@ def _without_interpreter_noise(lines: Iterable[OutputLine]) -> list[OutputLine]:
 
 
 Output = LogRecord | OutputLine
-#: Relative difference that a conversion with a short constant explains, such as 3.14159 for pi.
+#: Relative difference that a short conversion constant explains, such as 3.14159 for pi.
 CONVERSION = 1e-4
 
 
 @lru_cache(maxsize=4096)
 def numbers_in(text: str) -> tuple[Printed, ...]:
-    """Return the numbers of a text, those with decimal commas read both ways."""
+    """Return the numbers of a text; decimal commas are read both ways."""
     body = clean(text)
     other = with_decimal_points(body)
     return printed_numbers(body) + (printed_numbers(other) if other else ())
@@ -116,19 +116,19 @@ def numbers_in(text: str) -> tuple[Printed, ...]:
 
 @lru_cache(maxsize=4096)
 def shape_of(text: str) -> str:
-    """Return a text with its numbers masked and without white space; equal for texts that say the same."""
+    """Return a text with masked numbers and without white space; equal for texts of the same wording."""
     body = clean(text)
     return template_of(body, printed_numbers(body))
 
 
 def shows_about(printed: Printed, value: float, *, coarsest: float, relative: float = CONVERSION) -> bool:
-    """Return whether a printed number shows a value, computed with a short constant and printed finely enough.
+    """Return whether a printed number shows a value precisely enough, allowing for a short conversion constant.
 
     Args:
         printed: The number.
-        value: What it should show.
-        coarsest: Largest unit of the last digit that still tells something, unless the number is exact.
-        relative: Largest relative difference that is let pass.
+        value: The value it may show.
+        coarsest: Largest unit of the last digit that is precise enough, unless the number is exact.
+        relative: Largest relative difference accepted.
     """
     slack = relative * abs(value) + 1e-9
     if abs(printed.value - value) <= slack:
@@ -137,17 +137,17 @@ def shows_about(printed: Printed, value: float, *, coarsest: float, relative: fl
 
 
 def times(factor: float) -> str:
-    """Return a factor for text; 1 is the value itself."""
+    """Return a factor for text; a factor of 1 is the value itself."""
     return "the value itself" if factor == 1 else f"{number(factor)} times the value"
 
 
 def in_window(outputs: Sequence[Output], start_ns: int, stop_ns: int) -> list[Output]:
-    """Return what was written in [start_ns, stop_ns)."""
+    """Return the outputs written in [start_ns, stop_ns)."""
     return [o for o in outputs if start_ns <= o.t_ns < stop_ns]
 
 
 def number_in(text: str, pattern: str | None = None) -> float | None:
-    """Return the number that a text tells: what the pattern finds in it, or its first number."""
+    """Return the number that the pattern finds in a text, or without a pattern the first number."""
     if pattern is not None:
         match = re.search(pattern, text[:2_000])
         if match is None:
@@ -157,17 +157,18 @@ def number_in(text: str, pattern: str | None = None) -> float | None:
     return found[0].value if found else None
 
 
-#: Share of its texts in which a place must be right; the others may hold something else that is written alike.
+#: Minimum share of texts in which a position in the text must be right; the others may be different logs of similar
+#: wording.
 _USUALLY = 0.45
-#: The same for a place that has shown one value only, as in a sentence of its own for "off".
+#: The same for a position that has shown only one value, as in a separate sentence for "off".
 _NEARLY_ALWAYS = 0.75
-#: So few numbers may stand beside each other without being suspected.
+#: Up to this many numbers in one text are not suspicious.
 _FEW = 6
-#: The same where the place has followed several values.
+#: The same if the position has followed several values.
 _FEW_FOLLOWING = 12
-#: Largest number of places that chance may be expected to make right.
+#: Maximum expected number of positions that are right by chance.
 _LUCK = 0.15
-#: A printed number shows values over at most so many units of its last digit.
+#: A printed number shows values within at most this many units of its last digit.
 _UNITS_SHOWN = 3
 _DIGITS = re.compile(r"[0-9]+")
 _REPEATED = re.compile(r"(.)\1+")
@@ -177,13 +178,13 @@ _Place = tuple[_Key, int]
 
 @dataclass(frozen=True, slots=True)
 class Sought:
-    """A value that is to be logged in [start_ns, stop_ns), and what shows it.
+    """A value that must be logged in [start_ns, stop_ns), and the test for it.
 
     Attributes:
-        start_ns: From when on its log counts.
-        stop_ns: Until when, exclusive.
+        start_ns: Earliest time of its log.
+        stop_ns: Latest time of its log, exclusive.
         value: The value.
-        scale: Size of what the values range over, in their unit.
+        scale: Size of the range of such values, in their unit.
         shows: Whether a printed number shows the value.
     """
 
@@ -196,7 +197,7 @@ class Sought:
 
 @dataclass(slots=True)
 class _Record:
-    """What one place of one kind of text showed."""
+    """Results of one position in texts of one shape."""
 
     texts: int = 0
     right: int = 0
@@ -211,14 +212,14 @@ class _Record:
 
 
 def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
-    """Return the places in `sought` of the values that are logged, and not only among many other numbers.
+    """Return the indices in `sought` of values that are logged, and not only among many other numbers.
 
     Args:
-        outputs: What was written.
-        sought: The values, in the order of their times.
+        outputs: The output to search.
+        sought: The values, ordered by time.
     """
     places = _places(outputs, sought)
-    # each number is counted from the start and from the end, and tried once
+    # each number is indexed from the start and from the end, and counted once
     tried = [p for (_, index), p in places.items() if p.near and index >= 0]
     beside = [0] * len(sought)
     for place in tried:
@@ -234,7 +235,7 @@ def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[i
 
 
 def standing(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
-    """Return the places in `sought` of the values that stand anywhere in the texts of their time."""
+    """Return the indices in `sought` of values that occur anywhere in the output of their time."""
     found: set[int] = set()
     for output, active in _active(outputs, sought):
         numbers = [n for _, ns in _readings(output.text) for n in ns]
@@ -242,8 +243,8 @@ def standing(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[i
     return frozenset(found)
 
 
-def crowd(outputs: Sequence[Output], one: Sought) -> str:
-    """Return among what a value stands in the texts of its time, as a clause."""
+def surroundings(outputs: Sequence[Output], one: Sought) -> str:
+    """Return a clause about the other numbers in the texts that show a value."""
     texts = [o.text for o, _ in _active(outputs, [one])]
     count = sum(len(_readings(text)[0][1]) for text in texts)
     longest = max(texts, key=len, default="")
@@ -251,7 +252,7 @@ def crowd(outputs: Sequence[Output], one: Sought) -> str:
 
 
 def _knows(place: _Record, tried: int, beside: int, *, several: bool) -> bool:
-    """Return whether a place is right too often for chance."""
+    """Return whether a position is right too often for chance."""
     values = len(place.chances)
     if place.share < (_NEARLY_ALWAYS if values == 1 and several else _USUALLY):
         return False
@@ -289,7 +290,7 @@ def _chance(number: Printed, one: Sought) -> float:
 
 
 def _active(outputs: Sequence[Output], sought: Sequence[Sought]) -> Iterator[tuple[Output, list[int]]]:
-    """Yield the outputs at a time at which some value is sought, with the places of those values."""
+    """Yield the outputs written while some value is sought, with the indices of those values."""
     starts = [s.start_ns for s in sought]
     longest = max((s.stop_ns - s.start_ns for s in sought), default=0)
     for output in outputs:
@@ -301,14 +302,14 @@ def _active(outputs: Sequence[Output], sought: Sequence[Sought]) -> Iterator[tup
 
 @lru_cache(maxsize=4096)
 def _readings(text: str) -> tuple[tuple[tuple[str, frozenset[str], str], tuple[Printed, ...]], ...]:
-    """Return the numbers of a text with its shape; a second time with decimal commas, if there may be some."""
+    """Return the numbers of a text with its shape, and a second reading with decimal commas if it may have some."""
     body = clean(text)
     other = with_decimal_points(body)
     return tuple((_wording(b, ns), ns) for b in (body, other) if b is not None for ns in (printed_numbers(b),))
 
 
 def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str], str]:
-    """Return what stands before, between and after the numbers; lists of any length and bars have one shape."""
+    """Return the text around the numbers as a shape; lists and bars of any length have the same one."""
     starts = [0, *(n.stop for n in numbers)]
     stops = [*(n.start for n in numbers), len(text)]
     parts = [
@@ -318,12 +319,12 @@ def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str]
 
 
 _DEGREES = 180 / math.pi
-#: Share of the messages whose numbers a factor must explain for it to be named.
+#: Minimum share of messages whose numbers a factor must explain for it to be reported.
 _SURE = 0.8
-#: Values smaller than this share of the largest say nothing about a factor.
+#: Values smaller than this share of the largest are not used to find a factor.
 _SMALL = 0.05
 _FEWEST = 3
-#: Factors that stand where that from radians to degrees belongs.
+#: Factors that appear in place of the one from radians to degrees.
 _FOR_DEGREES: tuple[tuple[float, str], ...] = (
     (200 / math.pi, "gradians, of which a full turn has 400: degrees are radians times 180 / pi"),
     (1 / _DEGREES, "the inverse conversion: degrees are radians times 180 / pi"),
@@ -336,31 +337,31 @@ _FOR_DEGREES: tuple[tuple[float, str], ...] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """What was logged for one message.
+class LoggedNumbers:
+    """The numbers logged for one message.
 
     Attributes:
-        value: What the message holds.
-        numbers: The numbers that were written for it.
+        value: The value in the message.
+        numbers: The numbers logged for it.
     """
 
     value: float
     numbers: tuple[Printed, ...]
 
 
-def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[float]) -> tuple[str, str]:
-    """Return what stands where a converted value belongs, as a clause, and a hint; both empty if that is not plain.
+def wrong_conversion(heard: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
+    """Return a clause about what is logged instead of a converted value, and a hint; both empty if unclear.
 
     Args:
         heard: One entry for each message with a log.
-        factor: What the value should have been multiplied by.
-        others: Factors that are rightly there, whose numbers are no candidates.
+        factor: The correct conversion factor.
+        others: Factors that are also correct, whose numbers are ignored.
     """
     largest = max((abs(h.value) for h in heard), default=0.0)
     telling = [h for h in heard if h.numbers and abs(h.value) > _SMALL * largest]
     if len(telling) < _FEWEST:
         return "", ""
-    left = [Heard(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
+    left = [LoggedNumbers(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
     if _share(left, lambda h, n: n.step >= 1 and n.shows(factor * h.value)) >= _SURE:
         return "it is logged as a whole number", "keep some decimals, as in f'{angle:.3f}'"
     lost = [h for h in left if factor * h.value < 0]
@@ -370,7 +371,7 @@ def wrong_conversion(heard: Sequence[Heard], factor: float, others: Sequence[flo
     return _factor(left, factor)
 
 
-def _factor(left: Sequence[Heard], factor: float) -> tuple[str, str]:
+def _factor(left: Sequence[LoggedNumbers], factor: float) -> tuple[str, str]:
     first = max(left, key=lambda h: abs(h.value))
     for candidate in (n.value / first.value for n in first.numbers if math.isfinite(n.value) and n.value != 0):
         known = _known(candidate, factor)
@@ -381,7 +382,7 @@ def _factor(left: Sequence[Heard], factor: float) -> tuple[str, str]:
     return "", ""
 
 
-def _scaled(left: Sequence[Heard], factor: float) -> float:
+def _scaled(left: Sequence[LoggedNumbers], factor: float) -> float:
     return _share(left, lambda h, n: _shows_value(n, factor * h.value, 0.01))
 
 
@@ -395,9 +396,9 @@ def _shows_value(printed: Printed, value: float, relative: float = CONVERSION) -
     return shows_about(printed, value, coarsest=abs(value) / 3, relative=relative)
 
 
-def _explained(printed: Printed, heard: Heard, factors: Sequence[float]) -> bool:
+def _explained(printed: Printed, heard: LoggedNumbers, factors: Sequence[float]) -> bool:
     return any(_shows_value(printed, f * heard.value) for f in factors)
 
 
-def _share(heard: Sequence[Heard], fits: Callable[[Heard, Printed], bool]) -> float:
+def _share(heard: Sequence[LoggedNumbers], fits: Callable[[LoggedNumbers, Printed], bool]) -> float:
     return sum(any(fits(h, n) for n in h.numbers) for h in heard) / len(heard)

@@ -1,4 +1,4 @@
-"""Runs the check of one criterion on its trace, and says why where it cannot be run."""
+"""Runs the check of a criterion on its trace, and explains why if it cannot run."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from grader.judging.wording import quote
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of asking; exactly one attribute is set.
+    """The result of running a check; exactly one attribute is set.
 
     Attributes:
-        finding: What the check found.
+        finding: The check's finding.
         missing: Files of the scenario that the submission lacks.
-        problem: Why nobody knows: our side's or the machine's failure.
-        error: Class and text of an exception in a check, for whoever mends it; goes with `problem`.
+        problem: Why there is no finding: a failure of the grader or the machine.
+        error: Class and text of an exception in a check, for its author; set together with `problem`.
         hint: One thing to do about the problem; empty if nothing is very likely right.
     """
 
@@ -50,7 +50,7 @@ def run_check(
     submission: Submission,
     sources: Mapping[str, str] | None = None,
 ) -> Answer:
-    """Return what the criterion's check finds in the trace of its scenario, or in the text of its files."""
+    """Run the criterion's check on the trace of its scenario, or on the source of its files."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     missing = tuple(p for p in scenario.processes if p in submission.files and submission.files[p].found is None)
     if missing:
@@ -67,14 +67,14 @@ def run_check(
 
 
 def _placed(finding: Finding, submission: Submission) -> Finding:
-    """Return the finding with the path under which its file was found."""
+    """Return the finding with the path at which its file was found."""
     place = finding.location
     found = submission.files[place.file].found if place is not None and place.file in submission.files else None
     return finding if place is None or not found else replace(finding, location=replace(place, file=found))
 
 
 def _put(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
-    """Return the finding of a check, which may want to see the students' files too."""
+    """Return the finding of a check, which may need the students' files too."""
     if sources is not None and isinstance(check, SourceCheck):
         return check.judge_sources(trace, sources)
     return check.judge(trace)
@@ -86,7 +86,7 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
         finding = _put(criterion.check, trace, sources)
     except HarnessError as error:
         return Answer(problem=f"{name} cannot be judged: {error.message}")
-    except (Exception, SystemExit) as error:  # a check that fails must cost no points and must not end the report
+    except (Exception, SystemExit) as error:  # a failing check must cost no points and must not end the report
         problem = f"the check {name} failed on this recording through no fault of the submission"
         said = f"{type(error).__name__}: {quote(str(error))}"
         if not criterion.check_name or name in CHECKS:
@@ -103,13 +103,13 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
 
 
 def _place(error: BaseException) -> str:
-    """Return where an error arose, as `file:line: ` without the file's folder, for whoever mends the check."""
+    """Return where an error arose, as `file:line: ` without the folder, for the author of the check."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"{frames[-1].filename.rsplit('/', 1)[-1]}:{frames[-1].lineno}: " if frames else ""
 
 
 def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> Finding:
-    """Return the finding; where a file could not even start and nothing was earned, that is the reason."""
+    """Return the finding; if a file could not start and no points were earned, that becomes the reason."""
     fault = start_failure(scenario, trace)
     if fault is None or finding.credit > 0:
         return finding
@@ -121,7 +121,7 @@ def _start_failure_first(finding: Finding, scenario: Scenario, trace: Trace) -> 
 
 
 def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
-    """Return the fault that kept a file of the scenario from creating any endpoint, or None if all of them started."""
+    """Return the fault that prevented a file from creating any endpoint, or None if all files started."""
     faults = [fault for process in scenario.processes if (fault := first_fault(trace, process)) is not None]
     if not faults:
         return None
@@ -130,7 +130,7 @@ def start_failure(scenario: Scenario, trace: Trace) -> Fault | None:
 
 
 def _started(trace: Trace) -> int:
-    """Return how many processes came so far that they had a part in the ROS graph, or said something over it."""
+    """Return how many processes created an endpoint in the ROS graph, or sent something."""
     endpoints = student_endpoints(trace)
     ends = (*trace.service_ends("service"), *trace.service_ends("client"))
     only_services = {e.node for e in ends} - {e.node for e in endpoints}
@@ -144,7 +144,7 @@ _DEEPEST = 12
 
 
 def breach(finding: object) -> str:
-    """Return what is wrong with what a check returned, as the end of a sentence; empty if it is a good finding."""
+    """Describe what is wrong with a check's return value, as the end of a sentence; empty if it is a valid finding."""
     if not isinstance(finding, Finding):
         return f"returned a {type(finding).__name__}, expected a Finding"
     if isinstance(finding.credit, bool) or not isinstance(finding.credit, (int, Fraction)):

@@ -1,4 +1,4 @@
-"""What a series of numbers follows: a formula, another one instead, an earlier input, or chance."""
+"""Finds what a series of numbers follows: a formula, another one instead, an earlier input, or chance."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from grader.core.quantities import NS_PER_MS, NS_PER_S, within
 from grader.judging.values import Reading
 from grader.judging.wording import counted, number
 
-#: The letters a formula may use: the number of a message from 0, and its time in seconds.
+#: Variables of a formula: the number of a message from 0, and its time in seconds.
 VARIABLES = ("n", "t")
 _MOST_CHARACTERS = 200
 _CONSTANTS = MappingProxyType({"pi": math.pi})
@@ -46,20 +46,20 @@ _BINARY: Mapping[type[ast.operator], Callable[[float, float], float]] = MappingP
 _UNARY: Mapping[type[ast.unaryop], Callable[[float], float]] = MappingProxyType(
     {ast.UAdd: operator.pos, ast.USub: operator.neg}
 )
-#: Functions that are taken for each other.
+#: Functions that are often confused.
 _MISTAKEN = MappingProxyType({"sin": "cos", "cos": "sin"})
 
 
 class FormulaError(ValueError):
-    """A text is no formula; says what is wrong with it."""
+    """A text is not a formula; the message explains why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A formula that can be asked for its value.
+    """A formula that can be evaluated.
 
     Attributes:
-        text: As the rubric has it.
+        text: As written in the rubric.
         tree: Its whitelisted syntax tree.
     """
 
@@ -67,7 +67,7 @@ class Curve:
     tree: ast.expr
 
     def at(self, n: float, t: float = 0.0) -> float:
-        """Return the value at `n` and `t`; NaN where there is none, as for a root of -1."""
+        """Return the value at `n` and `t`; NaN if undefined, as for a root of -1."""
         try:
             return _value(self.tree, {"n": n, "t": t})
         except (ArithmeticError, ValueError):
@@ -75,7 +75,7 @@ class Curve:
 
     @property
     def mistaken(self) -> Curve | None:
-        """The formula with sine and cosine taken for each other, or None if it has neither."""
+        """The formula with sine and cosine exchanged, or None if it has neither."""
         tree = ast.parse(self.text, mode="eval").body
         found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in _MISTAKEN]
         for node in found:
@@ -85,10 +85,10 @@ class Curve:
 
 @lru_cache(maxsize=64)
 def curve(text: str) -> Curve:
-    """Return the formula that a text says.
+    """Return the formula in a text.
 
     Raises:
-        FormulaError: It says none.
+        FormulaError: The text is not a formula.
     """
     if len(text) > _MOST_CHARACTERS:
         raise FormulaError(f"at most {_MOST_CHARACTERS} characters")
@@ -101,7 +101,7 @@ def curve(text: str) -> Curve:
 
 
 def _check(node: ast.expr) -> None:
-    """Raise unless every part is known."""
+    """Raise FormulaError unless every part is allowed."""
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         _check(node.left)
         _check(node.right)
@@ -129,17 +129,17 @@ def _value(node: ast.expr, known: Mapping[str, float]) -> float:
     if isinstance(node, ast.Name):
         return known[node.id] if node.id in known else _CONSTANTS[node.id]
     assert isinstance(node, ast.Constant)
-    return float(node.value)  # type: ignore[arg-type]  # only numbers come through the whitelist
+    return float(node.value)  # type: ignore[arg-type]  # the check above allows only numbers
 
 
-#: Share of the values that another formula must give for it to be named as what they follow.
+#: Minimum share of the values that another formula must give for it to be reported.
 _SURE = 0.97
-#: Fewer values than this follow something by chance.
+#: Fewer values than this may follow something by chance.
 _FEWEST = 5
-#: Counters are tried to begin at most this far from 0.
+#: Counters may start at most this far from 0.
 _FURTHEST_START = 20
 _DEGREES = 180 / math.pi
-#: By what a counter may have been multiplied or divided by mistake.
+#: Factors by which a counter may have been multiplied or divided by mistake.
 _PACES = (10.0, 2.0, 5.0, 100.0, 20.0, 4.0, 3.0, 50.0, 1.1, 1.5)
 _REPEATS = (2, 3, 5, 10)
 _MOST_DECIMALS = 5
@@ -160,12 +160,12 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """What the values follow, as a clause, and what to do about it; both may be empty.
+    """What the values follow, as a clause, and what to do; both may be empty.
 
     Attributes:
         said: The clause.
-        hint: What to do.
-        start: The number that the count starts at, if that is all that differs.
+        hint: One thing to do.
+        start: First number of the count, if only that differs.
     """
 
     said: str = ""
@@ -177,10 +177,10 @@ _Wanted = Callable[[Sample], float]
 
 
 def followed_instead(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead:
-    """Return what a series that differs from a formula follows, if that is plain.
+    """Find what a series follows instead of a formula, if that is clear.
 
     Args:
-        wanted: The formula.
+        wanted: The expected formula.
         samples: The series, in order.
         tolerance: Largest difference.
     """
@@ -212,7 +212,7 @@ def _rounded(wanted: Curve, sample: Sample, *, decimals: int) -> float:
 
 
 def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
-    """Yield what students do instead, the commonest first."""
+    """Yield common mistakes, the most frequent first."""
     for start in (s for near in range(1, _FURTHEST_START + 1) for s in (near, -near)):
         said = f"the values are right for a count that starts at {start}"
         yield Instead(said, _FIRST_HINT if start == 1 else "", start), partial(_at, wanted, start=start)
@@ -250,28 +250,28 @@ def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Inste
     return Instead(said)
 
 
-#: Lags are tried in these steps, up to the longest.
+#: Step between the lags that are tried, and the longest lag.
 _STEP_NS = 100 * NS_PER_MS
 _LONGEST_NS = 8 * NS_PER_S
-#: So many inputs an answer may lie behind.
+#: Maximum number of inputs that an answer may lag behind.
 _FURTHEST_BEHIND = 25
-#: Share of the answers that must fit for it to be named.
+#: Minimum share of answers that must fit for a lag to be reported.
 _SURE_BEHIND = 0.97
-#: Fewer answers than this fit something by chance.
+#: Fewer answers than this may fit by chance.
 _FEWEST_ANSWERS = 10
 Right = Callable[[float, float], bool]
 
 
 def lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int | None:
-    """Return by how much the answers lag behind the inputs that they are right for, if they all do.
+    """Return by how much the answers lag behind the inputs that they are right for; None if they do not.
 
     Args:
-        inputs: The numbers in order, each with the time from which on it was there.
+        inputs: The numbers in order, each with the time at which it started.
         answers: The answers in order.
         right: Whether an answer (first) is right for an input (second).
 
     Returns:
-        A whole number of tenths of a second above 0, or None if there is no lag or none explains the answers.
+        A positive multiple of a tenth of a second, or None if there is no lag or none explains the answers.
     """
     found: int | None = None
     for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
@@ -295,11 +295,11 @@ def _fits(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right, l
 
 
 def steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int:
-    """Return how many inputs before the newest the one lies that nearly every answer is right for; 0 if none does.
+    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none.
 
     Args:
         inputs: The numbers in order; they change from one to the next.
-        answers: The answers in order, about one to each input.
+        answers: The answers in order, about one per input.
         right: Whether an answer (first) is right for an input (second).
     """
     times = [r.t_ns for r in inputs]
@@ -313,24 +313,24 @@ def steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: R
     return 0
 
 
-#: Fewer values than this say nothing but whether they differ.
+#: For fewer values than this, only whether they differ is checked.
 FEW = 10
-#: A pattern that chance gives more often than exp(-14), about one in a million, is no evidence.
+#: A pattern is evidence only if chance produces it less often than exp(-14), about one in a million.
 _EVIDENCE = 14.0
-#: Fewest steps for the patterns that a short random series may show by chance.
+#: Fewest steps for patterns that a short random series may have by chance.
 _ENOUGH = 16
-#: Share of the variance of the steps that the two steps before leave unexplained in a smooth curve, at most.
+#: Largest share of the steps' variance that the two previous steps may leave unexplained in a smooth curve.
 _REST = 0.05
-#: The same for few steps, where a fit comes out well by chance.
+#: The same for few steps, where a fit may be good by chance.
 _REST_OF_FEW = 0.001
 _MANY = 40
 
 
 def pattern_of(values: Sequence[float]) -> str | None:
-    """Return how the values follow from each other, as a phrase; None if they may have been drawn.
+    """Return how the values follow from each other, as a phrase; None if they may be random.
 
-    Every generator passes: uniform, whole or rounded numbers, a clipped normal distribution, a choice of a few values,
-    a random walk. Fewer than `FEW` values are only asked whether they differ.
+    Every generator is accepted: uniform, whole or rounded numbers, a clipped normal distribution, a choice of a few
+    values, a random walk. With fewer than `FEW` values, only whether they differ is checked.
 
     Args:
         values: Finite numbers in order of publishing.
@@ -355,7 +355,7 @@ def _pattern(values: Sequence[float]) -> str | None:
 
 
 def _cycle(values: Sequence[float]) -> int | None:
-    """Return the period of a repeating series, if chance does not explain it."""
+    """Return the period of a repeating series, unless chance explains it."""
     shares = Counter(values)
     log_chance = -math.log(sum((n / len(values)) ** 2 for n in shares.values()))
     for period in range(2, len(values) // 2 + 1):
@@ -375,7 +375,7 @@ def _one_way(steps: Sequence[float]) -> bool:
 
 
 def _sawtooth(values: Sequence[float], steps: Sequence[float]) -> bool:
-    """Return whether there is one small step and one jump back, the jump exactly where the step would go too far."""
+    """Return whether there is one small step and one jump back, which comes exactly when the step would go too far."""
     kinds = Counter(round(s, 4) for s in steps).most_common(2)
     if len(steps) < _ENOUGH or len(kinds) < 2 or sum(n for _, n in kinds) < len(steps) - 1:
         return False
@@ -390,7 +390,7 @@ def _sawtooth(values: Sequence[float], steps: Sequence[float]) -> bool:
 
 
 def _few_turns(steps: Sequence[float]) -> bool:
-    """Return whether the series turns round far more seldom than independent steps would: by five deviations."""
+    """Return whether the series turns much less often than with independent steps: by five deviations."""
     signs = [s > 0 for s in steps if s != 0]
     turns = sum(a != b for a, b in pairwise(signs))
     pairs = len(signs) - 1
@@ -398,7 +398,7 @@ def _few_turns(steps: Sequence[float]) -> bool:
 
 
 def _predictable(steps: Sequence[float]) -> bool:
-    """Return whether each step is a fixed combination of the two before it, as in any sampled sine."""
+    """Return whether each step is a fixed combination of the two previous ones, as in any sampled sine."""
     if len(steps) < _ENOUGH:
         return False
     mean = sum(steps) / len(steps)

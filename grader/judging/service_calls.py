@@ -1,4 +1,4 @@
-"""Calls of services: requests with their responses, calls about parameters, and what a client wrote after each."""
+"""Service calls: requests with their responses, calls about parameters, and a client's output after each."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
 from grader.judging.output import Output, number_in, shape_of, written
 from grader.judging.values import JITTER_NS, number_at, text_at, value_at
 
-#: How much later than asked something may come where the machine's load shows.
+#: Accepted delay on clocks where the machine's load shows.
 LATENESS_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One call of a service; without a response if none came."""
+    """A service call; without a response if none came."""
 
     request: Request
     response: Response | None
 
 
 def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
-    """Return the calls of a service by `grader` or `student` in the order asked, each with its response."""
+    """Return the calls of a service by `grader` or `student` in order, each with its response."""
     answerer = "grader" if asker == "student" else "student"
     responses: dict[int, Response] = {}
     for response in trace.responses(service, answerer):
@@ -37,7 +37,7 @@ def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
     return tuple(Call(r, responses.get(r.number)) for r in asked)
 
 
-#: Number of a type -> the field of rcl_interfaces/msg/ParameterValue that holds it, and what it is called.
+#: Number of a type -> its field in rcl_interfaces/msg/ParameterValue, and the name of the type.
 _TYPES: Mapping[int, tuple[str, str]] = {
     1: ("bool_value", "bool"),
     2: ("integer_value", "integer"),
@@ -52,14 +52,15 @@ _TYPES: Mapping[int, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Got:
-    """One parameter as a node told it.
+class ReportedParameter:
+    """A parameter as a node reported it.
 
     Attributes:
-        t_ns: When it did.
+        t_ns: Time of the response.
         node: The node's fully qualified name.
-        type: `bool`, `integer`, `double`, `string` or one of these with `_array`; empty if it has no such parameter.
-        value: What it holds.
+        type: `bool`, `integer`, `double`, `string` or one of these with `_array`; empty if the node lacks the
+            parameter.
+        value: Its value.
     """
 
     t_ns: int
@@ -69,16 +70,16 @@ class Got:
 
 
 @dataclass(frozen=True, slots=True)
-class Set:
-    """One try to set a parameter.
+class ParameterSetting:
+    """An attempt to set a parameter.
 
     Attributes:
-        t_ns: When the node answered, or was asked if it did not.
+        t_ns: Time of the response, or of the request without one.
         node: The node's fully qualified name.
-        value: What it should hold then.
-        answered: Whether there was an answer.
-        taken: Whether the node took it.
-        why: What it said where it did not.
+        value: The value to set.
+        answered: Whether there was a response.
+        taken: Whether the node accepted the value.
+        why: The node's reason if it did not.
     """
 
     t_ns: int
@@ -90,19 +91,19 @@ class Set:
 
 
 def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]:
-    """Return the grader's calls of a node's own service; of every node if none is named."""
+    """Return the grader's calls of a parameter service of one node, or of all nodes."""
     asked = (r.service for r in trace.of(Request) if r.sender == "grader" and r.service.endswith(f"/{service}"))
     names = [name for name in dict.fromkeys(asked) if node in (None, name.rpartition("/")[0])]
     return [call for name in names for call in calls_of(trace, name, "grader")]
 
 
 def asked_for(trace: Trace, name: str, node: str | None = None) -> list[Call]:
-    """Return the calls in which a parameter was asked for."""
+    """Return the calls that asked for a parameter."""
     return [c for c in _parameter_calls(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
 
 
-def got(call: Call, name: str) -> Got | None:
-    """Return what a node told of a parameter; None if it did not answer."""
+def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
+    """Return a parameter as a response reported it; None without a response."""
     if call.response is None:
         return None
     node = call.request.service.rpartition("/")[0]
@@ -110,11 +111,11 @@ def got(call: Call, name: str) -> Got | None:
     place = _list(call.request.value, "names").index(name)
     found = values[place] if place < len(values) else None
     type_, value = _typed(found)
-    return Got(call.response.t_ns, node, type_, value)
+    return ReportedParameter(call.response.t_ns, node, type_, value)
 
 
-def settings(trace: Trace, name: str, node: str | None = None) -> list[Set]:
-    """Return the tries to set a parameter, in order."""
+def settings(trace: Trace, name: str, node: str | None = None) -> list[ParameterSetting]:
+    """Return the attempts to set a parameter, in order."""
     found = []
     for call in _parameter_calls(trace, node, "set_parameters"):
         for place, parameter in enumerate(_list(call.request.value, "parameters")):
@@ -123,16 +124,16 @@ def settings(trace: Trace, name: str, node: str | None = None) -> list[Set]:
     return sorted(found, key=lambda s: s.t_ns)
 
 
-def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> Set:
+def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> ParameterSetting:
     node = call.request.service.rpartition("/")[0]
     value = _typed(parameter.get("value"))[1]
     if call.response is None:
-        return Set(call.request.t_ns, node, value, answered=False, taken=False, why="")
+        return ParameterSetting(call.request.t_ns, node, value, answered=False, taken=False, why="")
     results = _list(call.response.value, "results")
     result = results[place] if place < len(results) else {}
     taken = isinstance(result, Mapping) and result.get("successful") is True
     why = str(result.get("reason", "")) if isinstance(result, Mapping) else ""
-    return Set(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
+    return ParameterSetting(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
 
 
 def _typed(value: object) -> tuple[str, Any]:
@@ -152,23 +153,23 @@ _COMPLAINTS = ("WARN", "ERROR", "FATAL")
 
 
 class CallKind(str, Enum):
-    """What a response said."""
+    """The kind of a response."""
 
-    GOOD = "good"  # a number above the limit
+    GOOD = "good"  # a number above the threshold
     LOW = "low"  # a number at or below it
-    FAILED = "failed"  # no success
-    UNREADABLE = "unreadable"  # no number in it
-    UNANSWERED = "unanswered"  # there was none
+    FAILED = "failed"  # without success
+    UNREADABLE = "unreadable"  # without a number
+    UNANSWERED = "unanswered"  # no response came
 
 
 @dataclass(frozen=True, slots=True)
 class ResponseReader:
-    """How responses are read.
+    """How to read a response.
 
     Attributes:
         field: Path of the number, or of the text that holds it.
-        success: Path of the truth value that says whether the number counts; empty if there is none.
-        pattern: What finds the number in a text; None for its first one.
+        success: Path of the truth value that tells whether the number counts; empty if there is none.
+        pattern: Finds the number in a text; None for the first number.
         threshold: Numbers above it are good.
     """
 
@@ -180,19 +181,19 @@ class ResponseReader:
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """One call, and the time up to the next one.
+    """A call, and the time until the next one.
 
     Attributes:
         place: Number of the call, from 1.
-        kind: What the response said.
-        number: The number in it, if there is one.
-        text: The text it was read from; empty if the field is a number.
-        asked_ns: When the request came.
-        start_ns: When the response came, or the request if none did.
-        stop_ns: When the next request came, or the recording ended.
-        until_ns: The same, less the clock's jitter.
-        outputs: What was written in [start_ns, stop_ns], in order; both ends widened by the clock's jitter.
-        awaiting: What was written between the request and its response, in order.
+        kind: Kind of the response.
+        number: The number in the response, if any.
+        text: The text that holds the number; empty if the field is a number.
+        asked_ns: Time of the request.
+        start_ns: Time of the response, or of the request without one.
+        stop_ns: Time of the next request, or the end of the recording.
+        until_ns: `stop_ns` less the clock's jitter.
+        outputs: Output in [start_ns, stop_ns], in order; both ends are widened by the clock's jitter.
+        awaiting: Output between the request and its response, in order.
     """
 
     place: int
@@ -208,17 +209,17 @@ class Episode:
 
     @property
     def sure(self) -> tuple[Output, ...]:
-        """What cannot belong to the call before or after: what came from the response on, before the next request."""
+        """Output that cannot belong to another call: from the response on, before the next request."""
         return tuple(o for o in self.outputs if self.start_ns <= o.t_ns < self.until_ns)
 
     @property
     def shapes(self) -> frozenset[str]:
-        """The shapes of what was written."""
+        """Shapes of the output."""
         return frozenset(shape_of(o.text) for o in self.outputs)
 
 
 def episodes_of(trace: Trace, process: str, service: str, reading: ResponseReader) -> tuple[Episode, ...]:
-    """Return the calls of a student's client, each with what the process wrote after it."""
+    """Return the calls of a student's client, each with the output of the process after it."""
     calls = calls_of(trace, service, "student")
     stops = [*(b.request.t_ns for _, b in pairwise(calls)), trace.stop_ns]
     outputs = sorted(written(trace, process), key=lambda o: o.t_ns)
@@ -253,13 +254,13 @@ def _read(response: Response | None, reading: ResponseReader) -> tuple[CallKind,
 
 
 def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
-    """Return the shapes of what a process wrote before its first response.
+    """Return the shapes of the texts that a process wrote before its first response.
 
     Args:
         trace: What was observed.
         process: File name of the client.
         service: Service name as on the wire.
-        cautious: Whether what came at the instant of a response without delay may have come before it.
+        cautious: Whether output at the instant of a response without delay may have come before it.
     """
     first = next((c for c in calls_of(trace, service, "student") if c.response is not None), None)
     if first is None or first.response is None:

@@ -1,4 +1,4 @@
-"""A student's file as a syntax tree that is safe to ask: nothing here raises for any text, however strange."""
+"""A student's file as a syntax tree; reading any text, however strange, raises nothing."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Any, TypeVar
 from grader.core.exercise import Location
 from grader.judging.wording import quote
 
-#: Files longer than this are not parsed: no node that a person writes for an exercise comes near.
+#: Longer files are not parsed, in characters: student nodes are far shorter.
 LONGEST_SOURCE = 100_000
-#: The same for the parts of its syntax tree.
+#: Files with more syntax nodes are not parsed either.
 MOST_NODES = 12_000
-#: Longest quotation of code inside a hint.
+#: Longest quotation of code inside a hint, in characters.
 CODE_LENGTH = 70
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 AnyNode = TypeVar("AnyNode", bound=ast.AST)
-#: Calls that take a function to be called back.
+#: Methods that take a callback.
 _TAKE_CALLBACKS = frozenset(
     {
         "create_timer",
@@ -45,16 +45,16 @@ class Source:
     """One graded file.
 
     Attributes:
-        file: Path inside the submission, as locations have it.
-        lines: The text by lines, without their ends.
-        nodes: Every node of the syntax tree that has a line, in the order of the text; empty if it cannot be parsed.
+        file: Path inside the submission, as in locations.
+        lines: The lines of the text, without line breaks.
+        nodes: All syntax nodes with a line, in the order of the text; empty if the text cannot be parsed.
         tree: The syntax tree, or None if the text cannot be parsed.
-        parents: Node -> the node around it.
-        index: The nodes by their class, in the order of the text.
-        called: The calls by the last part of the name that is called, in the order of the text.
-        stored: Where names and attributes are assigned, by dotted name, in the order of the text.
-        aliases: Name in the file -> the dotted name it was imported as.
-        stars: Modules of which everything was imported.
+        parents: Node -> enclosing node.
+        index: Nodes by class, in the order of the text.
+        called: Calls by the last part of the called name, in the order of the text.
+        stored: Assignments to names and attributes by dotted name, in the order of the text.
+        aliases: Name in the file -> its dotted name at import.
+        stars: Modules imported with `*`.
     """
 
     file: str
@@ -77,63 +77,63 @@ class Source:
         return sorted([*self.all(ast.While), *self.all(ast.For)], key=_place)
 
     def names(self) -> list[ast.Name | ast.Attribute]:
-        """Return every name, plain or after a dot, in the order of the text."""
+        """Return every name and attribute, in the order of the text."""
         return sorted([*self.all(ast.Name), *self.all(ast.Attribute)], key=_place)
 
     def stores(self, dotted: str) -> list[ast.Attribute]:
-        """Return where an attribute such as `self.x` is assigned, in the order of the text."""
+        """Return the assignments to an attribute such as `self.x`, in the order of the text."""
         return [n for n in self.stored.get(dotted, ()) if isinstance(n, ast.Attribute)]
 
     def calls(self, *names: str) -> Iterator[ast.Call]:
-        """Yield the calls of functions or methods by the last part of their name."""
+        """Yield the calls of functions or methods with this last part of the name."""
         found = [c for name in dict.fromkeys(names) for c in self.called.get(name, ())]
         yield from found if len(names) == 1 else sorted(found, key=_place)
 
     def on_line(self, line: int, kind: type[AnyNode]) -> Iterator[AnyNode]:
-        """Yield the nodes of a kind that a line is part of, the outermost first."""
+        """Yield the nodes of a kind that cover a line, the outermost first."""
         for node in self.all(kind):
             if covers(node, line):
                 yield node
 
     def function_at(self, line: int) -> Function | None:
-        """Return the innermost function or method that a line is part of."""
+        """Return the innermost function or method that covers a line."""
         return next((f for f in reversed(self.functions()) if covers(f, line)), None)
 
     def around(self, node: ast.AST) -> Iterator[ast.AST]:
-        """Yield the nodes around a node, the nearest first."""
+        """Yield the enclosing nodes, the innermost first."""
         inner: ast.AST | None = self.parents.get(node)
         while inner is not None:
             yield inner
             inner = self.parents.get(inner)
 
     def function_of(self, node: ast.AST) -> Function | None:
-        """Return the function or method that a node is in."""
+        """Return the function or method that encloses a node."""
         return next((n for n in self.around(node) if isinstance(n, Function)), None)
 
     def class_of(self, node: ast.AST) -> ast.ClassDef | None:
-        """Return the class that a node is in."""
+        """Return the class that encloses a node."""
         return next((n for n in self.around(node) if isinstance(n, ast.ClassDef)), None)
 
     def functions(self, name: str | None = None) -> list[Function]:
-        """Return the functions and methods of a name, or all."""
+        """Return the functions and methods with a name, or all."""
         both: list[Function] = [*self.all(ast.FunctionDef), *self.all(ast.AsyncFunctionDef)]
         return sorted((f for f in both if name in (None, f.name)), key=_place)
 
     def is_method(self, function: Function) -> bool:
-        """Return whether a function stands directly in a class and is not static."""
+        """Return whether a function is defined directly in a class and is not static."""
         static = any(last_name(d) == "staticmethod" for d in function.decorator_list)
         return isinstance(self.parents.get(function), ast.ClassDef) and not static
 
     def place(self, node: ast.AST) -> Location:
-        """Return where a node begins."""
+        """Return the place where a node begins."""
         return Location(self.file, first_line(node))
 
     def line(self, number: int) -> str:
-        """Return a line of the text, from 1; empty if there is none."""
+        """Return a line of the text, counted from 1; empty if it does not exist."""
         return self.lines[number - 1] if 1 <= number <= len(self.lines) else ""
 
     def code(self, node: ast.AST, length: int = CODE_LENGTH) -> str:
-        """Return a node as it is written, on one line, cut to `length` characters."""
+        """Return the source code of a node on one line, cut to `length` characters."""
         first, last = first_line(node), last_line(node)
         rows = [self.line(n)[: 4 * CODE_LENGTH].encode() for n in range(first, min(last, first + 4) + 1)]
         if not rows:
@@ -146,13 +146,13 @@ class Source:
         return quote(b" ".join(rows).decode(errors="replace"), length)
 
     def resolved(self, node: ast.AST | None) -> str:
-        """Return the dotted name of an expression, its first part as it was imported: `t.sleep` -> `time.sleep`."""
+        """Return the dotted name of an expression with imports resolved: `t.sleep` -> `time.sleep`."""
         name = chain(node)
         head, dot, rest = name.partition(".")
         return f"{self.aliases.get(head, head)}{dot}{rest}"
 
     def means(self, node: ast.AST | None, wanted: str) -> bool:
-        """Return whether an expression names something: by its whole dotted name, or its last part if that is all."""
+        """Return whether an expression has a given full dotted name, or a given last part if that has no dot."""
         if "." not in wanted:
             return last_name(node) == wanted or self.resolved(node).rpartition(".")[2] == wanted
         found = self.resolved(node)
@@ -160,11 +160,11 @@ class Source:
         return found == wanted or (found == name and module in self.stars)
 
     def calling(self, wanted: str) -> list[ast.Call]:
-        """Return the calls of something by its dotted name, imports followed, in the order of the text."""
+        """Return the calls of a function by dotted name, with imports resolved, in the order of the text."""
         return [call for call in self.all(ast.Call) if self.means(call.func, wanted)]
 
     def deriving(self, *wanted: str) -> list[ast.ClassDef]:
-        """Return the classes that derive from one of those named, also by way of another class of the file."""
+        """Return the classes that derive from one of the given ones, also through another class of the file."""
         found: list[ast.ClassDef] = []
         while True:
             names = {c.name for c in found}
@@ -177,7 +177,7 @@ class Source:
         return any(chain(base) in known or any(self.means(base, w) for w in wanted) for base in class_.bases)
 
     def called_back(self) -> list[ast.AST]:
-        """Return the functions that run as callbacks, and what these call in the file, each once."""
+        """Return the functions that run as callbacks, and those of the file that they call, without duplicates."""
         functions = {f.name: f for f in self.functions()}
         waiting: list[ast.AST] = [f for call in self.calls(*_TAKE_CALLBACKS) for f in _handed_over(call, functions)]
         found: list[ast.AST] = []
@@ -192,7 +192,7 @@ class Source:
 
 
 def read(file: str, text: str) -> Source:
-    """Return a file ready to be asked; one that cannot be parsed, or is endless, has lines only."""
+    """Return a parsed file; one that cannot be parsed, or is too long, has only lines."""
     lines = tuple(text[:LONGEST_SOURCE].split("\n"))
     tree = _parsed(text) if len(text) <= LONGEST_SOURCE else None
     parents: dict[ast.AST, ast.AST] = {}
@@ -216,7 +216,7 @@ def read(file: str, text: str) -> Source:
 
 
 def _by_name(nodes: Sequence[ast.AST]) -> tuple[dict[str, list[ast.Call]], dict[str, list[ast.AST]]]:
-    """Return the calls by the name called, and the places of assignment by the name assigned."""
+    """Return the calls by called name, and the assignments by assigned name."""
     called: dict[str, list[ast.Call]] = {}
     stored: dict[str, list[ast.AST]] = {}
     for node in nodes:
@@ -228,7 +228,7 @@ def _by_name(nodes: Sequence[ast.AST]) -> tuple[dict[str, list[ast.Call]], dict[
 
 
 def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return what the names of the file were imported as, wherever in it, and the modules that were imported whole."""
+    """Return the imported names of the file, wherever imported, and the modules imported with `*`."""
     aliases: dict[str, str] = {}
     stars: list[str] = []
     for node in index.get(ast.Import, ()):
@@ -246,13 +246,13 @@ def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str],
 
 
 def _place(node: ast.AST) -> tuple[int, int, int]:
-    """Return what sorts nodes by the text, the outer before the inner."""
+    """Return a sort key that follows the text and puts outer nodes before inner ones."""
     return first_line(node), getattr(node, "col_offset", 0), -last_line(node)
 
 
 def _parsed(text: str) -> ast.Module | None:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the student's doubtful escapes are not ours
+        warnings.simplefilter("ignore")  # the student's invalid escapes must not warn here
         try:
             return ast.parse(text.removeprefix("\ufeff"))
         except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError):
@@ -270,7 +270,7 @@ def last_line(node: ast.AST) -> int:
 
 
 def covers(node: ast.AST, line: int) -> bool:
-    """Return whether a line is one of those that a node is written on."""
+    """Return whether a node covers a line."""
     return first_line(node) <= line <= last_line(node)
 
 
@@ -282,7 +282,7 @@ def last_name(node: ast.AST | None) -> str:
 
 
 def chain(node: ast.AST | None) -> str:
-    """Return a dotted name, calls in it as `()`: `self.get_logger().info`; empty where it starts with anything else."""
+    """Return a dotted name with `()` for calls: `self.get_logger().info`; empty if it starts with anything else."""
     parts: list[str] = []
     while True:
         if isinstance(node, ast.Attribute):
@@ -299,7 +299,7 @@ def chain(node: ast.AST | None) -> str:
 
 
 def argument(call: ast.Call, place: int, name: str) -> ast.expr | None:
-    """Return an argument by its place or its name."""
+    """Return an argument by its position or its name."""
     if place < len(call.args) and not any(isinstance(a, ast.Starred) for a in call.args[: place + 1]):
         return call.args[place]
     return next((k.value for k in call.keywords if k.arg == name), None)
@@ -316,7 +316,7 @@ def text_of(node: ast.AST | None) -> str | None:
 
 
 def subtree(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield a node and everything in it, in no particular order, without what inner classes hold."""
+    """Yield a node and everything in it, in no particular order, without the contents of inner classes."""
     waiting = [node]
     while waiting:
         here = waiting.pop()
@@ -325,13 +325,13 @@ def subtree(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _own_name(node: ast.AST | None) -> str:
-    """Return the name of a function or method of the file, called as `f` or `self.f`; empty for anything else."""
+    """Return the name of a function or method of the file, written `f` or `self.f`; empty for anything else."""
     name = chain(node)
     return name.removeprefix("self.") if "." not in name.removeprefix("self.") else ""
 
 
 def _handed_over(call: ast.Call, functions: dict[str, Function]) -> Iterator[ast.AST]:
-    """Yield the functions that are given to a call without being called, directly or wrapped in another."""
+    """Yield the functions that are passed to a call without being called, directly or wrapped in another call."""
     for given in [*call.args, *(k.value for k in call.keywords)]:
         called = {id(n.func) for n in subtree(given) if isinstance(n, ast.Call)}
         for node in subtree(given):

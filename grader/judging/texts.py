@@ -1,4 +1,4 @@
-"""Numbers in logged texts, and which of them are an x and a y."""
+"""Finds numbers in logged texts, and decides which of them are an x and a y."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-#: Longest text that is read; a printed odometry message has about 3,000 characters.
+#: Longest text that is read, in characters; a printed odometry message has about 3,000.
 LONGEST_TEXT = 8_000
-#: Most numbers that are read from one text.
+#: Maximum number of numbers read from one text.
 MOST_NUMBERS = 160
-#: Difference that printing does not explain but single precision does.
+#: Relative difference that single precision explains, but printing does not.
 SLACK_M = 2e-6
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[ -/]*[@-~]")
 _MINUS = dict.fromkeys((0x2212, 0x2010, 0x2011, 0x2012, 0x2013, 0xFE63, 0xFF0D), "-")
@@ -25,7 +25,7 @@ _NUMBER = re.compile(
 )
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])([0-9]+),([0-9]+)(?![0-9]*[.,][0-9])")
 _NAME_BEFORE = re.compile(r"[A-Za-z_À-ɏ]+$")
-#: What stands before most numbers, and ends no name; so nothing more has to be looked at.
+#: Characters before most numbers that cannot end a name, so the text before them needs no further check.
 _NO_NAME = frozenset(" =:,([")
 _UNIT_AFTER = re.compile(r"\s?(cm|mm)(?![A-Za-z0-9])")
 _PER_METRE = {"cm": 0.01, "mm": 0.001}
@@ -33,13 +33,13 @@ _PER_METRE = {"cm": 0.01, "mm": 0.001}
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """A number as it was printed.
+    """A printed number.
 
     Attributes:
         value: The number; not finite for a printed nan or inf.
-        step: Size of one unit of its last digit.
-        start: Where it begins in the text.
-        stop: Where it ends, exclusive.
+        step: Value of one unit of its last digit.
+        start: Start index in the text.
+        stop: End index, exclusive.
     """
 
     value: float
@@ -48,14 +48,14 @@ class Printed:
     stop: int
 
     def shows(self, value: float) -> bool:
-        """Return whether printing `value` gives this: rounded, cut off or rounded down to its last digit."""
+        """Return whether `value` prints as this number: rounded, truncated or rounded down to its last digit."""
         excess = value - self.value
         below = self.step if value <= 0 and self.value <= 0 else self.step / 2
         return -below - SLACK_M <= excess <= self.step + SLACK_M
 
 
 def clean(text: str) -> str:
-    """Return a text with one form of minus sign and digit, and without terminal colours."""
+    """Return a text with one kind of minus sign and digits, and without terminal colours."""
     text = text[:LONGEST_TEXT]
     if "\x1b" in text:
         text = _ANSI.sub("", text)
@@ -63,7 +63,7 @@ def clean(text: str) -> str:
 
 
 def with_decimal_points(text: str) -> str | None:
-    """Return the text with `1,25` read as `1.25`, or None if nothing in it can be read so."""
+    """Return the text with `1,25` read as `1.25`, or None if it has no such number."""
     if "," not in text:
         return None
     changed = _DECIMAL_COMMA.sub(r"\1.\2", text)
@@ -71,7 +71,7 @@ def with_decimal_points(text: str) -> str | None:
 
 
 def printed_numbers(text: str) -> tuple[Printed, ...]:
-    """Return the numbers of a cleaned text in order; digits that belong to a name such as `odom1` are none."""
+    """Return the numbers of a cleaned text in order; digits in a name such as `odom1` are not numbers."""
     found: list[Printed] = []
     for match in _NUMBER.finditer(text):
         number = _read(text, match)
@@ -91,7 +91,7 @@ def _read(text: str, match: re.Match[str]) -> Printed | None:
     if not sign and _belongs_to_name(text, match):
         return None
     decimals = len(part or only or "")
-    # 0e9 is no way of saying "any number"
+    # 0e9 must not match every number
     step = 10.0 ** min(0, int(power or 0) - decimals)
     scale = 1.0
     unit = _UNIT_AFTER.match(text, match.end())
@@ -107,15 +107,15 @@ def _belongs_to_name(text: str, match: re.Match[str]) -> bool:
     if before is None:
         return False
     if "." in match[0].rstrip("."):
-        return False  # names do not hold decimal fractions
+        return False  # names contain no decimal fractions
     label = before[0].lower() in ("x", "y", "z")
     return not label or re.match(r"\s*[:=]", text[match.end() : match.end() + 4]) is not None
 
 
-#: Most numbers among which unlabelled pairs are sought.
+#: Maximum number of numbers among which unlabelled pairs are searched.
 _MOST_UNLABELLED = 20
 _MOST_LABELLED_PAIRS = 60
-#: How many numbers after a list of labels may be the ones it names.
+#: Number of numbers after a list of labels that the list may refer to.
 _MOST_AFTER_LIST = 6
 _WORD = re.compile(r"[A-Z]+(?![a-zà-ɏ])|[A-ZÀ-ɏ]?[a-zà-ɏ]+|[A-Z]")
 _LABELS = {
@@ -125,7 +125,7 @@ _LABELS = {
     "xy": "xy",
     "xyz": "xyz",
 }
-#: Words that may stand inside a list of labels such as `pos_x and pos_y (m)`.
+#: Words that may appear inside a list of labels such as `pos_x and pos_y (m)`.
 _FILLERS = frozenset(
     {
         "and",
@@ -152,12 +152,12 @@ Assignment = list[str]
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How one text presents numbers.
+    """The numbers in a text and how they are presented.
 
     Attributes:
-        template: The text with its numbers masked; equal for texts that differ in their numbers only.
+        template: The text with its numbers masked; equal for texts that differ only in their numbers.
         numbers: The numbers in order.
-        pairs: Index pairs that can be (x, y), the labelled ones first.
+        pairs: Index pairs that may be (x, y), the labelled ones first.
     """
 
     template: str
@@ -172,7 +172,7 @@ def template_of(text: str, numbers: Sequence[Printed]) -> str:
 
 
 def candidate_pairs(text: str, numbers: Sequence[Printed]) -> tuple[Pair, ...]:
-    """Return the index pairs that can be (x, y) by their labels; in order of appearance where there are no labels."""
+    """Return the index pairs that are (x, y) by their labels; without labels, all in order of appearance."""
     parts = _segments(text, numbers)
     ways = [_by_run(parts), _by_nearest(parts), _by_suffix(parts)]
     complete = [w for w in ways if "x" in w and "y" in w]
@@ -212,7 +212,7 @@ def _last_run(segment: str) -> list[str]:
 
 
 def _by_run(parts: list[str]) -> Assignment:
-    """Give each list of labels to the numbers that follow it, in order."""
+    """Assign each list of labels to the numbers that follow it, in order."""
     waiting: list[str] = []
     given: Assignment = []
     for part in parts[:-1]:
@@ -223,7 +223,7 @@ def _by_run(parts: list[str]) -> Assignment:
 
 
 def _listed_pairs(parts: list[str]) -> list[Pair]:
-    """Return pairs in the order of a list of labels that stands apart from its numbers: `(x, y) at 12 s: 1, 2`."""
+    """Return pairs in the order of a list of labels apart from its numbers: `(x, y) at 12 s: 1, 2`."""
     pairs: list[Pair] = []
     for here, part in enumerate(parts[:-1]):
         run = _last_run(part)
@@ -237,12 +237,12 @@ def _listed_pairs(parts: list[str]) -> list[Pair]:
 
 
 def _by_nearest(parts: list[str]) -> Assignment:
-    """Give each number the label that stands last before it."""
+    """Assign to each number the last label before it."""
     return [(_labels_in(part) or [""])[-1] for part in parts[:-1]]
 
 
 def _by_suffix(parts: list[str]) -> Assignment:
-    """Give each number the label that stands first after it, where nothing is labelled before the first."""
+    """Assign to each number the first label after it, if there is no label before the first number."""
     if not parts or _labels_in(parts[0]) or not _labels_in(parts[-1]):
         return [""] * (len(parts) - 1)
     return [(_labels_in(part) or [""])[0] for part in parts[1:]]

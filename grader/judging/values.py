@@ -1,4 +1,4 @@
-"""What messages hold: fields by their paths, numbers, and what a rubric says that a field may hold."""
+"""Contents of messages: fields by path, numbers, and the rules that a rubric sets for fields."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from grader.judging.wording import number, quote
 
 T = TypeVar("T")
 Carrier = TypeVar("Carrier", Message, Delivery)
-#: Largest difference between two numbers that are the same one.
+#: Largest difference between two numbers that count as equal.
 EXACT = 1e-6
-#: How far two clock readings of one moment may lie apart.
+#: Largest difference between two clock readings of one moment.
 JITTER_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 50 * NS_PER_MS}
 _NUMERIC_TYPE = re.compile(r"std_msgs/msg/(Float(32|64)|U?Int(8|16|32|64)|Char)|sensor_msgs/msg/Temperature")
 
@@ -33,7 +33,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """A number that the grader repeated for a while, in [start_ns, stop_ns); the last one lasts to the trace's end."""
+    """A number that the grader repeated in [start_ns, stop_ns); the last one lasts until the trace ends."""
 
     start_ns: int
     stop_ns: int
@@ -42,7 +42,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Same(Generic[T]):
-    """A value as itself, for caches: checks ask the same of a trace again, and traces are too long to be compared."""
+    """A cache key that compares by identity: checks use the same trace again, and comparing traces is slow."""
 
     value: T
 
@@ -54,8 +54,8 @@ class Same(Generic[T]):
 
 
 def as_number(value: object) -> float | None:
-    """Return a plain JSON value as a number; a bool, a string or a list is none."""
-    if type(value) is float:  # nearly always, and this is asked very often
+    """Return a plain JSON value as a number; None for a bool, string or list."""
+    if type(value) is float:  # the common case, and this is called very often
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
@@ -66,7 +66,7 @@ def as_number(value: object) -> float | None:
 
 
 def number_of(message: Message | Delivery) -> float | None:
-    """Return the number that a message carries as `data` or `temperature`, or None."""
+    """Return the number in a message's field `data` or `temperature`, or None."""
     for key in ("data", "temperature"):
         found = as_number(message.value.get(key))
         if found is not None:
@@ -75,12 +75,12 @@ def number_of(message: Message | Delivery) -> float | None:
 
 
 def carries_number(type_: str) -> bool:
-    """Return whether a message type is one of the standard ones that hold one number."""
+    """Return whether a message type is a standard one that holds a single number."""
     return _NUMERIC_TYPE.fullmatch(type_) is not None
 
 
 def published(trace: Trace, topic: str) -> tuple[Message, ...]:
-    """Return what the student's nodes published on a topic while it was observed."""
+    """Return the messages of the student's nodes on a topic during the observation."""
     return trace.once((published, topic), lambda: _observed(trace, trace.messages(topic)))
 
 
@@ -89,35 +89,35 @@ def _observed(trace: Trace, messages: tuple[Carrier, ...]) -> tuple[Carrier, ...
 
 
 def delivered(trace: Trace, topic: str) -> tuple[Delivery, ...]:
-    """Return what the grader published on a topic while it was observed."""
+    """Return the grader's messages on a topic during the observation."""
     return trace.once((delivered, topic), lambda: _observed(trace, trace.deliveries(topic)))
 
 
 def published_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
-    """Return the numbers that the student's nodes published on a topic while it was observed."""
+    """Return the numbers that the student's nodes published on a topic during the observation."""
     return trace.once((published_numbers, topic), lambda: _readings(published(trace, topic)))
 
 
 def delivered_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
-    """Return the numbers that the grader published on a topic while it was observed."""
+    """Return the numbers that the grader published on a topic during the observation."""
     return trace.once((delivered_numbers, topic), lambda: _readings(delivered(trace, topic)))
 
 
 def _readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
-    """Return the numbers of those messages that carry one."""
+    """Return the numbers of those messages that hold one."""
     found = ((m.t_ns, number_of(m)) for m in messages)
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
 
 
 def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
-    """Return one reading an instant: the last one counts."""
+    """Return one reading per instant: the last one."""
     return tuple({r.t_ns: r for r in series}.values())
 
 
 def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...]:
-    """Return the numbers that the grader published on a topic, equal neighbours joined.
+    """Return the numbers that the grader published on a topic, merging equal neighbours.
 
-    What was sent before `heard_from_ns`, when nobody listened, is left out, unless that is everything.
+    Numbers sent before `heard_from_ns`, without a subscriber, are left out, unless that would leave none.
     """
     return trace.once((held, topic, heard_from_ns), lambda: _held(trace, topic, heard_from_ns))
 
@@ -137,7 +137,7 @@ def field(value: Mapping[str, Any], path: str) -> float | None:
     """Return the number at a path such as `linear.x`, or None if there is none."""
     here: Any = value
     for name in _names(path):
-        if not isinstance(here, (dict, Mapping)) or name not in here:  # a dict is known for one much faster
+        if not isinstance(here, (dict, Mapping)) or name not in here:  # the check for dict is much faster
             return None
         here = here[name]
     return as_number(here)
@@ -149,7 +149,7 @@ def _names(path: str) -> tuple[str, ...]:
 
 
 def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
-    """Return every number of a message by its path."""
+    """Return every number of a message by path."""
     found: dict[str, float] = {}
     for name, inner in value.items():
         if isinstance(inner, (dict, Mapping)):
@@ -160,14 +160,14 @@ def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 
 
 class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never ends a run
-    """A value has no field of that path."""
+    """A value has no field at that path."""
 
 
 def at_path(value: Mapping[str, Any], path: str) -> Any:
-    """Return what a value holds at a path; elements of lists are counted from 0.
+    """Return the part of a value at a path; list elements are counted from 0.
 
     Raises:
-        NoSuchField: There is nothing.
+        NoSuchField: The path does not exist.
     """
     here: Any = value
     for name in _names(path):
@@ -181,7 +181,7 @@ def at_path(value: Mapping[str, Any], path: str) -> Any:
 
 
 def value_at(value: Mapping[str, Any], path: str, default: Any = None) -> Any:
-    """Return what a value holds at a path, or the default if there is nothing."""
+    """Return the part of a value at a path, or the default if the path does not exist."""
     try:
         return at_path(value, path)
     except NoSuchField:
@@ -199,23 +199,23 @@ def text_at(value: Mapping[str, Any], path: str) -> str | None:
     return found if isinstance(found, str) else None
 
 
-#: Longest text that is held against a pattern.
+#: Longest text that is matched against a pattern, in characters.
 _LONGEST = 2_000
 _YES_OR_NO = MappingProxyType({"yes": True, "no": False})
 
 
 @dataclass(frozen=True, slots=True)
 class FieldRule:
-    """What one field has to hold; of several parameters all apply.
+    """The rule for one field; all given parameters apply.
 
     Attributes:
-        equals: The text, number or truth value expected.
-        items: The elements of a list expected, in order.
-        tolerance: Largest difference from a number expected.
+        equals: Expected text, number or truth value.
+        items: Expected list elements, in order.
+        tolerance: Largest difference from an expected number.
         low: Smallest number allowed.
         high: Largest number allowed.
-        pattern: Regular expression that the whole text has to match.
-        example: A text of that form, shown in place of the pattern.
+        pattern: Regular expression that must match the whole text.
+        example: A matching text, shown instead of the pattern.
     """
 
     equals: str | float | bool | None = None
@@ -233,7 +233,7 @@ class FieldRule:
 
     def _equal(self, value: object, wanted: str | float | bool) -> bool:  # noqa: FBT001 - the value of a field
         if isinstance(value, bool) and isinstance(wanted, str):
-            return _YES_OR_NO.get(wanted.lower()) is value  # for YAML, yes is a text
+            return _YES_OR_NO.get(wanted.lower()) is value  # in YAML, yes is a text
         if isinstance(wanted, (bool, str)):
             return type(value) is type(wanted) and value == wanted
         got = as_number(value)
@@ -263,7 +263,7 @@ class FieldRule:
 
     @property
     def wanted(self) -> str:
-        """What is expected, for text."""
+        """The expected value, for text."""
         parts = []
         if self.equals is not None:
             parts.append(shown(self.equals))
@@ -280,17 +280,17 @@ class FieldRule:
         return " and ".join(parts) or "any value"
 
 
-#: A rule, or short for one: the value expected.
+#: A rule, or just the expected value.
 RuleOrValue = str | float | bool | FieldRule
 
 
 def as_rule(rule: RuleOrValue, tolerance: float = 1e-6) -> FieldRule:
-    """Return a rule for what may stand short for one."""
+    """Return the rule for an expected value; a rule stays as it is."""
     return rule if isinstance(rule, FieldRule) else FieldRule(equals=rule, tolerance=tolerance)
 
 
 def broken_rules(value: Mapping[str, Any], rules: Mapping[str, RuleOrValue], tolerance: float = 1e-6) -> list[str]:
-    """Return the paths whose rules a value breaks, in the order of the rules; the tolerance is that of short ones."""
+    """Return the paths whose rules a value breaks, in order; the tolerance applies to plain expected values."""
     return [path for path, rule in rules.items() if not _keeps(value, path, as_rule(rule, tolerance))]
 
 
@@ -302,7 +302,7 @@ def _keeps(value: Mapping[str, Any], path: str, rule: FieldRule) -> bool:
 
 
 def breach(value: Mapping[str, Any], path: str, rule: RuleOrValue) -> str:
-    """Return what stands at a path and what was expected there, as a clause."""
+    """Return the found and the expected value at a path, as a clause."""
     try:
         found = f"{path} is {shown(at_path(value, path))}"
     except NoSuchField:
@@ -311,7 +311,7 @@ def breach(value: Mapping[str, Any], path: str, rule: RuleOrValue) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a field's value for text."""
+    """Return a field's value as text."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -324,8 +324,8 @@ def shown(value: object) -> str:
     return number(got) if got is not None else quote(str(value), 80)
 
 
-def told(rules: Mapping[str, RuleOrValue]) -> str:
-    """Return rules for text: `success true, message a text such as ...`."""
+def rules_text(rules: Mapping[str, RuleOrValue]) -> str:
+    """Return rules as text: `success true, message a text such as ...`."""
     return ", ".join(f"{path} {as_rule(rule).wanted}" for path, rule in rules.items())
 
 
@@ -334,18 +334,18 @@ HIDDEN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})
 
 
 def student_endpoints(trace: Trace, kind: str | None = None, topic: str | None = None) -> tuple[Endpoint, ...]:
-    """Return the endpoints of student nodes, on one topic or all that a student makes, each once, as they appeared."""
+    """Return the endpoints of student nodes, on one topic or all, without duplicates, in order of appearance."""
     kinds = (kind,) if kind else ("publisher", "subscription")
     return tuple(e for k in kinds for e in trace.endpoints(k, topic) if on_student_topic(e))
 
 
 def on_student_topic(endpoint: Endpoint) -> bool:
-    """Return whether an endpoint is a student's own, and not one that every node has."""
+    """Return whether an endpoint is the student's own, and not one that every node has."""
     return endpoint.participant != -1 and endpoint.topic not in HIDDEN_TOPICS
 
 
 def heard_from_ns(trace: Trace, topic: str) -> int:
-    """Return when the first subscription to a topic was there; 0 if that is not known."""
+    """Return when the first subscription to a topic appeared; 0 if unknown."""
     for graph in trace.graphs():
         if any(e.kind == "subscription" and e.topic == topic and on_student_topic(e) for e in graph.endpoints):
             return graph.t_ns

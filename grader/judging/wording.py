@@ -1,4 +1,4 @@
-"""How judging words times, numbers, names and quotations in reasons."""
+"""Formats times, numbers, names and quotations for reasons."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 
 from grader.core.quantities import seconds
 
-#: Longest quotation of a student's text inside a sentence.
+#: Longest quotation of a student's text inside a sentence, in characters.
 QUOTE_LENGTH = 120
-#: Where an object lies in memory, as Python writes it: another place in every run.
+#: Memory address of an object in Python's repr; it differs in every run.
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]{6,16}\b")
 
 
@@ -41,18 +41,18 @@ def counted(count: int, noun: str) -> str:
 
 
 def quote(text: str, length: int = QUOTE_LENGTH) -> str:
-    """Return a student's text on one line, without addresses of objects, which vary, and cut to `length` characters."""
+    """Return a student's text on one line, without memory addresses, cut to `length` characters."""
     line = _ADDRESS.sub("", " ".join(text[: 4 * length].split()))
     return line if len(line) <= length else line[: length - 1] + "…"
 
 
 def unit_of(topic: str) -> str:
-    """Return the unit of a topic's numbers with a leading space; empty if the name does not tell."""
+    """Return the unit of a topic's numbers with a leading space; empty if the name does not show it."""
     return " °C" if "temperature" in topic.lower() else ""
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate that reads like a slip for `name`: almost the same, or the same last part; None if none."""
+    """Return the probable correct spelling of `name`: almost equal, or the same last part; None otherwise."""
     others = sorted(set(candidates) - {name})
     last = _last_part(name)
     same_end = [c for c in others if _last_part(c) == last]

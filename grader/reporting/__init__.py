@@ -1,1 +1,1 @@
-"""Turns a report into the formats that people and programs read; pure functions."""
+"""Renders a report in the formats that people and programs read; pure functions."""

@@ -1,4 +1,4 @@
-"""A report as its reader may see it: what a rubric withholds from students is taken out before rendering."""
+"""Removes from a report what its rubric withholds from students, before rendering."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Audience, Location, 
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.reporting.wording import points
 
-#: Unit behind a number -> what stands for both.
+#: Unit after a number -> word that replaces both.
 _UNITS = {
     "Hz": "a rate",
     "s": "a time",
@@ -25,10 +25,10 @@ _UNITS = {
     "%": "a share",
 }
 _NUMBER = "a number"
-# The number of bits is part of a type's name; any other digits might have been chosen by the program that said them.
+# Bit counts are part of a type's name; a student's program might have chosen any other digits.
 _KEPT = re.compile(r"\b[a-z_]+/(?:msg|srv|action)/[A-Za-z]+(?:8|16|32|64)?(?:MultiArray)?(?!\w)")
 _LINE = re.compile(r"(\.py):[0-9]+")
-# Between two of these signs stands one word.
+# Separators of words.
 _WORD = re.compile(r"[^\s(),;:=\[\]{}<>|\"'`/±*\u00d7\u2018-\u201f]+")
 _SIGNS = "+-\N{MINUS SIGN}"
 _WORDS_FOR_VALUES = ("nan", "inf", "infinity")
@@ -38,10 +38,10 @@ _WITH_UNIT = re.compile(rf"{_NUMBER} ?({'|'.join(sorted(map(re.escape, _UNITS), 
 
 
 def without_numbers(text: str) -> str:
-    """Return a sentence in which words stand for numbers.
+    """Return a sentence in which words replace the numbers.
 
-    Names of message types stay whole, places in Python files lose their line, and of any other word with digits in it
-    there is left what comes before the first one.
+    Names of message types stay whole, and places in Python files lose their line. Any other word with digits is cut
+    before the first digit.
     """
     text = _LINE.sub(r"\1", text)
     parts, end = [], 0
@@ -57,13 +57,13 @@ def _worded(text: str) -> str:
 
 
 def _row(match: re.Match[str]) -> str:
-    """Return what stands for several numbers in a row: what the last one is, if it has a unit."""
+    """Return the replacement for several numbers in a row: that of the last one, if it has a unit."""
     last = next((word for word in _UNITS.values() if match.group().endswith(f" {word}")), "")
     return last or "numbers"
 
 
 def _word(word: str) -> str:
-    """Return a word as it is if nothing in it is a digit of any script."""
+    """Return a word unchanged if it has no digit of any script."""
     if word.strip(f"{_SIGNS}.").casefold() in _WORDS_FOR_VALUES:
         return _NUMBER
     first = next((n for n, sign in enumerate(word) if sign.isnumeric()), -1)
@@ -76,27 +76,27 @@ def _word(word: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Readers:
-    """Who reads the reports of a run, and when.
+    """Who reads the reports of a run, and on which day.
 
     Attributes:
-        audience: Who reads all of them; None for students where a platform shows a format to them, else instructors.
-        day: The day, as `2026-12-01`, by which dates in a rubric are over or not; before all of them if it is empty.
+        audience: Who reads all of them. None: students if a platform shows the format to them, else instructors.
+        day: The day, as `2026-12-01`, with which dates in a rubric are compared; empty means before all dates.
     """
 
     audience: Audience | None = None
     day: str = ""
 
     def of(self, usual: Audience) -> Audience:
-        """Return who reads a format that is usually read by some."""
+        """Return who reads a format, given its usual audience."""
         return self.audience or usual
 
     @property
     def only_students(self) -> bool:
-        """Whether nothing of the run is for instructors, so that not even an exit code may tell more."""
+        """Whether instructors get nothing from the run, so that the exit code must not reveal more either."""
         return self.audience is Audience.STUDENT
 
 
-#: Nobody is named, so formats say who reads them.
+#: No audience is given, so each format has its usual one.
 ANYBODY = Readers()
 
 
@@ -108,20 +108,20 @@ _CLOCK = "the reason is not shown"
 
 
 def told(report: Report, readers: Readers) -> Report:
-    """Return what a run may tell besides its reports, such as scores on a line or an exit code."""
+    """Return the report that a run may reveal in other ways, such as a score line or an exit code."""
     return for_student(report, readers.day) if readers.only_students else report
 
 
 def withholds(report: Report, day: str) -> bool:
-    """Return whether the rubric keeps anything of a report from a student on a day."""
+    """Return whether the rubric withholds anything in a report from a student on a day."""
     return any(_strictest(exercise, day) is not Shows.ALL for exercise in report.exercises)
 
 
 def for_student(report: Report, day: str) -> Report:
     """Return a report without what its rubrics withhold from a student on a day.
 
-    A criterion that is not shown counts in no sum: a score with it would tell what it came to. Where anything is left
-    out, so is what would give the whole report again.
+    A hidden criterion is left out of every sum: a score that included it would reveal its result. If anything is
+    withheld, so is the information that would reproduce the whole report.
     """
     if not withholds(report, day):
         return report
@@ -174,7 +174,7 @@ def _exercise(exercise: ExerciseReport, day: str) -> ExerciseReport:
 
 
 def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
-    """Return a verdict with as much as is shown of it; a criterion that is not shown has no name either."""
+    """Return the visible part of a verdict; a hidden criterion has no name either."""
     if shown[verdict.id] is Shows.OUTCOME:
         return replace(
             verdict, reason=_OUTCOME_ONLY, hint="", location=None, evidence={}, blocked_by="", same_cause_as=""
@@ -182,13 +182,13 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
     verdict = _without_hidden(verdict, shown)
     if shown[verdict.id] is Shows.ALL:
         return verdict
-    # What is not judged has no numbers of its own, and the ids in it have to stay what they are.
+    # The text of a verdict that was not judged has no numbers of its own, and the ids in it must not change.
     said = verdict.reason if verdict.outcome is Outcome.BLOCKED else without_numbers(verdict.reason)
     return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={})
 
 
 def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
-    """Return a verdict that names no criterion that is not shown; a missing file may be named."""
+    """Return a verdict that names no hidden criterion; a missing file may be named."""
     if shown.get(verdict.blocked_by) is Shows.NOTHING:
         reason = verdict.reason if verdict.missing_file else f"{NOT_JUDGED}needs {_HIDDEN}"
         verdict = replace(verdict, reason=reason, blocked_by="")
@@ -198,25 +198,25 @@ def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
 
 
 def _hint(hint: str) -> str:
-    """Return the parts of a hint that get along without numbers: most others would give the answer away."""
+    """Return the parts of a hint without numbers: most others would give the answer away."""
     return "; ".join(part for part in hint.split("; ") if without_numbers(part) == part)
 
 
 def _said(text: str, worst: Shows, *, otherwise: str) -> str:
-    """Return text of an exercise as a whole, fit for the closest of its criteria."""
+    """Return text about a whole exercise, as visible as its most restricted criterion."""
     if not text:
         return ""
     return without_numbers(text) if worst is Shows.WITHOUT_NUMBERS else otherwise
 
 
 def _notes(exercise: ExerciseReport, worst: Shows) -> list[str]:
-    """Return the notes of the run; the variant is no secret, for it is on the student's own task sheet."""
+    """Return the notes of the run; the variant is not secret, because the student's task sheet has it."""
     notes = [note for note in exercise.notes if note not in variant_notes(exercise.variant)]
     return [without_numbers(note) for note in notes] if worst is Shows.WITHOUT_NUMBERS else []
 
 
 def _unshown(exercise: ExerciseReport, day: str) -> list[str]:
-    """Return how many criteria are not shown at all, by the time until which that is so."""
+    """Return how many criteria are hidden completely, by the time until which they are."""
     found: dict[str, list[Fraction]] = {}
     for verdict in exercise.verdicts:
         if shows(exercise, verdict.id, day) is Shows.NOTHING:
@@ -233,7 +233,7 @@ def _when(until: str) -> str:
 
 
 def _faults(exercise: ExerciseReport, shown: Mapping[str, Shows]) -> tuple[ReportedFault, ...]:
-    """Return the faults: a program may tell in one whatever it was told in its scenario."""
+    """Return the faults that may be shown: a fault's text can repeat whatever the program received in its scenario."""
     kept = []
     for fault in exercise.faults:
         worst = _of_scenario(fault.scenario, exercise, shown)
@@ -245,13 +245,13 @@ def _faults(exercise: ExerciseReport, shown: Mapping[str, Shows]) -> tuple[Repor
 
 
 def _of_scenario(scenario: str, exercise: ExerciseReport, shown: Mapping[str, Shows]) -> Shows:
-    """Return how much is shown of the closest criterion judged on a scenario; of all, if none is."""
+    """Return the strictest visibility of the criteria judged on a scenario; of all criteria, if there are none."""
     asked = tuple(shown[id_] for id_, where in exercise.situations.items() if where == scenario and id_ in shown)
     return strictest(asked or tuple(shown.values()))
 
 
 def _is_open(figure: Figure, exercise: ExerciseReport, shown: Mapping[str, Shows]) -> bool:
-    """Return whether a picture shows only scenarios of which all is shown; a graph may show any of them."""
+    """Return whether a figure shows only fully visible scenarios; a graph may show any of them."""
     if not isinstance(figure, Chart) or not figure.criteria:
         return False
     scenarios = [exercise.situations.get(id_, "") for id_ in figure.criteria]
@@ -264,7 +264,7 @@ def _excerpts(
     faults: Sequence[ReportedFault],
     shown: Mapping[str, Shows],
 ) -> tuple[Excerpt, ...]:
-    """Return the lines of the source that what is wholly shown points to."""
+    """Return the source lines that fully visible verdicts and faults point to."""
     places = {v.location for v in verdicts if shown[v.id] is Shows.ALL}
     places |= {Location(f.file, f.line) for f in faults if _of_scenario(f.scenario, exercise, shown) is Shows.ALL}
     return tuple(e for e in exercise.excerpts if Location(e.file, e.line) in places)

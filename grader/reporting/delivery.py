@@ -1,4 +1,4 @@
-"""Writes reports to files, whole or not at all, and to standard output."""
+"""Writes reports atomically to files, and to standard output."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, re
 
 
 def check_writable(path: Path) -> None:
-    """Make sure that a report can be written to a path, without changing what is there.
+    """Check that a report can be written to a path, without changing what is there.
 
     Raises:
-        OSError: It cannot, and why.
+        OSError: It cannot be written.
     """
     target = _target(path)
     if _is_special(target):
@@ -40,13 +40,13 @@ def check_writable(path: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that a reader finds either what was there before or all of the new content.
+    """Write a file atomically: a reader finds the old content or all of the new.
 
-    A symbolic link stays one, an existing file keeps its mode. What is no regular file, such as /dev/null or a pipe,
-    is written to as it is.
+    A symbolic link stays a link, and an existing file keeps its mode. Special files, such as /dev/null or a pipe, are
+    written to directly.
 
     Raises:
-        OSError: It could not be written; nothing is left beside it.
+        OSError: It could not be written; no temporary file is left behind.
     """
     target = _target(path)
     if _is_special(target):
@@ -76,7 +76,7 @@ def _is_special(path: Path) -> bool:
 
 
 def _beside(target: Path) -> tuple[int, Path]:
-    """Create an empty file in the folder of the target, with the mode that the user's umask leaves."""
+    """Create an empty file in the target's folder, with the mode that the user's umask allows."""
     fresh = target.parent / f".grade-{secrets.token_hex(8)}.tmp"
     return os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666), fresh
 
@@ -88,20 +88,20 @@ _WIDEST = 120
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """One report to deliver; without a path it goes to standard output."""
+    """A report to deliver; without a path it goes to standard output."""
 
     format: str
     path: Path | None = None
 
 
 def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
-    """Return all that is to be delivered, files first, after making sure that it can be.
+    """Return all reports to deliver, files first, after checking that each can be written.
 
-    If nothing goes to standard output, the text does.
+    If nothing goes to standard output, the text report is added.
 
     Raises:
-        GraderError: A file cannot be written, two reports would go to one place, or a format lacks what only its
-            platform can tell.
+        GraderError: A file cannot be written, two reports have the same destination, or the environment lacks a value
+            that a format needs.
     """
     for output in outputs:
         check_surroundings(output.format)
@@ -116,12 +116,12 @@ def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
 
 
 def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
-    """Deliver every report; one that cannot be does not keep the others back.
+    """Deliver every report, also after one of them failed.
 
     Args:
-        report: The whole of it.
-        outputs: The formats, and where they go.
-        readers: Who reads them, and when.
+        report: The whole report.
+        outputs: Formats and destinations.
+        readers: Who reads the reports, and when.
 
     Raises:
         GraderError: A report could not be written.
@@ -132,9 +132,9 @@ def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBOD
 
 
 def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Callable[[Report], None] | None:
-    """Return what writes partial reports to the files whose platform may end this run at any time; None without any.
+    """Return a writer of partial reports, for files whose platform may end the run early; None without any.
 
-    A report that cannot be written is passed over: the whole one will say why.
+    A report that cannot be written is ignored: delivery of the final one will raise the error.
     """
     files = [output for output in outputs if output.path is not None and FORMATS[output.format].written_early]
 
@@ -146,14 +146,14 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
 
 
 def show(render: Callable[[PageLayout], str], *, for_people: bool) -> None:
-    """Print something on standard output.
+    """Print text on standard output.
 
     Args:
-        render: Makes the text, as wide and as coloured as it is told.
-        for_people: Whether a terminal with a poor encoding gets plain signs; programs read UTF-8.
+        render: Renders the text for a given width and colour setting.
+        for_people: Whether to replace characters that the terminal's encoding lacks; programs read UTF-8.
 
     Raises:
-        OSError: It cannot be written; a reader that had enough is no problem.
+        OSError: It cannot be written; a closed pipe is not an error.
     """
     if sys.stdout is not None:
         layout = PageLayout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
@@ -209,10 +209,10 @@ def _print(data: bytes) -> None:
         sys.stdout.buffer.write(data)
         sys.stdout.flush()
     except OSError as error:
-        # What is still buffered must not fail once more when Python ends.
+        # Prevent a second failure when Python flushes the buffer at exit.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-        # A reader that had enough, such as `head`, is no problem.
+        # A closed pipe, as after `head`, is not an error.
         if not isinstance(error, BrokenPipeError):
             raise

@@ -1,4 +1,4 @@
-"""Shows a checkup of this machine: as text for people, as JSON for programs."""
+"""Renders a checkup of this machine, as text for people and as JSON for programs."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def render_checkup(checkup: Checkup, *, width: int, colour: bool) -> str:
     """Return a checkup as text.
 
     Args:
-        checkup: What is shown.
+        checkup: The checkup.
         width: Columns of the page; at least 60 are used.
-        colour: Whether to colour with ANSI sequences; without, the text is the same.
+        colour: Whether to colour with ANSI sequences; the text is the same without.
     """
     page = Page(width=max(width, _NARROWEST), colour=colour)
     _head(page, checkup)
@@ -71,10 +71,10 @@ def _fact(page: Page, fact: Fact) -> None:
     style = "" if fact.fits else _BAD
     page.put(shown(fact.value), prefix=Text(f"  {fact.name:{_NAME_WIDTH}}", style=style), indent=6)
     if fact.remedy:
-        _mend(page, fact.remedy, _NAME_WIDTH)
+        _remedy(page, fact.remedy, _NAME_WIDTH)
 
 
-def _mend(page: Page, remedy: str, column: int) -> None:
+def _remedy(page: Page, remedy: str, column: int) -> None:
     page.put(shown(remedy), prefix=f"  {'':{column}}mend: ", indent=6)
 
 
@@ -98,11 +98,11 @@ def _tier(page: Page, tier: TierReport, *, used: bool) -> None:
     else:
         page.put(f"not here: {_why(tier)}", prefix=head)
         if tier.remedy:
-            _mend(page, tier.remedy, _TIER_WIDTH - 2)
+            _remedy(page, tier.remedy, _TIER_WIDTH - 2)
 
 
 def _why(tier: TierReport) -> str:
-    """Return why a tier is not usable, briefly: the properties follow."""
+    """Return briefly why a tier is not usable; the properties follow below."""
     open_ones = [found.name for found in missing(tier.properties)]
     if open_ones:
         return f"it does not contain {', '.join(open_ones)}"
@@ -110,7 +110,7 @@ def _why(tier: TierReport) -> str:
 
 
 def _matrix(page: Page, checkup: Checkup) -> None:
-    """Write a row a property and a column a tier, and what the property means."""
+    """Write one row per property and one column per tier, and what each property means."""
     tried = [tier for tier in checkup.tiers if tier.properties]
     columns = "".join(f"{tier.tier:{_MARK_WIDTH}}" for tier in tried)
     page.put(Text(f"  {'':{_PROPERTY_WIDTH}}{columns}a student's process ...", style=_QUIET))
@@ -127,7 +127,7 @@ def _matrix(page: Page, checkup: Checkup) -> None:
 
 
 def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
-    """Return what gives a property under the tier that is used; empty if nothing does."""
+    """Return the mechanism that provides a property in the used tier; empty if there is none."""
     found = (found for tier in tiers if tier.name == used for found in tier.properties)
     return next((one.mechanism for one in found if one.name == name and one.holds), "")
 
@@ -142,7 +142,7 @@ def _open(tier: TierReport) -> Iterator[Property]:
 
 
 def _limits(limits: Limits) -> Iterator[tuple[str, str]]:
-    """Yield each limit as people read it, in the order of the model."""
+    """Yield each limit in readable form, in the order of the model."""
     for field in fields(limits):
         value: int = getattr(limits, field.name)
         words, _, unit = field.name.rpartition("_")

@@ -1,8 +1,8 @@
-"""Makes text that a student controls harmless wherever it is shown: one small function for each place.
+"""Makes text that a student controls harmless in each output: one small function per output.
 
-Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`, `obeyed_by_none`.
-Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML: `html_text`, `script_json`. XML:
-`xml_text`. CSV: `csv_cell`. JSON: `json_value`.
+Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`,
+`without_workflow_commands`. Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML:
+`html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
 """
 
 from __future__ import annotations
@@ -11,45 +11,46 @@ import html
 import json
 import math
 import re
+import shlex
 import string
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
 from typing import Any
 
-#: Longest piece of foreign text that a report for people shows, in characters.
+#: Longest piece of foreign text in a report for people, in characters.
 LIMIT = 500
-#: The same for text of several lines.
+#: The same limit for text of several lines.
 LINES_LIMIT = 20_000
 ELLIPSIS = "…"
 
-# Controls, invisible format characters (bidi overrides among them), surrogates, line separators, and code points
-# whose glyph nobody can foretell.
+# Controls, invisible format characters (bidi overrides among them), surrogates, line separators, and code points whose
+# glyph is unknown.
 _UNSAFE_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 _COMBINING_CATEGORIES = frozenset({"Mn", "Me"})
-# More marks than this on one letter serve to paint over the neighbouring lines.
+# More combining marks than this on one letter would paint over neighbouring lines.
 _MOST_MARKS = 3
 _SURROGATE = re.compile("[\ud800-\udfff]")
-# What the grader's own sentences use beyond ASCII, for outputs that cannot say it.
+# Replacements for the non-ASCII characters of the grader's own sentences, for encodings that lack them.
 _PLAIN = str.maketrans({"─": "-", "▶": ">", "±": "+/-", "°": "deg ", "…": "..."})
 _TAB_WIDTH = 4
 
-# Inside Markdown text; as entities they cannot open anything, neither in a paragraph nor in a cell of a table.
+# Special characters inside Markdown text. As entities they cannot start markup, in a paragraph or in a table cell.
 _MARKDOWN_SIGNS = frozenset("\\`*_[]~$<>&|#@")
 _NOTHING_VISIBLE = "&#8203;"
-# What GitHub makes a mention, a reference, a link or a picture of although no sign of Markdown is in it.
+# Text that GitHub turns into a mention, reference, link or picture without any Markdown syntax.
 _LINKED = re.compile(r"(?i)(?P<before>(?:https?|ftp|www|GH|:[a-z0-9_+-]{1,40}(?=:)))(?P<sign>[:.-])")
 _LISTED = re.compile(r"(?P<number>[0-9]{0,9})(?P<sign>[-+=.)])")
 _BACKTICKS = re.compile("`+")
 
-# What spreadsheets take for the beginning of a formula; Excel also the wide forms.
+# Characters that make spreadsheets read a cell as a formula; Excel also accepts the full-width forms.
 _FORMULA = re.compile(r" *[=+\-@\uff1d\uff0b\uff0d\uff20]")
-# A line that the runner of GitHub Actions would obey: the present form at its beginning, the old one anywhere.
+# Lines that the GitHub Actions runner executes: the current form at the start of a line, the old one anywhere.
 _COMMAND = re.compile(r"^\s*:(?=:)|#(?=#\[)", re.MULTILINE)
-# In JSON that stands inside HTML: what could end the script element or begin a comment, and what JavaScript disliked.
+# In JSON inside HTML: what could end the script element or start a comment, and what old JavaScript rejects.
 _ENDS_SCRIPT = re.compile("[<>&\u2028\u2029]")
-# Integers beyond 64 bits are no measurements, and most JSON readers cannot hold them.
+# Integers beyond 64 bits are not measurements, and most JSON readers cannot hold them.
 _MOST_BITS = 64
 
 
@@ -57,14 +58,14 @@ def shown(text: str, *, limit: int = LIMIT) -> str:
     r"""Return foreign text as one line that is safe on a terminal.
 
     Line breaks, escape sequences, direction overrides and other unprintable characters appear as `\n`, `\x1b`
-    or `\u202e`; every kind of space is a plain one.
+    or `\u202e`; every kind of space becomes a plain one.
 
     Args:
-        text: Anything, lone surrogates included.
-        limit: Most characters returned, at least 1; a longer text ends in an ellipsis.
+        text: Any text, lone surrogates included.
+        limit: Maximum number of characters returned, at least 1; a longer text ends in an ellipsis.
     """
     if len(text) <= limit and text.isascii() and text.isprintable():
-        return text  # nearly all there is; looking at each character takes a hundred times as long
+        return text  # the common case; looking at each character takes a hundred times as long
     pieces: list[str] = []
     length = marks = 0
     for character in text:
@@ -81,8 +82,8 @@ def shown_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
     """Return foreign text of several lines that is safe on a terminal: as `shown`, but its line breaks stay.
 
     Args:
-        text: Anything; tabs become spaces up to the next column of four.
-        limit: Most characters returned, at least 1; a longer text ends in an ellipsis.
+        text: Any text; tabs become spaces up to the next column of four.
+        limit: Maximum number of characters returned, at least 1; a longer text ends in an ellipsis.
     """
     lines: list[str] = []
     left = limit
@@ -101,7 +102,7 @@ def valid_unicode(text: str) -> str:
 
 
 def encoded(text: str, encoding: str) -> bytes:
-    """Return the text in the encoding of an output; where that is a poor one, signs give way to plain ones."""
+    """Return the text in the encoding of an output; characters that it lacks are replaced by plain ones."""
     try:
         return text.encode(encoding)
     except UnicodeEncodeError:
@@ -119,30 +120,29 @@ def workflow_property(text: str, *, limit: int = LIMIT) -> str:
 
 
 def log_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text for the log of a GitHub job: as `shown_lines`, and no line of it is a workflow command.
+    """Return foreign text for the log of a GitHub job: as `shown_lines`, but no line is a workflow command.
 
     Args:
-        text: Whole lines, with all that is to stand before foreign text in them.
-        limit: Most characters of the text that are shown.
+        text: Whole lines, including everything that is printed before foreign text in them.
+        limit: Maximum number of characters shown.
     """
-    return obeyed_by_none(shown_lines(text, limit=limit))
+    return without_workflow_commands(shown_lines(text, limit=limit))
 
 
-def obeyed_by_none(text: str) -> str:
-    """Return lines, safe otherwise, none of which is a command for a GitHub job that they are printed in."""
+def without_workflow_commands(text: str) -> str:
+    """Return lines that are otherwise safe with every GitHub workflow command defused."""
     return _COMMAND.sub(r"\g<0>\\", text)
 
 
 def markdown(text: str, *, limit: int = LIMIT) -> str:
-    """Return foreign text as Markdown that shows just this text.
+    """Return foreign text as Markdown that shows exactly this text.
 
-    It fits into a paragraph, a heading, a list or a cell of a table, also at its beginning: no markup, HTML, link,
-    picture, formula, mention or reference comes of it. What GitHub links without any markup is broken by an invisible
-    space.
+    The result fits into a paragraph, heading, list or table cell, also at its start: it cannot become markup, HTML, a
+    link, picture, formula, mention or reference. An invisible space breaks what GitHub links without any markup.
 
     Args:
-        text: Anything; it becomes one line.
-        limit: Most characters that are visible in the end.
+        text: Any text; it becomes one line.
+        limit: Maximum number of visible characters.
     """
     line = shown(text, limit=limit).strip(" ")
     line = _LINKED.sub(r"\g<before>\0\g<sign>", line)
@@ -152,69 +152,69 @@ def markdown(text: str, *, limit: int = LIMIT) -> str:
 
 
 def markdown_code(text: str, *, in_cell: bool = False, limit: int = LIMIT) -> str:
-    """Return foreign text as a code span of Markdown; nothing if it is empty.
+    """Return foreign text as a Markdown code span, or nothing if it is empty.
 
     GitHub links nothing in a code span, so this suits names and values best.
 
     Args:
-        text: Anything; it becomes one line.
-        in_cell: Whether the span stands in a cell of a table, where `|` is written in another way.
-        limit: Most characters of the text that are shown.
+        text: Any text; it becomes one line.
+        in_cell: Whether the span is in a table cell, where `|` needs another escape.
+        limit: Maximum number of characters shown.
     """
     line = shown(text, limit=limit)
     if not line.strip(" "):
         return ""
     fence = "`" * _longer_than_runs(line, 1)
-    # One space on either side is not shown; without it, a backtick at the edge would lengthen the fence.
+    # One space on either side is not rendered; without it, a backtick at the edge would lengthen the fence.
     padding = " " if line[0] in " `" or line[-1] in " `" else ""
     span = f"{fence}{padding}{line}{padding}{fence}"
     return span.replace("|", "\\|") if in_cell else span
 
 
 def markdown_block(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text as a fenced code block of Markdown, to be set between blank lines at the left edge."""
+    """Return foreign text as a fenced Markdown code block, for use between blank lines at the left margin."""
     lines = shown_lines(text, limit=limit)
     fence = "`" * _longer_than_runs(lines, 3)
     return f"{fence}text\n{lines}\n{fence}"
 
 
 def mermaid_label(text: str, *, limit: int = LIMIT) -> str:
-    """Return foreign text for a label between double quotes in a Mermaid diagram."""
+    """Return foreign text for a double-quoted label in a Mermaid diagram."""
     signs = frozenset(string.punctuation) - frozenset("/_.,-")
     return "".join(f"#{ord(sign)};" if sign in signs else sign for sign in shown(text, limit=limit))
 
 
 def html_text(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text for the content of an HTML element or for an attribute between quotes; line breaks stay."""
+    """Return foreign text for an HTML element or a quoted attribute; line breaks stay."""
     return html.escape(shown_lines(text, limit=limit), quote=True)
 
 
 def script_json(value: object) -> str:
-    """Return data as JSON for a script element of an HTML page; nothing in it can end the element."""
+    """Return data as JSON for a script element of an HTML page; it cannot end the element."""
     text = json.dumps(json_value(value), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return _ENDS_SCRIPT.sub(lambda match: f"\\u{ord(match.group()):04x}", text)
 
 
 def xml_text(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text that XML 1.0 can hold, line breaks included; the writer of the XML escapes `<` and `&`."""
-    # All that is illegal in XML (controls, surrogates, U+FFFE and U+FFFF) is in a category that is named, not shown.
+    """Return foreign text that XML 1.0 can hold, line breaks included; the XML writer escapes `<` and `&`."""
+    # Everything illegal in XML (controls, surrogates, U+FFFE and U+FFFF) is in a category that is shown as an escape.
     return shown_lines(text, limit=limit)
 
 
 def csv_cell(text: str, *, limit: int = LIMIT) -> str:
-    """Return foreign text for a cell of a CSV file that no spreadsheet takes for a formula.
+    """Return foreign text for a CSV cell that no spreadsheet reads as a formula.
 
-    One that would be gets an apostrophe in front. Numbers of our own need no such care; the writer of the CSV quotes.
+    A text that looks like a formula gets a leading apostrophe. Our own numbers do not need this; the CSV writer quotes.
     """
     line = shown(text, limit=limit)
     return f"'{line}" if _FORMULA.match(line) else line
 
 
 def json_value(value: object) -> Any:
-    """Return a value as JSON can say it.
+    """Return a value as JSON can represent it.
 
     Fractions become numbers of six digits, NaN and the infinities their names, integers beyond 64 bits a sentence, lone
-    surrogates U+FFFD, and all else its text.
+    surrogates U+FFFD, and everything else its text.
     """
     if isinstance(value, Mapping):
         return {valid_unicode(str(key)): json_value(item) for key, item in value.items()}
@@ -237,11 +237,11 @@ def _json_number(value: float | Fraction) -> int | float | str:
 
 
 def _entity(character: str) -> str:
-    if character == "\0":  # our own mark: what is shown holds no control characters
+    if character == "\0":  # our own marker: shown text holds no control characters
         return _NOTHING_VISIBLE
     if character not in _MARKDOWN_SIGNS:
         return character
-    # After these two a mention or a reference would follow.
+    # After these two, a mention or a reference would follow.
     return f"&#{ord(character)};{_NOTHING_VISIBLE if character in '@#' else ''}"
 
 
@@ -271,3 +271,28 @@ def _cut(pieces: list[str], length: int, limit: int) -> str:
     while pieces and length > limit - len(ELLIPSIS):
         length -= len(pieces.pop())
     return "".join(pieces) + ELLIPSIS
+
+
+def command_line(words: Sequence[str]) -> str:
+    """Return words as one line for a POSIX shell, or for bash where a word is unprintable."""
+    return " ".join(map(quoted, words))
+
+
+def quoted(word: str) -> str:
+    """Return a word quoted for a shell, on one line; unprintable characters use the quotes of bash."""
+    if word.isprintable():
+        return shlex.quote(word)
+    return f"$'{''.join(map(_in_bash_quotes, word))}'"
+
+
+def _in_bash_quotes(character: str) -> str:
+    if character in "\\'":
+        return f"\\{character}"
+    if character.isprintable():
+        return character
+    # Bytes that are not UTF-8 arrive as lone surrogates; other surrogates are written as they are.
+    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", _surrogates(character)))
+
+
+def _surrogates(character: str) -> str:
+    return "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"

@@ -1,4 +1,4 @@
-"""Explanations of criteria and checks, as text and as JSON."""
+"""Renders explanations of criteria and checks, and the values of one student's variant, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
+from grader.core.exercise import Exercise, Variant, written
 from grader.core.report import CheckExplanation, CriterionExplanation, Parameter
-from grader.reporting.escape import shown
+from grader.reporting.escape import json_value, markdown, markdown_code, shown
 
-SCHEMA = "grader/explanation/v1"
+EXPLANATION_SCHEMA = "grader/explanation/v1"
 _LABEL = 12
 #: Widest column of parameters with their values.
 _VALUE = 32
 
+SHEET_SCHEMA = "grader/variant/v1"
+
 
 def render_explanations(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
-    """Return explanations as text, one after the other, no line longer than `width` where words allow it."""
+    """Return explanations as text, one after the other, no line longer than `width` if words allow it."""
     parts = [_criterion(e, width) if isinstance(e, CriterionExplanation) else _check(e, width) for e in found]
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
 
@@ -30,11 +33,11 @@ def explanations_to_json(found: Sequence[CriterionExplanation | CheckExplanation
         else {"kind": "check", **asdict(e)}
         for e in found
     ]
-    return json.dumps({"schema": SCHEMA, "explanations": rows}, indent=2) + "\n"
+    return json.dumps({"schema": EXPLANATION_SCHEMA, "explanations": rows}, indent=2) + "\n"
 
 
 def list_checks(found: Sequence[CriterionExplanation | CheckExplanation], *, width: int) -> str:
-    """Return the checks among explanations as a list: name, and what it asks."""
+    """Return the checks among the explanations as a list: name and purpose."""
     checks = [e for e in found if isinstance(e, CheckExplanation)]
     column = max((len(e.name) for e in checks), default=0) + 2
     lines = (line for e in checks for line in _wrapped(f"{e.name:<{column}}", shown(e.asks), width, after=column))
@@ -86,3 +89,31 @@ def _row(label: str, text: str, width: int) -> Iterator[str]:
 def _wrapped(start: str, text: str, width: int, *, after: int = _LABEL + 2) -> Iterator[str]:
     lines = textwrap.wrap(text.strip(), max(40, width), initial_indent=start, subsequent_indent=" " * after)
     yield from lines or [start.rstrip()]
+
+
+def render_sheet(exercise: Exercise) -> str:
+    """Return the values as a Markdown table, or a sentence if the exercise is the same for everybody."""
+    title = f"## Exercise {markdown(exercise.number)}: {markdown(exercise.title)}\n"
+    variant = exercise.variant
+    if variant is None:
+        return f"{title}\nThis exercise is the same for everybody.\n"
+    rows = [f"| {markdown(_spaced(name))} | {markdown_code(written(value))} |" for name, value in variant.values]
+    whose = f"\nThe values of {markdown(variant.student)}:\n"
+    return "\n".join([title + whose, "| | |", "|:--|:--|", *rows]) + "\n"
+
+
+def sheet_to_json(exercise: Exercise) -> str:
+    """Return the values as JSON text."""
+    variant = exercise.variant or Variant("", ())
+    data = {
+        "schema": SHEET_SCHEMA,
+        "exercise": exercise.id,
+        "student": json_value(variant.student),
+        "values": {name: json_value(value) for name, value in variant.values},
+        "rubric": exercise.digest,
+    }
+    return json.dumps(data, indent=2, allow_nan=False) + "\n"
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")

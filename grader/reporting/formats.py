@@ -1,4 +1,4 @@
-"""The formats that a report can be delivered in, one row each; what renders one is imported when it is first used."""
+"""The formats of reports, one row each; a renderer is imported at its first use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from grader.reporting.audience import ANYBODY, Readers
 
 @dataclass(frozen=True, slots=True)
 class PageLayout:
-    """How a text is laid out; formats for programs do not care."""
+    """Width and colour of text; formats for programs ignore it."""
 
     width: int
     colour: bool
@@ -47,16 +47,17 @@ def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format that a report can be delivered in.
+    """A format of reports.
 
     Attributes:
-        renderer: What makes the text of a report: `module:function` in `grader.reporting`.
-        suffix: How the name of a file in this format ends.
-        usual: Who reads it unless somebody is named: students, where a platform shows it to them.
-        arguments: What the renderer is given besides the report.
-        withholds: Whether it leaves out by itself what students must not see yet: its platform shows that later.
-        illustrated: Whether it shows pictures, which take about as long to draw as judging takes.
-        written_early: Whether its platform ends a run that takes too long, and then takes what is there.
+        renderer: The rendering function: `module:function` in `grader.reporting`.
+        suffix: File name suffix of this format.
+        usual: Who reads it unless an option says otherwise: students, if a platform shows it to them.
+        arguments: Computes the renderer's further arguments.
+        withholds: Whether the renderer itself hides what students must not see yet, because its platform shows it
+            later.
+        illustrated: Whether it shows figures, which take about as long to draw as judging takes.
+        written_early: Whether its platform ends a run that takes too long, and then uses the file that exists.
     """
 
     renderer: str
@@ -76,7 +77,7 @@ class Format:
         return text
 
 
-#: Every format that a report can be delivered in.
+#: Every format of reports, by name.
 FORMATS: dict[str, Format] = {
     "json": Format("json_report:dumps", ".json", Audience.INSTRUCTOR),
     "text": Format("text:render_text", ".txt", Audience.INSTRUCTOR, _layout),
@@ -94,10 +95,10 @@ FORMATS: dict[str, Format] = {
 
 
 def check_surroundings(name: str) -> None:
-    """Make sure that the environment tells what a format needs and a report does not know.
+    """Check that the environment has the values that a format needs.
 
     Raises:
-        GraderError: It does not.
+        GraderError: A value is missing.
     """
     if FORMATS[name].arguments is _handed_in:
         from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
@@ -106,12 +107,12 @@ def check_surroundings(name: str) -> None:
 
 
 def rendered(name: str, report: Report, layout: PageLayout, readers: Readers = ANYBODY) -> str:
-    """Return a report in a format, with what its reader may see of it.
+    """Return a report in a format, limited to what its reader may see.
 
     Args:
         name: One of `FORMATS`.
-        report: The whole of it.
-        layout: How a text is laid out.
+        report: The whole report.
+        layout: Width and colour of text.
         readers: Who reads it, and when.
     """
     format_ = FORMATS[name]

@@ -1,4 +1,4 @@
-"""The live ROS graph as rqt_graph would draw it, in text and as a Mermaid flowchart."""
+"""Draws the live ROS graph like rqt_graph, as text and as a Mermaid flowchart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.reporting.escape import mermaid_label, shown
 
 #: Topics that every node has.
 _EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
-#: Stands for a side of a topic where no node is.
+#: Stands for a side of a topic without nodes.
 NOBODY = "(nobody)"
 #: More edges than this are counted, not drawn.
 MOST_EDGES = 40
@@ -21,10 +21,10 @@ Edge = tuple[str, str, str, str]
 
 
 def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
-    """Return the lines of the drawing, each edge on one line, or on two where `width` columns do not hold it.
+    """Return the lines of the drawing; an edge takes one line, or two if it is wider than `width` columns.
 
-    A topic that only one side knows leads from or to `(nobody)`; a topic whose two sides disagree on the type is
-    marked, for no message goes through it.
+    A topic with only one side leads from or to `(nobody)`. A topic whose two sides have different types is marked,
+    because no message passes.
     """
     edges = graph_edges(graph)
     lines = [line for edge in edges[:MOST_EDGES] for line in _drawn(edge, width)]
@@ -33,12 +33,12 @@ def draw_graph(graph: GraphSnapshot, *, width: int) -> list[str]:
     calls = service_edges(graph)
     lines += [_called(*edge) for edge in calls[:MOST_EDGES]]
     joined = {name for client, _, server in calls for name in (client, server)}
-    lonely = [node for node in lonely_nodes(graph) if node not in joined]
+    lonely = [node for node in isolated_nodes(graph) if node not in joined]
     return lines + [f"{shown(node, limit=_NAME_LIMIT)} (no topics)" for node in lonely]
 
 
 def service_edges(graph: GraphSnapshot) -> list[tuple[str, str, str]]:
-    """Return every client with every server that it may call, and those that have nobody; without parts of actions."""
+    """Return every client with each server that it may call or with nobody, without the parts of actions."""
     ends = [end for end in graph.services if not _hidden(end.service)]
     clients = [end for end in ends if end.kind == "client"]
     servers = [end for end in ends if end.kind == "service"]
@@ -60,12 +60,12 @@ def _called(client: str, service: str, server: str) -> str:
 
 
 def graph_edges(graph: GraphSnapshot) -> list[Edge]:
-    """Return every edge once: source node, topic, target node, and what keeps messages from going through it."""
+    """Return every edge once: source node, topic, target node, and what prevents messages from passing."""
     return list(dict.fromkeys(_edges(graph)))
 
 
-def lonely_nodes(graph: GraphSnapshot) -> list[str]:
-    """Return the nodes that no edge joins."""
+def isolated_nodes(graph: GraphSnapshot) -> list[str]:
+    """Return the nodes without edges."""
     joined = {name for source, _, target, _ in graph_edges(graph) for name in (source, target)}
     return [node for node in graph.nodes if node not in joined]
 
@@ -77,7 +77,7 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
     for publisher in publishers:
         takers = [s for s in subscriptions if s.topic == publisher.topic]
         for taker in takers:
-            yield publisher.node, publisher.topic, taker.node, _quarrel(publisher, taker)
+            yield publisher.node, publisher.topic, taker.node, _type_conflict(publisher, taker)
         if not takers:
             yield publisher.node, publisher.topic, NOBODY, ""
     served = {p.topic for p in publishers}
@@ -90,7 +90,7 @@ def _hidden(topic: str) -> bool:
     return topic in _EVERYWHERE or "/_" in topic
 
 
-def _quarrel(publisher: Endpoint, taker: Endpoint) -> str:
+def _type_conflict(publisher: Endpoint, taker: Endpoint) -> str:
     return "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
 
 
@@ -106,12 +106,12 @@ _MERMAID_NAME_LIMIT = 100
 
 
 def draw_mermaid(graph: GraphSnapshot) -> str:
-    """Return the lines of a flowchart; an edge that carries no message because the types differ is dotted."""
+    """Return the lines of a flowchart; an edge without messages, because the types differ, is dotted."""
     edges = graph_edges(graph)
     kept, left_out = edges[:MOST_EDGES], len(edges) - MOST_EDGES
     drawing = _Drawing()
     lines = list(dict.fromkeys(line for edge in kept for line in drawing.edge(edge)))
-    lonely = [drawing.node(name) for name in lonely_nodes(graph)[:MOST_EDGES]]
+    lonely = [drawing.node(name) for name in isolated_nodes(graph)[:MOST_EDGES]]
     more = [f'more["and {left_out} more"]'] if left_out > 0 else []
     return (
         "\n".join(["flowchart LR", *(f"    {line}" for line in (*drawing.boxes, *lines, *more))])
@@ -121,7 +121,7 @@ def draw_mermaid(graph: GraphSnapshot) -> str:
 
 
 class _Drawing:
-    """The boxes drawn so far; names stand only in their labels, never where they could be syntax."""
+    """The boxes drawn so far; names appear only in labels, where they cannot be syntax."""
 
     def __init__(self) -> None:
         self.boxes: list[str] = []

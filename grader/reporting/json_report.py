@@ -1,4 +1,4 @@
-"""The report as JSON, version 1: what other programs read."""
+"""The report as JSON, version 1, for other programs."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from grader.core.checkup import Property, described
 from grader.core.exercise import Location, Variant
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
-from grader.reporting.escape import valid_unicode
-from grader.reporting.shell import command_line
+from grader.reporting.escape import command_line, valid_unicode
 
-#: Digits after the point of every score and duration.
+#: Decimal places of every score and duration.
 DIGITS = 6
-# Integers beyond 64 bits are no measurements, and most JSON readers cannot hold them.
+# Integers beyond 64 bits are not measurements, and most JSON readers cannot hold them.
 _MOST_BITS = 64
-# Legal inside a JSON string, but a terminal may obey them: C1 controls, and characters that reorder or hide text.
+# Legal inside a JSON string, but a terminal may interpret them: C1 controls, and characters that reorder or hide text.
 _OBEYED_BY_TERMINALS = re.compile("[\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\U000e0000-\U000e007f]")
 
 
@@ -59,18 +58,18 @@ def report_to_json(report: Report) -> dict[str, Any]:
 
 
 def dumps(report: Report) -> str:
-    """Return a report as indented JSON text that ends in a line break, can be encoded, and is safe on a terminal."""
+    """Return a report as indented JSON text that ends in a line break, is encodable, and is safe on a terminal."""
     return json_text(report_to_json(report))
 
 
 def json_text(values: Mapping[str, Any]) -> str:
-    """Return plain JSON values as `dumps` does a report; formats of other programs are written with it too."""
+    """Return plain JSON values as text in the way of `dumps`; platform formats use it too."""
     text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
     return _OBEYED_BY_TERMINALS.sub(lambda match: json.dumps(match.group())[1:-1], text) + "\n"
 
 
 def report_schema() -> dict[str, Any]:
-    """Return the JSON Schema that every report follows."""
+    """Return the JSON Schema of reports."""
     text = files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
     schema: dict[str, Any] = json.loads(text)
     return schema
@@ -114,14 +113,14 @@ def _starts(exercise: ExerciseReport) -> dict[str, Any]:
 
 
 def _variant(variant: Variant | None) -> dict[str, Any]:
-    """Return the values of the student's own, where the rubric has some."""
+    """Return the values of this student's variant, if the rubric has variants."""
     if variant is None:
         return {}
     return {"variant": {"student": valid_unicode(variant.student), "values": _plain(dict(variant.values))}}
 
 
 def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
-    """Each exercise carries the notes of the whole run, for the format has no other place for them."""
+    """Return the notes of an exercise and of the whole run; the format has no other place for the latter."""
     seed = () if report.seed is None else (f"drawn values come from seed {report.seed}",)
     notes = (*report.notes, *exercise.notes, *seed)
     return list(dict.fromkeys(valid_unicode(note) for note in notes))
@@ -158,13 +157,13 @@ def _fault(fault: ReportedFault) -> dict[str, Any]:
 
 
 def _number(value: Fraction | float) -> int | float:
-    """Return a whole number as an int, any other rounded."""
+    """Return a whole number as an int, and any other number rounded."""
     rounded = round(float(value), DIGITS)
     return int(rounded) if rounded.is_integer() else rounded
 
 
 def _plain(value: object) -> Any:
-    """Return evidence as JSON values; what JSON cannot say becomes text."""
+    """Return evidence as JSON values; what JSON cannot represent becomes text."""
     if isinstance(value, Mapping):
         return {valid_unicode(str(key)): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -11,9 +11,9 @@ from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, xml_text
 
-# Judging a recording takes no time worth telling; that of the run is on the root.
+# Judging a recording takes negligible time; the root has that of the run.
 _NO_TIME = "0"
-#: Element for an outcome: a failure is the student's, an error is ours, and what was not asked is skipped.
+#: Outcome -> element: a failure is the student's, an error is ours, and a blocked criterion is skipped.
 _ELEMENTS = {
     Outcome.PARTLY: "failure",
     Outcome.NOT_MET: "failure",
@@ -26,9 +26,9 @@ def render_junit(report: Report, *, folder: str | None) -> str:
     """Return a report as JUnit XML.
 
     Args:
-        report: What is shown.
-        folder: Where the submission lies in the repository, POSIX form; None if it does not, and then files are named
-            as the submission names them.
+        report: The report.
+        folder: The submission's folder in the repository, POSIX form. None if it is elsewhere: then files have the
+            names they have in the submission.
     """
     root = ET.Element("testsuites", {"name": xml_text(wording.headline(report)), "time": f"{report.duration_s:.3f}"})
     _count(root, [verdict for exercise in report.exercises for verdict in exercise.verdicts])

@@ -1,4 +1,4 @@
-"""The report as GitHub's Markdown, for a step summary, a release or a comment."""
+"""The report as GitHub Markdown, for a step summary, a release or a comment."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.reporting import wording
 from grader.reporting.escape import LIMIT, markdown, markdown_block, markdown_code
 from grader.reporting.graph import draw_mermaid
 
-#: GitHub drops a step summary of 1024 KiB or more as a whole; some room is left for what else a step writes.
+#: GitHub drops a step summary of 1024 KiB or more entirely; the rest is left for other output of the step.
 MOST_BYTES = 1000 * 1024
 _SIGNS = {
     Outcome.MET: "✅",
@@ -26,7 +26,7 @@ _LEFT_OUT = "> [!NOTE]\n> Details are left out here, or GitHub would drop all of
 
 @dataclass(frozen=True, slots=True)
 class Detail:
-    """How much is said; the first of `DETAILS` that fits is used."""
+    """How much a report shows; the first entry of `DETAILS` that fits is used."""
 
     faults: int = wording.MOST_FAULTS
     notes: int = wording.MOST_NOTES
@@ -41,7 +41,7 @@ class Detail:
 _ALL = Detail()
 _SHORT = Detail(faults=3, notes=5, frames=False, graph=False)
 _SHORTER = replace(_SHORT, faults=0, notes=0, text=150)
-#: From everything to the score alone: what explains least goes first.
+#: From everything to the score alone; the least useful detail is dropped first.
 DETAILS = (
     _ALL,
     replace(_ALL, frames=False),
@@ -55,7 +55,7 @@ DETAILS = (
 
 
 def render_markdown(report: Report, *, limit: int = MOST_BYTES) -> str:
-    """Return a report as Markdown of at most `limit` bytes; detail gives way before it would be longer."""
+    """Return a report as Markdown of at most `limit` bytes; details are dropped to stay below it."""
     text = _rendered(report, _ALL)
     for detail in DETAILS[1:]:
         if len(text.encode()) <= limit:
@@ -74,7 +74,7 @@ def _rendered(report: Report, detail: Detail) -> str:
 def _head(report: Report, detail: Detail) -> list[str]:
     lines = [f"# {markdown(report.name, limit=wording.NAME_LIMIT)}: {wording.score_line(report)}\n"]
     lines += [f"> [!WARNING]\n> {markdown(warning)}\n" for warning in wording.warnings(report)]
-    if wording.without_walls(report):
+    if wording.ran_without_sandbox(report):
         lines.append(f"> [!CAUTION]\n> isolation: {markdown(wording.isolation(report))}\n")
     lines += [f"**{markdown(wording.summary(report))}**\n", f"{markdown(wording.run_line(report))}\n"]
     lines += [_LEFT_OUT] if detail != _ALL else []

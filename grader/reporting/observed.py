@@ -1,4 +1,4 @@
-"""Shows a summary: as text for people, as JSON for programs."""
+"""Renders the summary of an observation, as text for people and as JSON for programs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from grader.reporting.escape import shown, valid_unicode
 from grader.reporting.graph import draw_graph
 
 SCHEMA = "grader/observation/v1"
-#: The text shows so many lines of a kind, and counts the rest.
+#: Lines of one kind that the text shows; the rest are counted.
 SHOWN_LINES = 12
 SHOWN_RANGES = 8
 WIDTH = 100
@@ -107,7 +107,7 @@ def _fault(fault: Fault) -> Iterator[str]:
 
 
 def summary_to_json(summary: Summary) -> str:
-    """Return a summary as JSON text; times in seconds."""
+    """Return a summary as JSON text; times are in seconds."""
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "processes": list(summary.processes),
@@ -182,7 +182,7 @@ def _end_json(end: Endpoint) -> dict[str, Any]:
 
 
 def _valid(value: Any) -> Any:
-    """Return JSON values whose texts hold no lone surrogates."""
+    """Return JSON values without lone surrogates in their text."""
     if isinstance(value, str):
         return valid_unicode(value)
     if isinstance(value, dict):

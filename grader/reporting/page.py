@@ -1,4 +1,4 @@
-"""A page of text of a given width: wrapped paragraphs that hang under their first line, coloured or plain."""
+"""Lays out text for a given width: wrapped paragraphs with a hanging indent, coloured or plain."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
-from grader.reporting.escape import obeyed_by_none
+from grader.reporting.escape import without_workflow_commands
 
-#: Narrowest page; below it nothing can be laid out.
+#: Narrowest page that can be laid out, in columns.
 NARROWEST = 20
 # A column narrower than this is harder to read than a new line.
 _NARROWEST_COLUMN = 14
 
 
 class Page:
-    """Text written from top to bottom; nothing is cut, and no line is longer than the page is wide."""
+    """Text written from top to bottom; nothing is cut, and no line is wider than the page."""
 
     def __init__(self, *, width: int, colour: bool) -> None:
-        """Begin an empty page; the environment has no say in how it comes out."""
+        """Start an empty page; environment variables do not affect it."""
         self.width = max(width, NARROWEST)
         self._out = StringIO()
         self._console = Console(
@@ -37,11 +37,11 @@ class Page:
         )
 
     def text(self) -> str:
-        """Return what was written so far, fit for the log of a GitHub job: a line break may have made a command."""
-        return obeyed_by_none(self._out.getvalue())
+        """Return the text so far; no line of it is a GitHub workflow command, even after wrapping."""
+        return without_workflow_commands(self._out.getvalue())
 
     def blank(self) -> None:
-        """Leave a line free, unless the page is empty."""
+        """Write an empty line, unless the page is empty."""
         if self._out.getvalue():
             self._out.write("\n")
 
@@ -49,10 +49,10 @@ class Page:
         """Write a paragraph.
 
         Args:
-            body: Already safe to show.
-            prefix: What stands before its first line; further lines hang under its end.
+            body: Text that is already safe to show.
+            prefix: Text before the first line; further lines are indented to its end.
             style: Style of the body.
-            indent: Where the body begins if it has too little room beside its prefix.
+            indent: Indentation of the body when it does not fit beside its prefix.
         """
         head, text = _text(prefix), _text(body, style)
         if head.plain.strip() and self._crowded(text, head.cell_len, indent):
@@ -64,7 +64,7 @@ class Page:
             self._line(Text(" " * head.cell_len) + line)
 
     def _crowded(self, text: Text, beside: int, indent: int) -> bool:
-        """Whether the text reads better below its prefix: a word would break beside it that is whole below."""
+        """Return whether the text reads better below its prefix, because a word would break beside it."""
         longest = max(map(cell_len, text.plain.split()), default=0)
         return beside > indent and self.width - beside < max(min(longest, self.width - indent), _NARROWEST_COLUMN)
 

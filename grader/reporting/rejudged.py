@@ -1,4 +1,4 @@
-"""Reports that were judged again: what changed for whom, as text and as JSON."""
+"""Renders the results of judging again: what changed for each submission, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from grader.reporting.escape import shown
 
 @dataclass(frozen=True, slots=True)
 class ReportStanding:
-    """What a criterion came to in one report, as its JSON says."""
+    """Outcome and points of a criterion in one report, read from its JSON."""
 
     outcome: str
     score: float
@@ -22,7 +22,7 @@ class ReportStanding:
 
 @dataclass(frozen=True, slots=True)
 class CriterionChange:
-    """One criterion whose outcome or points changed; None where a report has no such criterion."""
+    """A criterion whose outcome or points changed; a side is None if its report lacks the criterion."""
 
     exercise: str
     criterion: str
@@ -40,12 +40,12 @@ class ReportChange:
     """What changed for one submission.
 
     Attributes:
-        name: What people call the submission.
-        before: Points of the first report, of the exercises compared.
-        before_max: Points there were to be had.
-        after: Points of the new report.
-        after_max: Points there are to be had.
-        criteria: Those that changed, in the order of the new report, removed ones last.
+        name: Display name of the submission.
+        before: Points in the first report, for the exercises compared.
+        before_max: Maximum points in the first report.
+        after: Points in the new report.
+        after_max: Maximum points in the new report.
+        criteria: Changed criteria in the order of the new report, removed ones last.
     """
 
     name: str
@@ -62,15 +62,15 @@ class ReportChange:
 
     @property
     def share_gain(self) -> float:
-        """Share of the points won, in [-1, 1]: what counts where the rubric gives other points than before."""
+        """Share of the points won, in [-1, 1]: comparable when the rubric's points have changed."""
         return round(_share(self.after, self.after_max) - _share(self.before, self.before_max), 9)
 
 
 def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> ReportChange:
-    """Return what changed between two reports as JSON, of the exercises that the second one has.
+    """Compare two JSON reports, for the exercises in the second one.
 
     Raises:
-        KeyError, TypeError, ValueError: `before` is no report.
+        KeyError, TypeError, ValueError: `before` is not a report.
     """
     exercises = [e["id"] for e in after["exercises"]]
     old = {key: row for key, row in _standings(before) if key[0] in exercises}
@@ -84,7 +84,7 @@ def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Re
 
 
 def dropped_first(changes: Sequence[ReportChange]) -> list[ReportChange]:
-    """Return those with any difference: the greatest loss first, by the share of the points, the greatest gain last."""
+    """Return the changes that are not empty, from the greatest loss to the greatest gain, by share of the points."""
     return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
 
 
@@ -116,16 +116,16 @@ _OUTCOMES = {"not_met": "not met"}
 
 @dataclass(frozen=True, slots=True)
 class RejudgedResult:
-    """One submission judged again, or refused.
+    """One submission that was judged again, or could not be.
 
     Attributes:
-        name: What people call the submission.
+        name: Display name of the submission.
         problem: Why its evidence cannot be used, on one line; empty if it can.
         score: Points earned.
-        max_score: Points to be had.
-        code: Exit code that this submission alone would have.
-        change: What changed since its first report; None if nobody asked, or there is none to compare with.
-        report: The new report as JSON text; empty if nobody asked for it.
+        max_score: Maximum points.
+        code: Exit code for this submission alone.
+        change: Changes since the first report; None if not requested, or without a report to compare with.
+        report: The new report as JSON text; empty if not requested.
     """
 
     name: str
@@ -138,7 +138,7 @@ class RejudgedResult:
 
 
 def render_results(results: Sequence[RejudgedResult]) -> str:
-    """Return one line for each submission, in the order given, and what was refused."""
+    """Return one line for each submission, in the order given, then those that were refused."""
     judged = [r for r in results if not r.problem]
     width = max((len(_name(r.name)) for r in judged), default=0)
     lines = [f"{_name(r.name):<{width}}  {_points(r.score)}/{_points(r.max_score)}" for r in judged]
@@ -146,7 +146,7 @@ def render_results(results: Sequence[RejudgedResult]) -> str:
 
 
 def render_changes(results: Sequence[RejudgedResult]) -> str:
-    """Return what changed for whom, dropped marks first, and what was refused."""
+    """Return the changes by submission, losses first, then those that were refused."""
     judged = [r for r in results if not r.problem]
     changes = dropped_first([r.change for r in judged if r.change is not None])
     lines = [line for change in changes for line in _change(change)]
@@ -156,7 +156,7 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
 
 
 def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
-    """Return a class as JSON text: every report, or with `changes` what changed, dropped marks first."""
+    """Return a class as JSON text: every report, or with `changes` the changes, losses first."""
     judged = [r for r in results if not r.problem]
     data: dict[str, Any] = {"schema": SCHEMA}
     if changes:

@@ -1,4 +1,4 @@
-"""What a report cannot know and a platform tells: where the repository is, and what was handed in."""
+"""Reads what a report does not know from the platform: the repository folder, and the submission's metadata."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from grader.core.errors import GraderError
 from grader.reporting.platforms.classroom50 import HandedIn
 
-#: Names of the variables that Classroom 50 sets for its autograders, by the field that each one fills.
+#: Environment variables that Classroom 50 sets for its autograders, by the field that each one fills.
 VARIABLES = {
     "classroom": "CLASSROOM",
     "assignment": "ASSIGNMENT",
@@ -23,16 +23,16 @@ VARIABLES = {
     "release": "RELEASE_URL",
     "review": "REVIEW_URL",
 }
-#: When the submission was committed, in any form of ISO 8601 that names its offset.
+#: When the submission was committed, in any form of ISO 8601 with an offset.
 COMMIT_DATETIME = "COMMIT_DATETIME"
 _EVENT = "GITHUB_EVENT_PATH"
 _EVENT_BYTES = 32 << 20
 
 
 def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
-    """Return where a submission lies in its repository, POSIX form, empty for the root; None if it does not.
+    """Return a submission's folder in its repository, POSIX form, empty for the root; None outside of one.
 
-    The repository is the workspace of a GitHub job, else the nearest folder above with a `.git`, else this folder.
+    The repository is the workspace of a GitHub job, else the nearest parent folder with a `.git`, else this folder.
     """
     source = Path(os.path.realpath(path))
     folder = source if source.is_dir() else source.parent
@@ -47,10 +47,10 @@ def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
 
 
 def handed_in(environment: Mapping[str, str]) -> HandedIn:
-    """Return what Classroom 50 says about the submission.
+    """Return the metadata of the submission from Classroom 50.
 
     Raises:
-        GraderError: It does not say all that a result needs.
+        GraderError: A value that a result needs is missing.
     """
     missing = [name for name in VARIABLES.values() if not environment.get(name)]
     if missing:
@@ -85,7 +85,7 @@ def _committed_at(environment: Mapping[str, str]) -> str:
 
 
 def _from_event(path: str) -> str:
-    """Return the time of the commit that a push event was about, as GitHub wrote it; empty if it says none."""
+    """Return the commit time from a push event, as GitHub wrote it; empty if it has none."""
     if not path:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""The report for people: what a student reads in a terminal."""
+"""The report as text for a student in a terminal."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STYLES = {
 }
 _WORD_WIDTH = max(len(word) for word in OUTCOME_WORDS.values())
 _DETAIL = " " * 6
-# What ends a line of a command that goes on in the next one.
+# Ends a line of a command that continues on the next one.
 _GOES_ON = " \\"
 
 
@@ -33,9 +33,9 @@ def render_text(report: Report, *, width: int, colour: bool) -> str:
     """Return a report as text.
 
     Args:
-        report: What is shown; all its text is taken for hostile.
+        report: The report; all its text is treated as hostile.
         width: Columns of the page; at least 20 are used.
-        colour: Whether to colour with ANSI sequences; without, the text is the same.
+        colour: Whether to colour with ANSI sequences; the text is the same without.
     """
     page = Page(width=width, colour=colour)
     _head(page, report)
@@ -86,7 +86,7 @@ def _verdict(page: Page, verdict: Verdict, share: str) -> None:
     if verdict.outcome is Outcome.MET:
         page.put(title, prefix=prefix)
         return
-    # The id is what "needs ..." of a blocked criterion refers to.
+    # "needs ..." of a blocked criterion refers to this id.
     page.put(Text.assemble((title, "bold"), (f" ({verdict.id})", "dim")), prefix=prefix)
     _details(page, verdict)
 
@@ -111,7 +111,7 @@ def _fault(page: Page, fault: ReportedFault) -> None:
 
 
 def _graph(page: Page, exercise: ExerciseReport) -> None:
-    # With a single node the drawing would say no more than the criteria do.
+    # With a single node, the drawing adds nothing to the criteria.
     if exercise.graph is None or len(exercise.graph.nodes) < 2:
         return
     page.put("  Live ROS graph:")
@@ -132,7 +132,7 @@ def _more(page: Page, count: int, what: str, *, indent: str = "  ") -> None:
 
 def _foot(page: Page, report: Report) -> None:
     for name, value in wording.reproduction(report):
-        loud = name == "isolation" and wording.without_walls(report)
+        loud = name == "isolation" and wording.ran_without_sandbox(report)
         page.put(value, prefix=_row(name), style="bold red" if loud else "dim")
     prefix = _row("reproduce")
     for line in _command_lines(wording.command(report), page.width - prefix.cell_len):

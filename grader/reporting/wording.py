@@ -1,28 +1,28 @@
-"""The words that every format uses: outcomes, points, places, faults, and what a reader must know first."""
+"""Words that all formats share: outcomes, points, places, faults, and warnings that belong to the score."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
+from math import floor
 
 from grader.core.checkup import NO_WALLS, summarised
 from grader.core.exercise import Outcome, exercise_name
 from grader.core.quantities import seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind
-from grader.reporting.escape import shown
-from grader.reporting.shell import quoted
+from grader.reporting.escape import quoted, shown
 
 #: More faults or notes than this are counted, not shown.
 MOST_FAULTS = 10
 MOST_NOTES = 20
-#: Longest name of a submission, a scenario or a node that is shown.
+#: Longest name of a submission, a scenario or a node that is shown, in characters.
 NAME_LIMIT = 100
-# No path is longer; a word that was cut would make another command.
+# No path is longer; cutting a word would change the command.
 _WORD_LIMIT = 20_000
 _DIGEST_LENGTH = len("sha256:") + 12
-#: Words carry the outcome, so that nothing is lost without colour.
+#: Words state the outcome, so that nothing is lost without colour.
 OUTCOME_WORDS = {
     Outcome.MET: "met",
     Outcome.PARTLY: "partly",
@@ -37,17 +37,17 @@ _WHAT_HAPPENED = {
     "hung": "did not come back",
     "killed": "was ended",
 }
-# The first frames say where it began, the last where it broke; a deep recursion repeats itself between.
+# The first frames show where the failure began, the last where it ended; deep recursion repeats in between.
 _FIRST_FRAMES, _LAST_FRAMES = 3, 5
 
 
 def points(value: Fraction) -> str:
-    """Return points with two digits at most, and none where they would be zero."""
+    """Return points with at most two decimals, and none if they are zero."""
     return f"{float(value):.2f}".rstrip("0").rstrip(".")
 
 
 def headline(report: Report) -> str:
-    """Return whose report it is and the score; safe to show as a line of text."""
+    """Return the submission's name and the score; safe to show as a line of text."""
     return f"{shown(report.name, limit=NAME_LIMIT)}: {score_line(report)}"
 
 
@@ -64,7 +64,7 @@ def exercise_line(exercise: ExerciseReport) -> str:
 
 
 def warnings(report: Report) -> list[str]:
-    """Return what must be read with the score: that the report is partial or not final, or had no walls."""
+    """Return warnings that belong to the score: the report is partial or not final, or there was no sandbox."""
     said = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
@@ -74,7 +74,7 @@ def warnings(report: Report) -> list[str]:
 
 
 def summary(report: Report) -> str:
-    """Return how many criteria came to which outcome."""
+    """Return how many criteria have each outcome."""
     verdicts = [verdict for exercise in report.exercises for verdict in exercise.verdicts]
     counts = Counter(verdict.outcome for verdict in verdicts)
     parts = [f"{counts[outcome]} {word}" for outcome, word in OUTCOME_WORDS.items() if counts[outcome]]
@@ -83,12 +83,12 @@ def summary(report: Report) -> str:
 
 
 def reason(verdict: Verdict) -> str:
-    """Return a verdict's reason; of a blocked one only what it needs. Not yet safe to show."""
+    """Return a verdict's reason; for a blocked criterion, only what it needs. Not yet safe to show."""
     return verdict.reason.removeprefix(NOT_JUDGED) if verdict.outcome is Outcome.BLOCKED else verdict.reason
 
 
 def explanation(verdict: Verdict) -> list[str]:
-    """Return why a verdict is what it is, what to do and where; each safe to show as a line of text."""
+    """Return the reason, the hint and the place of a verdict; each safe to show as a line of text."""
     said = [shown(reason(verdict))]
     if verdict.hint:
         said.append(f"hint: {shown(verdict.hint)}")
@@ -99,7 +99,7 @@ def explanation(verdict: Verdict) -> list[str]:
 
 
 def opening(report: Report) -> list[str]:
-    """Return what a reader must know before the criteria; each safe to show as a line of text."""
+    """Return the lines before the criteria; each safe to show as a line of text."""
     blocked = any(v.outcome is Outcome.BLOCKED for e in report.exercises for v in e.verdicts)
     return [
         headline(report),
@@ -111,7 +111,7 @@ def opening(report: Report) -> list[str]:
 
 
 def remarks(exercise: ExerciseReport) -> list[str]:
-    """Return what an exercise's criteria do not say: faults, clock and notes; each safe to show as a line of text."""
+    """Return faults, clock and notes of an exercise; each safe to show as a line of text."""
     faults = [f"fault: {happened(fault)}: {shown(fault.text)}" for fault in exercise.faults]
     notes = [f"note: {shown(note)}" for note in exercise.notes]
     clock_note = f"note: judged on the wall clock: {shown(exercise.clock_reason)}"
@@ -123,7 +123,7 @@ def remarks(exercise: ExerciseReport) -> list[str]:
 
 
 def ending(report: Report) -> list[str]:
-    """Return what gives the report again, the command last; each safe to show as a line of text."""
+    """Return the lines that help to reproduce the report, the command last; each safe to show as a line of text."""
     rows = [f"{name}: {value}" for name, value in reproduction(report)]
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
 
@@ -134,12 +134,12 @@ def _capped(lines: list[str], most: int, what: str) -> list[str]:
 
 
 def place(file: str, line: int) -> str:
-    """Return a place as people click on it; safe to show as a line of text."""
+    """Return a place in the form that terminals make clickable; safe to show as a line of text."""
     return f"{shown(file)}:{line}" if line else shown(file)
 
 
 def happened(fault: ReportedFault) -> str:
-    """Return what happened where and when, without the fault's own words; safe to show as a line of text."""
+    """Return kind, place and time of a fault, without its text; safe to show as a line of text."""
     what = _WHAT_HAPPENED.get(fault.kind, shown(fault.kind))
     when = f" at t = {seconds(fault.t_ns):.3f} s" if fault.t_ns else ""
     where = place(fault.file, fault.line) or "the node"
@@ -156,7 +156,7 @@ def frames(all_frames: Sequence[str]) -> list[str]:
 
 
 def versions(report: Report) -> str:
-    """Return what the report was made with."""
+    """Return the versions that made the report."""
     made_with = report.environment
     return (
         f"grader {made_with.grader}, rclpy {made_with.rclpy} ({made_with.ros_distro}), "
@@ -174,17 +174,17 @@ def clock(report: Report) -> str:
 
 
 def isolation(report: Report) -> str:
-    """Return what held the student's code back; loud if nothing did."""
+    """Return how the student's code was isolated, in capitals if it was not."""
     return summarised(report.environment.isolation, report.environment.containment)
 
 
-def without_walls(report: Report) -> bool:
+def ran_without_sandbox(report: Report) -> bool:
     """Return whether the student's code ran without a sandbox."""
     return report.environment.isolation == NO_WALLS
 
 
 def run_line(report: Report) -> str:
-    """Return what belongs to this run alone, so that nothing else in a report differs between two runs."""
+    """Return the path and the duration: the only line that differs between two runs."""
     return f"graded {shown(report.path)} in {report.duration_s:.1f} s"
 
 
@@ -195,7 +195,7 @@ def starts(report: Report) -> list[str]:
 
 
 def reproduction(report: Report) -> list[tuple[str, str]]:
-    """Return name and value of all that gives the report again, except the command; safe to show as lines of text."""
+    """Return names and values that reproduce the report, except the command; safe to show as lines of text."""
     rows = [("versions", versions(report)), ("isolation", isolation(report))]
     rows[:0] = [] if report.seed is None else [("seed", str(report.seed))]
     rows.append(("clock", clock(report)))
@@ -207,9 +207,9 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
 
 
 def command(report: Report) -> list[str]:
-    """Return the command that gives the report again, quoted for a shell and safe to show as text.
+    """Return the command that reproduces the report, quoted for a shell and safe to show as text.
 
-    Its pieces are to be joined by spaces; an option and its value are one piece.
+    Join the pieces with spaces; an option and its value are one piece.
     """
     pieces: list[str] = []
     for word in report.reproduce.command:
@@ -222,7 +222,7 @@ def command(report: Report) -> list[str]:
 
 
 def _short(digest: str) -> str:
-    """Return as much of a digest as tells files apart; all of it is in the JSON report."""
+    """Return the part of a digest that tells files apart; the JSON report has all of it."""
     return digest[:_DIGEST_LENGTH]
 
 
@@ -242,3 +242,46 @@ def _not_final(undecided: Sequence[Verdict]) -> str:
         f"This score is not final: {criteria} undecided through no fault of the student, "
         f"{open_points} points are still open. Grade again."
     )
+
+
+def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> list[tuple[int, int]]:
+    """Return whole-number score and maximum of each row, by the largest remainder method.
+
+    The totals are the exact ones rounded half up, and the rows add up to them. No row earns more than its maximum, and
+    only a score without any loss becomes the full one.
+    """
+    tops = largest_remainder(max_scores, _rounded(sum(max_scores, Fraction(0))), [floor(m) + 1 for m in max_scores])
+    exact = sum(scores, Fraction(0))
+    total = min(_rounded(exact), sum(tops))
+    if exact < sum(max_scores):
+        total = min(total, max(sum(tops) - 1, 0))
+    earned = largest_remainder(scores, total, tops)
+    return list(zip(earned, tops, strict=True))
+
+
+def largest_remainder(shares: Sequence[Fraction], total: int, most: Sequence[int]) -> list[int]:
+    """Return whole numbers close to `shares` that add up to `total`.
+
+    Each share is rounded down, and the missing points go to the largest remainders, the first of equal ones first. If
+    the rounded shares exceed the total, the smallest remainders lose points.
+
+    Args:
+        shares: Exact values, at least 0.
+        total: At most the sum of `most`.
+        most: Maximum of each row.
+    """
+    found = [min(floor(share), top) for share, top in zip(shares, most, strict=True)]
+    by_remainder = sorted(range(len(found)), key=lambda row: (found[row] - shares[row], row))
+    while sum(found) < total:
+        row = next(row for row in by_remainder if found[row] < most[row])
+        found[row] += 1
+        by_remainder.remove(row)
+        by_remainder.append(row)
+    for row in reversed(by_remainder):
+        if sum(found) > total and found[row] > 0:
+            found[row] -= 1
+    return found
+
+
+def _rounded(value: Fraction) -> int:
+    return floor(value + Fraction(1, 2))

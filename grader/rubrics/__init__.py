@@ -1,1 +1,1 @@
-"""Turns rubric files, which authors write, into values of the core."""
+"""Reads rubric files as values of `grader.core`."""

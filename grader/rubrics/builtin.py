@@ -1,4 +1,4 @@
-"""The files that come with the grader, and the rubrics among them."""
+"""Files that ship with the grader: rubrics, templates and integrations."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from grader.submissions.collected import shown
 
 
 def shipped(name: str) -> Path:
-    """Return a folder that comes with the grader: `rubrics`, `student_template` or `integrations`."""
+    """Return a shipped folder: `rubrics`, `student_template` or `integrations`."""
     package = Path(__file__).resolve().parent.parent
     inside = package / "shipped" / name
     return inside if inside.is_dir() else package.parent / name
 
 
 def shipped_folder() -> Path:
-    """Return the folder of the built-in rubrics and of the recording."""
+    """Return the folder of the built-in rubrics and of the /odom recording."""
     return shipped("rubrics")
 
 
 def shipped_templates() -> Path:
-    """Return the folder of the templates that students begin with."""
+    """Return the folder of the templates for students."""
     return shipped("student_template")
 
 
@@ -39,7 +39,7 @@ def builtin_odometry() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What a rubric that comes with the grader says of its exercise before its scenarios; see Exercise."""
+    """The header of a built-in rubric, without its scenarios; see Exercise."""
 
     path: Path
     id: str
@@ -48,7 +48,7 @@ class Header:
 
 
 def builtin_rubrics() -> Mapping[str, Path]:
-    """Return the rubrics that come with the grader: exercise id to YAML file, in the order of exercise numbers.
+    """Return the built-in rubrics: exercise id -> YAML file, in the order of exercise numbers.
 
     Raises:
         RubricError: The rubrics are missing from this installation.
@@ -57,7 +57,7 @@ def builtin_rubrics() -> Mapping[str, Path]:
 
 
 def builtin_headers() -> tuple[Header, ...]:
-    """Return the headers of the rubrics that come with the grader, in the order of exercise numbers.
+    """Return the headers of the built-in rubrics, in the order of exercise numbers.
 
     Raises:
         RubricError: The rubrics are missing from this installation.
@@ -70,7 +70,7 @@ def builtin_headers() -> tuple[Header, ...]:
 
 
 def _header(path: Path) -> Header:
-    """Read the beginning of a file of ours, whose scenarios need not be looked at to know what it is about."""
+    """Read the header of a built-in rubric, without validating the rest."""
     above, _, _ = path.read_text(encoding="utf-8").partition("\nscenarios:")
     tree: Any = read_yaml(above).data
     said = tree["exercise"]
@@ -78,12 +78,12 @@ def _header(path: Path) -> Header:
 
 
 def _number_order(number: str) -> list[tuple[int, str]]:
-    """Return a sort key under which 2 comes before 10 and numbers before words."""
+    """Return a sort key that puts 2 before 10 and numbers before words."""
     return [(int(part), "") if part.isdigit() else (1 << 62, part) for part in re.findall(r"[0-9]+|[^0-9]+", number)]
 
 
 def require_exercises(wanted: Sequence[str], known: Sequence[str]) -> None:
-    """Raise RubricError for the first exercise asked for that no rubric has, with the name that was meant."""
+    """Raise RubricError for the first unknown exercise, with the most similar known name."""
     for exercise in wanted:
         if exercise not in known:
             nearest = difflib.get_close_matches(exercise, known, n=1, cutoff=0.3)

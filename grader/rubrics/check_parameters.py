@@ -1,10 +1,13 @@
-"""Dataclasses read by their annotations: pydantic models of the parameters of checks, of stimuli and of limits."""
+"""Reads checks and stimuli as dataclasses: pydantic models from their annotations, manuals from their docstrings."""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 import types
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -46,10 +49,10 @@ from grader.rubrics.units import format_quantity
 
 T = TypeVar("T")
 
-#: Dynamic fields carry a prefix, so that a check may call a parameter `copy` or `json` without hiding pydantic's own.
+#: Prefix of dynamic fields, so that a check may have a parameter `copy` or `json` without hiding pydantic's own.
 _PREFIX = "p_"
 
-#: What a parameter of a certain name has to look like, beyond being text.
+#: Required form of parameters by their name, beyond being text.
 _BY_NAME: Mapping[str, Any] = {
     **dict.fromkeys(
         ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
@@ -88,6 +91,9 @@ _BY_KIND: Mapping[str, Any] = {
 
 _ALIKE: Mapping[str, str] = {}
 
+_PARAMETER = re.compile(r"^ {4}(?P<name>\w+): (?P<meaning>.*)$")
+_HEADING = "Attributes:"
+
 
 class _Parameters(Shape):
     """The fields of a frozen dataclass."""
@@ -95,10 +101,10 @@ class _Parameters(Shape):
     made: ClassVar[type]
 
     def built(self) -> Any:
-        """Return the dataclass that the mapping describes; what the rubric leaves out keeps its default.
+        """Return the dataclass that the mapping describes; omitted fields keep their defaults.
 
         Raises:
-            ValueError: The dataclass itself refuses the values.
+            ValueError: The dataclass itself rejects the values.
         """
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
         return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
@@ -108,7 +114,7 @@ class _Parameters(Shape):
 
 
 def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Choice]:
-    """Return the model of a mapping whose one key names a dataclass or a shape, and whose value is described by it."""
+    """Return the model of a mapping with one key, which selects the dataclass or shape of its value."""
     shapes: dict[str, Any] = {k: cls if issubclass(cls, Shape) else _parameters(cls) for k, cls in options.items()}
     fields: dict[str, Any] = {f"{_PREFIX}{key}": (shapes[key], Field(default=None, alias=key)) for key in options}
     return create_model(name, __base__=Choice, __doc__=summary, **fields)
@@ -116,7 +122,7 @@ def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Ch
 
 @lru_cache(maxsize=256)
 def _parameters(cls: Any) -> type[Shape]:
-    """Return the model of a check: a rubric calls the fields of the dataclass what they are called in Python."""
+    """Return the model of a check; its fields have the same names in rubrics as in Python."""
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
@@ -127,14 +133,14 @@ def _parameters(cls: Any) -> type[Shape]:
 
 
 def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usual: Any) -> type[Shape]:
-    """Return the model of a dataclass that is part of a scenario: a rubric leaves out the units in names of fields.
+    """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
     Args:
         cls: The dataclass.
-        name: What the model is called in the JSON Schema.
-        aliases: What a rubric calls a field, where it is not that.
-        usual: What the JSON Schema says of a field that a rubric leaves out, where it is not what the dataclass says;
-            a field that the dataclass requires has this value.
+        name: Name of the model in the JSON Schema.
+        aliases: Rubric names of fields, where they differ.
+        usual: Defaults shown in the JSON Schema, where they differ from those of the dataclass; a required field gets
+            this default.
     """
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
@@ -160,7 +166,7 @@ def _is_required(field: dataclasses.Field[Any]) -> bool:
 
 
 def _accepted(annotation: object, name: str = "") -> object:
-    """Return what a rubric may hold for a dataclass field: the field's annotation, made strict and given units."""
+    """Return the type that a rubric may hold for a dataclass field: its annotation, made strict and given units."""
     if annotation is str:
         return _BY_NAME.get(name, Text)
     for known, accepted in _BY_ANNOTATION:
@@ -191,7 +197,7 @@ def _accepted_generic(annotation: object, name: str) -> object:
 
 
 def _mark(annotation: object, kind: type[T]) -> T | None:
-    """Return the mark of a kind that an annotation carries."""
+    """Return the mark of the given type in an annotation."""
     return next((mark for mark in getattr(annotation, "__metadata__", ()) if isinstance(mark, kind)), None)
 
 
@@ -200,3 +206,43 @@ def _at_least(least: int, unit: Unit | None, value: int) -> int:
         words = format_quantity(least, unit) if unit else f"{least}"
         raise wrong(f"at least {words}, which a node that does nothing needs")
     return value
+
+
+@dataclass(frozen=True, slots=True)
+class Manual:
+    """The parts of a docstring.
+
+    Attributes:
+        summary: The first paragraph, on one line.
+        details: The other paragraphs before the attributes, one per line.
+        parameters: Attribute -> its meaning, on one line.
+    """
+
+    summary: str
+    details: str
+    parameters: Mapping[str, str]
+
+
+def manual_of(kind: type) -> Manual:
+    """Return the manual of a class; empty if it has no docstring."""
+    written = kind.__doc__ or ""
+    # Without a docstring, a dataclass gets its signature as one.
+    known = "" if written.startswith(f"{kind.__name__}(") else written
+    text, _, attributes = inspect.cleandoc(known).partition(_HEADING)
+    paragraphs = [" ".join(p.split()) for p in text.split("\n\n") if p.strip()]
+    return Manual(paragraphs[0] if paragraphs else "", "\n".join(paragraphs[1:]), _parameter_meanings(attributes))
+
+
+def _parameter_meanings(text: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    name = ""
+    for line in text.split("\n"):
+        start = _PARAMETER.match(line)
+        if start is not None:
+            name = start["name"]
+            found[name] = start["meaning"].strip()
+        elif name and line.startswith(" " * 8):
+            found[name] += f" {line.strip()}"
+        elif line.strip():
+            name = ""
+    return found

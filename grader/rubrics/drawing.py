@@ -1,4 +1,4 @@
-"""What a rubric leaves to the seed: fields, times, counts, and the order of cases."""
+"""The parts of a rubric that are drawn from the seed: fields, times, counts, and the order of cases."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing_extensions import Self, TypeAliasType
 from grader.core.scenario import AnyOrder, Between, Choose, CountBetween, InOrder, SomeOf, TimeBetween, Written
 from grader.rubrics.types import Duration, LongDuration, MatchingText, Real, Shape, Text, Whole, YesNo, build, wrong
 
-#: Most decimals that a text shows of a drawn number.
+#: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9
 
 
 def rising(low_high: tuple[float, float]) -> tuple[float, float]:
-    """Refuse two numbers that leave nothing to draw."""
+    """Reject a range that leaves nothing to draw."""
     if not low_high[0] < low_high[1]:
         raise wrong("two numbers, the lower one first")
     return low_high
@@ -58,7 +58,7 @@ class DrawnFieldShape(Shape):
         return self
 
     def built(self) -> Between | Choose | Written:
-        """Return what is drawn."""
+        """Return the draw as a scenario holds it."""
         if self.choose is not None:
             return Choose(self.choose)
         between = Between(*(self.between or (0.0, 1.0)))
@@ -66,7 +66,7 @@ class DrawnFieldShape(Shape):
 
 
 def _kind(value: object) -> str:
-    """Return the tag of what was written; tags are no names of fields, so that places stay right."""
+    """Return the tag of a value; tags are not names of fields, so that error places stay right."""
     if isinstance(value, Mapping):
         return "<drawn>" if value.keys() & {"between", "choose"} else "<parts>"
     kinds = {list: "<list>", tuple: "<list>", str: "<text>", bool: "<bool>", int: "<whole>"}
@@ -74,7 +74,7 @@ def _kind(value: object) -> str:
 
 
 if TYPE_CHECKING:
-    FieldValue = Any  # an alias that holds itself is beyond the type checker; pydantic reads the one below
+    FieldValue = Any  # the type checker does not support recursive aliases; pydantic reads the one below
 else:
     FieldValue = TypeAliasType(
         "FieldValue",
@@ -92,7 +92,7 @@ else:
 Fields = dict[FieldName, FieldValue]
 
 
-#: Most cases of one list, and most times that one of them comes.
+#: Maximum number of cases in a list, and of repetitions of one case.
 CASES = 1_000
 
 
@@ -141,7 +141,7 @@ class DrawnCountShape(Shape):
 
 
 def drawn_or_not(value: object) -> str:
-    """Return the tag of what was written; tags are no names of fields, so that places stay right."""
+    """Return the tag of a value; tags are not names of fields, so that error places stay right."""
     return "<drawn>" if isinstance(value, Mapping) else "<fixed>"
 
 
@@ -193,13 +193,13 @@ _LISTS = ("any_order", "in_order", "some_of")
 
 
 def _kind_of_case(value: object) -> str:
-    """Return the tag of one entry in a list of cases."""
+    """Return the tag of an entry in a list of cases."""
     found = [name for name in _LISTS if isinstance(value, Mapping) and name in value]
     return f"<{found[0]}>" if found else "<case>"
 
 
 def _spelt(value: object) -> object:
-    """Refuse a word about order that is misspelt: what it stands for would be taken for a case."""
+    """Reject a misspelt order keyword: its content would be read as a case."""
     for key in value if isinstance(value, Mapping) else ():
         near = [] if key in _LISTS else difflib.get_close_matches(str(key), _LISTS, n=1, cutoff=0.85)
         if near:
@@ -208,11 +208,11 @@ def _spelt(value: object) -> object:
 
 
 def cases_model(case: Any, name: str) -> Any:
-    """Return what an entry in a list of cases may be: a case, or several with a word about their order.
+    """Return the model of an entry in a list of cases: one case, or several with an order keyword.
 
     Args:
-        case: What one case may be.
-        name: What the shapes are called in the JSON Schema.
+        case: Model of one case.
+        name: Name of the shapes in the JSON Schema.
     """
     listed = (list_of(case), Field(min_length=1))
     in_order = create_model(f"{name}InOrder", __base__=InOrderShape, __doc__=InOrderShape.__doc__, in_order=listed)

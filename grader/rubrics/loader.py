@@ -28,9 +28,8 @@ from grader.core.scenario import (
     shortest,
 )
 from grader.judging.checks import CHECKS
-from grader.rubrics.feedback import feedback_of
 from grader.rubrics.mistakes import mistakes_of, nearest
-from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, rubric_model
+from grader.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
 from grader.rubrics.own_checks import OwnFile, digest_of, load, named_files, own_files
 from grader.rubrics.types import CHECK_FILE, build
 from grader.rubrics.variants import (
@@ -49,11 +48,11 @@ from grader.submissions.collected import listed, shown
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
-    """Return the mistakes of a rubric whose every part is well formed by itself.
+    """Return the mistakes between the parts of a rubric, each of which is well formed by itself.
 
     Args:
         rubric: The rubric.
-        tree: The document it came from, for places.
+        tree: The document it was read from, for places.
     """
     scenario_ids = [scenario.id for scenario in rubric.scenarios]
     criterion_ids = [criterion.id for criterion in rubric.criteria]
@@ -120,7 +119,7 @@ def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlT
 
 
 def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield the mistake that some draw leaves out a case, because the observation ends before it."""
+    """Yield a mistake if, for some draw, a case is lost because the observation ends before it."""
     time, needed_ns = observed.duration_ns, longest_course_ns(stimulus)
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
@@ -142,7 +141,7 @@ def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tr
 
 
 def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
-    """Yield the needs that name no earlier criterion; so there are no cycles."""
+    """Yield the needs that name no earlier criterion; this rule prevents cycles."""
     path: TreePath = ("criteria", index, "needs")
     earlier = [other.id for other in rubric.criteria[:index]]
     yield from _repeated(criterion.needs, path, tree)
@@ -160,13 +159,13 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
-#: Largest rubric file.
+#: Largest rubric file, in bytes.
 MAX_BYTES = 256 * 1024
 
-#: How the names of files end that lie beside rubrics and are none: notes on their self-tests.
+#: Suffixes of files beside rubrics that are not rubrics: notes on their self-tests.
 NOTES = ".selftest.yaml"
 
-#: Mistakes listed at once.
+#: Maximum number of mistakes listed at once.
 MAX_MISTAKES = 10
 
 
@@ -174,8 +173,8 @@ class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
     """A rubric has mistakes.
 
     Args:
-        where: The file, as messages show it.
-        mistakes: All of them; the message lists the first ones.
+        where: The file's name in messages.
+        mistakes: All mistakes; the message lists the first ones.
     """
 
     def __init__(self, where: str, mistakes: Iterable[Mistake]) -> None:
@@ -196,13 +195,13 @@ def read_rubric(
     submissions: Sequence[Path] = (),
     draw: Draw | None = None,
 ) -> Exercise:
-    """Read one rubric file; where it names checks of its own, their files are run.
+    """Read a rubric file; its own checks, if any, are run.
 
     Args:
         path: The file; messages show it as given.
-        checks: The table of checks that the rubric may use, besides its own.
-        submissions: What students write: no check is taken from there.
-        draw: Says what variants come to; without it, a rubric that has some is refused.
+        checks: Checks that the rubric may use, besides its own.
+        submissions: Folders that students write to: checks are never loaded from there.
+        draw: Chooses the values of variants; without it, a rubric with variants is rejected.
 
     Returns:
         The exercise.
@@ -230,7 +229,7 @@ def read_rubric(
 def _variant(
     path: Path, tree: YamlTree, exercise: Exercise, options: Sequence[VariantOptions], draw: Draw | None
 ) -> Variant:
-    """Return the values that were drawn; raises RubricError where nobody is named, or a value is not known."""
+    """Return the drawn values; raises RubricError if no student is given, or a value is not known."""
     if draw is None:
         hint = "name the student and the course key: --student ID --variant-key FILE"
         text = "expected a student, because this rubric has variants, found none"
@@ -264,12 +263,12 @@ def _exercise(path: Path, tree: YamlTree, checks: Mapping[str, type], digest: st
 
 
 def own_check_files(path: Path) -> tuple[OwnFile, ...]:
-    """Return the files of checks that a rubric names, without running them; raises RubricError as reading it does."""
+    """Return the check files that a rubric names, without running them; raises RubricError like `read_rubric`."""
     return own_files(path, _own_names(path, _tree(path, _content(path))))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
-    """Return the checks of a rubric's own by name, whether it uses them or not; raises RubricError as above."""
+    """Return a rubric's own checks by name, used or not; raises RubricError like `read_rubric`."""
     return load(own_check_files(path), CHECKS)
 
 
@@ -283,7 +282,7 @@ def _tree(path: Path, content: bytes) -> YamlTree:
 
 
 def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
-    """Return the files of checks that are named; raises RubricError for a name that leads elsewhere."""
+    """Return the named check files; raises RubricError for a name that leads elsewhere."""
     names = named_files(tree.data)
     wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
     if wrong:
@@ -321,7 +320,7 @@ def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
 
 
 def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
-    """Raise the error that lists mistakes, one a line; with several, each hint says which it belongs to."""
+    """Raise an error that lists mistakes, one per line; with several, each hint names the one it belongs to."""
     raise RubricMistakes(shown(str(path), 500), mistakes)
 
 
@@ -337,7 +336,7 @@ def _validated(path: Path, tree: YamlTree, model: type[_Model]) -> _Model:
 
 
 def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> Iterator[Criterion]:
-    """Yield the criteria; one whose check refuses its parameters becomes a mistake."""
+    """Yield the criteria; if a check rejects its parameters, this becomes a mistake."""
     for index, shape in enumerate(rubric.criteria):
         name, parameters = shape.check.chosen
         try:

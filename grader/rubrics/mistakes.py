@@ -1,4 +1,4 @@
-"""What pydantic found wrong in a rubric, in the words and with the places that its author needs."""
+"""Translates pydantic's validation errors into mistakes, in the words and with the places of a rubric."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, nearest_position
 from grader.submissions.collected import listed, shown
 
-#: pydantic's kind of error -> what should stand there.
+#: pydantic's kind of error -> what was expected.
 _EXPECTED: Mapping[str, str] = {
     "string_type": "text",
     "int_type": "a whole number",
@@ -33,14 +33,14 @@ _NO_VALUE = object()
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a hint that names the known word nearest to one that is unknown; empty if none is near."""
+    """Return a hint with the known word nearest to an unknown one; empty if none is near."""
     by_folded = {name.casefold(): name for name in known}
     near = difflib.get_close_matches(word.casefold(), list(by_folded), n=1, cutoff=0.6)
     return f"did you mean `{by_folded[near[0]]}`?" if near else ""
 
 
 def found(value: object) -> str:
-    """Return a value of a YAML file as a message shows it."""
+    """Return a value of a YAML file in the form that messages show."""
     if value is None or value in ("", [], {}):
         return "nothing"
     if isinstance(value, dict):
@@ -53,11 +53,11 @@ def found(value: object) -> str:
 
 
 def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) -> list[Mistake]:
-    """Return every error of a validation as a mistake with its place.
+    """Return every validation error as a mistake with its place.
 
     Args:
-        error: What pydantic raised.
-        tree: The document that was validated.
+        error: The error of pydantic.
+        tree: The validated document.
         model: The model that it was validated with.
     """
     errors = error.errors(include_url=False)
@@ -65,7 +65,7 @@ def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) 
 
 
 def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:
-    """Return whether an error goes away with another: a misspelt key, a list cut short."""
+    """Return whether an error follows from another one: a misspelt key, a list cut short."""
     *parent, name = one["loc"] or ("",)
     if one["type"] == "missing":
         unknown = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden" and [*e["loc"][:-1]] == parent]
@@ -122,7 +122,7 @@ def _shape_in(annotation: object) -> type[BaseModel] | None:
 
 
 def _first(annotation: Any, wanted: Callable[[Any], bool]) -> Any:
-    """Return the first part of an annotation that is wanted, outside in."""
+    """Return the first matching part of an annotation, searching from the outside in."""
     if wanted(annotation):
         return annotation
     annotation = getattr(annotation, "__value__", annotation)  # an alias of a type

@@ -1,4 +1,4 @@
-"""Checks of a rubric's own: Python files that lie beside a rubric, are named in it, and are run by whoever judges."""
+"""Loads a rubric's own checks: Python files beside a rubric, which names them; they run in the judging process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from grader.core.errors import RubricError
 from grader.rubrics.check_parameters import choice_model
 from grader.submissions.collected import shown
 
-#: Largest file of checks.
+#: Largest file of checks, in bytes.
 MAX_BYTES = 256 * 1024
 #: Name of the table in such a file.
 TABLE = "CHECKS"
@@ -30,11 +30,11 @@ _ALONE = "a file of checks may import the standard library, grader and what is i
 
 @dataclass(frozen=True, slots=True)
 class OwnFile:
-    """A file of checks as a rubric names it.
+    """A check file that a rubric names.
 
     Attributes:
         name: As written in the rubric: relative to the rubric, with `/`.
-        path: Where it lies.
+        path: Its path.
         content: Its bytes.
     """
 
@@ -44,34 +44,34 @@ class OwnFile:
 
 
 def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
-    """Return the files of checks that a rubric names, without running them.
+    """Return the check files that a rubric names, without running them.
 
     Args:
-        rubric: The rubric; files lie in its folder or below.
-        names: As written in it.
-        never_in: Folders that students write to: what lies there is never run as a check.
+        rubric: The rubric; the files must be in its folder or below.
+        names: As written in the rubric.
+        never_in: Folders that students write to: files there are never run as checks.
 
     Raises:
-        RubricError: One is missing, too large, leads out of the rubric's folder or lies where students write.
+        RubricError: A file is missing, too large, outside the rubric's folder, or where students write.
     """
     return tuple(_own_file(rubric, name, never_in) for name in dict.fromkeys(names))
 
 
 def named_files(data: object) -> tuple[str, ...]:
-    """Return the names of files of checks in a rubric's data; what is no name is told by the rubric's shape."""
+    """Return the check files named in a rubric's data; the rubric's shape reports anything else."""
     names = data.get("checks") if isinstance(data, Mapping) else None
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
 
 def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]:
-    """Run files of checks, and return the checks in them by name.
+    """Run check files, and return their checks by name.
 
     Args:
-        files: What the rubric names.
-        known: Checks whose names are taken.
+        files: The check files of a rubric.
+        known: Checks whose names are already used.
 
     Raises:
-        RubricError: A file cannot be imported or holds something that is no check; one line for each such thing.
+        RubricError: A file cannot be imported, or its table holds something that is not a check; one line for each.
     """
     found: dict[str, type] = {}
     for file in files:
@@ -84,7 +84,7 @@ def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]
 
 
 def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
-    """Return `sha256:` over a rubric and its files of checks; without such files it is the rubric's own."""
+    """Return the `sha256:` digest of a rubric and its check files; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
     for file in files:
         digest.update(f"\0{file.name}\0{len(file.content)}\0".encode() + file.content)
@@ -118,7 +118,7 @@ def _table(file: OwnFile) -> dict[str, Any]:
     where = shown(str(file.path), 500)
     try:
         module = _module(str(file.path.resolve()), file.content)
-    except (Exception, SystemExit) as error:  # whatever the author's file raises is the author's to mend
+    except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
         text = f"{where}:{_line_of(error, file)}: expected a file that can be imported, found "
         text += f"{type(error).__name__}: {shown(_words(error), 200)}"
         raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
@@ -143,7 +143,7 @@ def _line_of(error: BaseException, file: OwnFile) -> int:
 
 
 def _module(path: str, content: bytes) -> ModuleType:
-    """Return the module that a file makes; the same file with the same content is run once in a process."""
+    """Return the module of a file; the same file with the same content runs once per process."""
     digest = hashlib.sha256(path.encode("utf-8", "surrogateescape") + b"\0" + content).hexdigest()
     name = f"_own_checks_{digest[:24]}"
     if name in sys.modules:
@@ -152,7 +152,7 @@ def _module(path: str, content: bytes) -> ModuleType:
     module.__file__ = path
     vars(module)["__content__"] = content
     code = compile(content, path, "exec", dont_inherit=True)
-    sys.modules[name] = module  # dataclasses look for their module while they are made
+    sys.modules[name] = module  # dataclasses look up their module while they are created
     try:
         exec(code, vars(module))  # noqa: S102  the instructor chose this file, and it lies where no student writes
     except BaseException:
@@ -165,7 +165,7 @@ def _module(path: str, content: bytes) -> ModuleType:
 
 
 def _reduced(value: Any) -> tuple[Any, ...]:
-    """Return how a value of an own class is made again in another process, which has to run its file first."""
+    """Return how another process recreates a value of such a class; it has to run the file first."""
     module = sys.modules[type(value).__module__]
     given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
     return _remade, (module.__file__, vars(module)["__content__"], type(value).__qualname__, given)
@@ -176,7 +176,7 @@ def _remade(path: str, content: bytes, name: str, given: Mapping[str, Any]) -> A
 
 
 def _problems(file: OwnFile, table: Mapping[Any, Any], taken: Mapping[str, type]) -> Iterator[str]:
-    """Yield what keeps the entries of a table from being checks, each with its place."""
+    """Yield what prevents the entries of a table from being checks, each with its place."""
     where = shown(str(file.path), 500)
     lines = _lines(file.content)
     for name, kind in table.items():
@@ -195,19 +195,19 @@ def _class_name(kind: object) -> str:
 
 
 def _no_check(kind: object) -> str:
-    """Return why something is no check; empty if it is one."""
+    """Return why something is not a check; empty if it is one."""
     if not isinstance(kind, type) or not dataclasses.is_dataclass(kind):
         return "expected a frozen dataclass, found something else"
     if not vars(kind)["__dataclass_params__"].frozen:
         return "expected a frozen dataclass, found one that can change: write @dataclass(frozen=True)"
     judge: Any = getattr(kind, "judge", None)
     try:
-        inspect.signature(judge).bind(None, None)  # what cannot be called raises TypeError
+        inspect.signature(judge).bind(None, None)  # raises TypeError if it cannot be called
     except (TypeError, ValueError):
         return "expected a method judge(self, trace), found none that takes a trace"
     try:
         choice_model("Check", "", {"own": kind})
-    except Exception as error:  # an annotation may be anything, and may name what is not there
+    except Exception as error:  # an annotation may be anything, and may name something undefined
         return f"expected parameters that a rubric can hold, found {type(error).__name__}: {shown(str(error), 200)}"
     return ""
 

@@ -1,6 +1,6 @@
-"""The JSON Schema of rubric files, which lets editors complete and check them.
+"""The JSON Schema of rubric files, which editors use to complete and check them.
 
-`python -m grader.rubrics.schema` prints it as it is shipped.
+`python -m grader.rubrics.schema` prints the shipped schema.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of rubric files.
 
     Args:
-        checks: The table of checks that rubrics may use.
+        checks: Checks that rubrics may use.
     """
     schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
@@ -42,12 +42,12 @@ def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
 
 
 def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
-    """Return the schema as text; that of the grader's own checks is shipped."""
+    """Return the schema as text; that of the built-in checks is shipped."""
     return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
 
 
 def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
-    """Return the definition of a mapping in which variants may stand for values."""
+    """Return the definition of a mapping whose values may be variants."""
     if name in _FIXED:
         return node
     if "properties" not in node:
@@ -58,18 +58,18 @@ def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
 
 
 def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
-    """Return a schema of values, each of which may be a variant instead."""
+    """Return a schema of values that also accepts a variant."""
     for word in ("anyOf", "oneOf"):
         if word in node:
             rest = {key: value for key, value in node.items() if key != word}
             options = [_inside(option) for option in node[word]]
-            # One mapping may look like several things: the fields of a message, something drawn, a variant.
+            # One mapping may match several: the fields of a message, something drawn, a variant.
             return {**rest, "anyOf": [*options, _REFERS] if any(map(_is_scalar, node[word])) else options}
     return {"anyOf": [node, _REFERS]} if _is_scalar(node) else _inside(node)
 
 
 def _inside(node: dict[str, Any]) -> dict[str, Any]:
-    """Return a schema of a list or a mapping whose values may be variants."""
+    """Return a schema of a list or mapping whose values may be variants."""
     found = dict(node)
     for word in ("items", "additionalProperties"):
         if isinstance(node.get(word), dict):
@@ -88,11 +88,11 @@ def _is_scalar(node: dict[str, Any]) -> bool:
 
 
 def _tidy(node: Any, *, names: bool = False) -> Any:
-    """Drop what speaks of Python only: generated titles, and defaults that a rubric could not write.
+    """Remove details of Python: generated titles, and defaults that a rubric could not write.
 
     Args:
         node: Part of a schema.
-        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not words of the schema.
+        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not schema keywords.
     """
     if isinstance(node, list):
         return [_tidy(item) for item in node]
@@ -103,10 +103,10 @@ def _tidy(node: Any, *, names: bool = False) -> Any:
 
 
 def _misleads(key: str, value: object, node: dict[str, Any]) -> bool:
-    """Return whether a word of the schema speaks of Python instead of what a rubric holds."""
+    """Return whether a schema entry describes Python instead of the rubric."""
     if key == "title":
         return isinstance(value, str)
-    # A default of nanoseconds is no text with a unit.
+    # A default in nanoseconds is not a text with a unit.
     return key == "default" and (value is None or (node.get("type") == "string" and not isinstance(value, str)))
 
 

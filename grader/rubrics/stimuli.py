@@ -1,4 +1,4 @@
-"""What the stimuli of a rubric file hold, and those stimuli that a scenario holds as calls of a service."""
+"""Shapes of the stimuli in a rubric file, including those that a scenario holds as service calls."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from grader.rubrics.drawing import (
 )
 from grader.rubrics.types import Choice, LongDuration, Real, Shape, Text, Topic, Whole, build, wrong
 
-#: Default of the keys of a choice that were not chosen; not a value that a rubric can write.
+#: Default of keys that were not chosen in a choice; not a value that a rubric can contain.
 ABSENT: Any = None
-#: Most clients that call at once, and most calls of each.
+#: Maximum number of concurrent clients, and of calls of each.
 CLIENTS, CALLS = 20, 1_000
 
 
@@ -34,7 +34,7 @@ class DrawnShape(Choice):
     just_below: Real = ABSENT
 
     def built(self) -> Between | JustAbove | JustBelow:
-        """Return what is drawn."""
+        """Return the draw as a scenario holds it."""
         kind, value = self.chosen
         if kind == "between":
             return Between(*value)
@@ -82,7 +82,7 @@ MessageCases: Any = Annotated[MessageCasesOrNone, Field(min_length=1)]
 
 
 class ParameterShape(Shape):
-    """A stimulus: one parameter of the student's node is set, or asked for; without a node the only one."""
+    """A stimulus: sets or reads a parameter of the student's node; without `node`, of the only one."""
 
     node: Topic | None = None
     name: Text
@@ -90,7 +90,7 @@ class ParameterShape(Shape):
     start: SomeTime = 0
 
     def built(self) -> ServiceCalls:
-        """Return the call of the service behind it."""
+        """Return the equivalent service call."""
         if self.set is None:
             return _call(self, "get_parameters", "rcl_interfaces/srv/GetParameters", {"names": (self.name,)})
         wanted: Mapping[str, FieldSpec] = {"name": self.name, "value": _parameter_value(build(self.set))}
@@ -98,27 +98,27 @@ class ParameterShape(Shape):
 
 
 class TransitionShape(Shape):
-    """A stimulus: the student's lifecycle node is asked for a transition; without a node the only one."""
+    """A stimulus: requests a transition of the student's lifecycle node; without `node`, of the only one."""
 
     node: Topic | None = None
     to: Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
     start: SomeTime = 0
 
     def built(self) -> ServiceCalls:
-        """Return the call of the service behind it."""
+        """Return the equivalent service call."""
         # without a number the label counts; the numbers of shutdown differ from state to state
         asked: Mapping[str, FieldSpec] = {"transition": {"id": 0, "label": self.to}}
         return _call(self, "change_state", "lifecycle_msgs/srv/ChangeState", asked)
 
 
 class StateShape(Shape):
-    """A stimulus: the student's lifecycle node is asked for its state; without a node the only one."""
+    """A stimulus: asks the student's lifecycle node for its state; without `node`, the only one."""
 
     node: Topic | None = None
     start: SomeTime = 0
 
     def built(self) -> ServiceCalls:
-        """Return the call of the service behind it."""
+        """Return the equivalent service call."""
         return _call(self, "get_state", "lifecycle_msgs/srv/GetState", {})
 
 
@@ -128,7 +128,7 @@ def _call(
     return ServiceCalls(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=build(shape.start))
 
 
-#: What a parameter's value is called, and its number, in rcl_interfaces/msg/ParameterValue; of a list, by its first.
+#: Name and number of each type in rcl_interfaces/msg/ParameterValue; the first element decides that of a list.
 _PARAMETER_FIELDS: tuple[tuple[type, str, int, int], ...] = (
     (bool, "bool", 1, 6),
     (int, "integer", 2, 7),

@@ -1,4 +1,4 @@
-"""The scalars of a rubric file as pydantic types: names, quantities with units, points, formulas and patterns."""
+"""Scalars of a rubric file as pydantic types: names, quantities with units, points, formulas and patterns."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from grader.submissions.collected import listed
 
 
 def wrong(expected: str, hint: str = "") -> PydanticCustomError:
-    """Return the error that says what should stand at a place in a rubric."""
+    """Return an error that states what was expected at a place in a rubric."""
     return PydanticCustomError("rubric", "{expected}", {"expected": expected, "hint": hint})
 
 
@@ -37,7 +37,7 @@ class Shape(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, loc_by_alias=True, protected_namespaces=())
 
     def built(self) -> Any:
-        """Return what the mapping stands for in an exercise."""
+        """Return the value for an exercise that the mapping stands for."""
         raise NotImplementedError
 
 
@@ -60,12 +60,12 @@ class Choice(Shape):
         return type(self).model_fields[name].alias or name, getattr(self, name)
 
     def built(self) -> Any:
-        """Return what the value of the one key stands for."""
+        """Return the value for an exercise that the chosen key stands for."""
         return build(self.chosen[1])
 
 
 def build(value: Any) -> Any:
-    """Return what a validated value stands for in an exercise, and everything inside it."""
+    """Return a validated value, and everything inside it, as values for an exercise."""
     if isinstance(value, Shape):
         return value.built()
     if isinstance(value, dict):
@@ -75,12 +75,12 @@ def build(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class MatchingText:
-    """Marks a text that has to match a pattern as a whole.
+    """Marks a text that must match a pattern as a whole.
 
     Attributes:
-        pattern: Regular expression that Python and JavaScript read alike.
-        expected: What a message says should stand there.
-        example: One that matches.
+        pattern: Regular expression with the same meaning in Python and JavaScript.
+        expected: What was expected, for messages.
+        example: A matching text.
     """
 
     pattern: str
@@ -109,7 +109,7 @@ class Quantity:
     above_zero: bool = False
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the text in place of the number's own validation."""
+        """Parse the text instead of pydantic's own validation."""
         return core_schema.no_info_plain_validator_function(self._read)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -135,7 +135,7 @@ class PointsRule:
     """Marks points: a whole, decimal or common fraction above 0, kept exactly."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the fraction in place of pydantic's own validation."""
+        """Parse the fraction instead of pydantic's own validation."""
         return core_schema.no_info_plain_validator_function(self._read)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -183,7 +183,7 @@ PythonFile = Annotated[
         r"[^/\\\x00-\x1f]+\.py", "a file name such as fan_controller.py, without folders", "fan_controller.py"
     ),
 ]
-#: Where a file of checks may lie: beside the rubric or below; never outside, never hidden.
+#: A check file must be beside the rubric or below, and not hidden.
 CHECK_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.py"
 CheckFile = Annotated[
     str, MatchingText(CHECK_FILE, "a Python file in the rubric's folder such as my_checks.py", "my_checks.py")
@@ -222,13 +222,13 @@ def _pattern(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Readable:
-    """Marks a text that a reader has to understand."""
+    """Marks a text for readers."""
 
     example: str
     is_formula: bool
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the text after its type was checked."""
+        """Check the text after its type."""
         read = _formula if self.is_formula else _pattern
         return core_schema.no_info_after_validator_function(read, core_schema.str_schema(strict=True))
 

@@ -1,4 +1,4 @@
-"""Quantities as people write them: `10 s`, `200 ms`, `20 Hz`; parsed exactly and printed back."""
+"""Quantities in readable form: `10 s`, `200 ms`, `20 Hz`; parsed exactly and printed back."""
 
 import re
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ class QuantityError(ValueError):
     """A quantity cannot be read.
 
     Args:
-        expected: What should stand there, e.g. ``a duration with its unit, such as `10 s```.
+        expected: What was expected, e.g. ``a duration with its unit, such as `10 s```.
         hint: One thing to do; empty if nothing is very likely right.
     """
 
@@ -28,7 +28,7 @@ class QuantityError(ValueError):
 class _Kind:
     """One dimension: its words for messages, and each unit as a multiple of the stored one, largest first.
 
-    `whole` names what is stored, where parts of it cannot be.
+    `whole` names the stored unit if fractions of it are not allowed.
     """
 
     noun: str
@@ -83,23 +83,23 @@ _KINDS: Mapping[str, _Kind] = {
     ),
 }
 
-# Digits are bounded: an exact fraction of a million digits would take minutes.
+# Digits are limited: an exact fraction of a million digits would take minutes.
 _NUMBER = r"(?:[0-9]{1,400}(?:\.[0-9]{0,400})?|\.[0-9]{1,400})"
 _QUANTITY = re.compile(rf"(?P<sign>[-+\N{{MINUS SIGN}}]?)(?P<number>{_NUMBER})\s*(?P<unit>[^\W\d_]{{0,20}})")
 
 
 def parse_quantity(text: str, unit: Unit) -> int | float:
-    """Read a quantity that is written with its unit.
+    """Parse a quantity with its unit.
 
     Args:
         text: Number and unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
-        unit: The dimension wanted, named by its base unit.
+        unit: The expected dimension, named by its base unit.
 
     Returns:
         Whole nanoseconds for `Unit("s")`, whole bytes for `Unit("B")`, a float in hertz for `Unit("Hz")`; at least 0.
 
     Raises:
-        QuantityError: Not a number, no unit, an unknown unit, below zero, or a part of a nanosecond or byte.
+        QuantityError: Not a number, no unit, an unknown unit, below zero, or a fraction of a nanosecond or byte.
     """
     kind = _KINDS[unit.symbol]
     found = _QUANTITY.fullmatch(text.strip())
@@ -136,7 +136,7 @@ def _finite(value: Fraction, kind: _Kind) -> float:
 
 
 def missing_unit(number: str, symbol: str) -> QuantityError:
-    """Return the error for a bare number where a quantity in `symbol` is wanted."""
+    """Return the error for a bare number where a quantity in `symbol` is expected."""
     kind = _KINDS[symbol]
     number = shown(number, 30)
     return QuantityError(
@@ -146,7 +146,7 @@ def missing_unit(number: str, symbol: str) -> QuantityError:
 
 
 def format_quantity(value: int | float, unit: Unit) -> str:
-    """Return a quantity as `parse_quantity` reads it, with nothing lost.
+    """Return a quantity in the form that `parse_quantity` reads, without loss.
 
     Args:
         value: Nanoseconds for `Unit("s")`, bytes for `Unit("B")`, hertz for `Unit("Hz")`; finite and at least 0.
@@ -163,10 +163,10 @@ def format_quantity(value: int | float, unit: Unit) -> str:
 
 
 def quantity_pattern(unit: Unit) -> str:
-    """Return a regular expression, for a JSON Schema, that quantities of a dimension match."""
+    """Return a regular expression for quantities of a dimension, for use in a JSON Schema."""
     return rf"^\s*\+?([0-9]+\.?[0-9]*|\.[0-9]+)\s*({'|'.join(_KINDS[unit.symbol].units)})\s*$"
 
 
 def quantity_example(unit: Unit) -> str:
-    """Return a quantity of a dimension as an example."""
+    """Return an example quantity of a dimension."""
     return _KINDS[unit.symbol].example

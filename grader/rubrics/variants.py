@@ -1,4 +1,4 @@
-"""The `variants` of a rubric: what they may be, and a document in which each has the value that was drawn."""
+"""The `variants` of a rubric: their possible values, and a document with the drawn values filled in."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from grader.rubrics.types import Id, Shape, wrong
 from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
 
-#: What stands in the place of a value: `{variant: rate}`.
+#: Key of a placeholder for a value: `{variant: rate}`.
 REFERENCE = "variant"
-#: Most values that a variant may have.
+#: Maximum number of values of a variant.
 MOST = 10_000
-#: Of a variant with more values than this, the first and the last are tried when a rubric is checked.
+#: If a variant has more values than this, checking a rubric tries only the first and the last.
 TRIED = 24
-#: Where a variant may stand, by the keys below `scenarios` and `criteria`; what names something else never varies.
+#: Where a variant may be used, by the keys below `scenarios` and `criteria`; names of other things never vary.
 _FIXED_IN_SCENARIOS = ("id", "processes", "may_exit", "start")
 _FREE_IN_CRITERIA = ("check", "title", "hint")
 _AMOUNT = re.compile(r"([+-]?[0-9]{1,30}(?:\.[0-9]{1,30})?)\s*([^\W\d_][^\s\d]{0,20})?")
@@ -41,7 +41,7 @@ def _scalar(value: object) -> object:
 
 
 def _split(value: object) -> tuple[Decimal, str]:
-    """Return number and unit; raises ValueError for what is neither a number nor a number with its unit."""
+    """Return number and unit; raises ValueError for anything but a number, with or without a unit."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise ValueError("no number")
     found = _AMOUNT.fullmatch(value.strip()) if isinstance(value, str) else None
@@ -107,7 +107,7 @@ VariantsField = dict[Id, VariantShape]
 
 
 def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
-    """Return the least value, the step, how many values there are, and their unit."""
+    """Return the least value, the step, the number of values, and their unit."""
     assert shape.between is not None
     (low, *units), (high, unit), (step, last) = map(_split, (*shape.between, shape.step))
     if {unit, last} != {*units}:
@@ -122,11 +122,11 @@ def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
 
 @dataclass(frozen=True, slots=True)
 class VariantOptions:
-    """All that a variant may be.
+    """The possible values of a variant.
 
     Attributes:
         name: Its name.
-        count: How many values there are.
+        count: Number of values.
     """
 
     name: str
@@ -134,7 +134,7 @@ class VariantOptions:
     _shape: VariantShape
 
     def value(self, index: int) -> Value:
-        """Return one of the values, counted from 0."""
+        """Return the value with the given index, counted from 0."""
         if self._shape.choose is not None:
             chosen: Value = self._shape.choose[index]
             return chosen
@@ -145,18 +145,18 @@ class VariantOptions:
         return int(number) if number == number.to_integral_value() and low % 1 == step % 1 == 0 else float(number)
 
     def tried(self) -> Iterator[Value]:
-        """Yield the values that a check of the rubric tries."""
+        """Yield the values that checking a rubric tries."""
         every = range(self.count)
         few = every if self.count <= TRIED else (*every[: TRIED // 2], *every[-TRIED // 2 :])
         yield from map(self.value, few)
 
 
 class Draw(Protocol):
-    """Says which value a variant has for a student."""
+    """Chooses the value of each variant for a student."""
 
     @property
     def student(self) -> str:
-        """Whose values they are."""
+        """The student whose values these are."""
         ...
 
     def value(self, exercise: str, options: VariantOptions) -> Value | None:
@@ -166,7 +166,7 @@ class Draw(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class First:
-    """Nobody's variant: the first value of each, for reading a rubric that is not to be graded by."""
+    """The first value of each variant, for reading a rubric without a student."""
 
     student: str = ""
 
@@ -178,32 +178,32 @@ class First:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """The variant that was graded, for judging what was recorded then.
+    """The values used in an earlier run, for judging its recording.
 
     Attributes:
-        drawn: Its values.
+        drawn: The values.
     """
 
     drawn: Drawn
 
     @property
     def student(self) -> str:
-        """Whose values they are."""
+        """The student whose values these are."""
         return self.drawn.student
 
     def value(self, exercise: str, options: VariantOptions) -> Value | None:
-        """Return the value that was kept."""
+        """Return the recorded value."""
         return self.drawn.values.get(exercise, {}).get(options.name)
 
 
 def tried(options: Sequence[VariantOptions], usual: Mapping[str, Value]) -> Iterator[Mapping[str, Value]]:
-    """Yield the combinations that a check of the rubric tries: each value once, the others as usual."""
+    """Yield the combinations that checking a rubric tries: each value once, the others as usual."""
     for option in options:
         yield from ({**usual, option.name: value} for value in option.tried())
 
 
 class _Variants(Shape):
-    """A rubric, of which only the variants are looked at."""
+    """A rubric, reduced to its variants."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -211,12 +211,12 @@ class _Variants(Shape):
 
 
 def variants_model() -> type[Shape]:
-    """Return the model that the variants of a rubric are validated by, whatever else is in it."""
+    """Return the model that validates the variants of a rubric and ignores the rest."""
     return _Variants
 
 
 def options_of(validated: Shape) -> tuple[VariantOptions, ...]:
-    """Return what the variants may be, of a rubric that `variants_model` has validated."""
+    """Return the possible values of variants in a rubric validated by `variants_model`."""
     assert isinstance(validated, _Variants)
     return tuple(
         VariantOptions(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
@@ -225,14 +225,14 @@ def options_of(validated: Shape) -> tuple[VariantOptions, ...]:
 
 
 def has_variants(tree: YamlTree) -> bool:
-    """Return whether a rubric speaks of variants at all."""
+    """Return whether a rubric has variants."""
     return isinstance(tree.data, Mapping) and "variants" in tree.data
 
 
 def with_values(tree: YamlTree, values: Mapping[str, Value]) -> YamlTree:
-    """Return a document in which every `{variant: name}` has become its value; places stay what they were.
+    """Return a document with every `{variant: name}` replaced by its value; positions stay the same.
 
-    Mistakes in how variants are used are added to the document's own.
+    Mistakes in the use of variants are added to those of the document.
     """
     mistakes = list(tree.mistakes)
     used: set[str] = set()
@@ -276,6 +276,6 @@ def _may_vary(path: Sequence[str | int]) -> bool:
 
 
 def varied_digest(digest: str, variant: Variant) -> str:
-    """Return the digest of a rubric with the values of a variant in it."""
+    """Return the digest of a rubric with the values of a variant filled in."""
     text = json.dumps([digest, variant.values])
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

@@ -14,17 +14,17 @@ from ruamel.yaml.reader import ReaderError
 
 from grader.submissions.collected import shown
 
-#: Deepest nesting, and most values once aliases are written out: a small file can name itself a billion times.
+#: Deepest nesting, and most values after expanding aliases: a small file can expand to billions of values.
 MAX_DEPTH = 24
 MAX_VALUES = 20_000
 
-#: Keys and list indices from the top of a document down to a value.
+#: Keys and list indices from the root of a document to a value.
 TreePath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Mistake:
-    """One thing that is wrong in a file; line and column count from 1."""
+    """A mistake in a file; line and column count from 1."""
 
     line: int
     column: int
@@ -34,13 +34,13 @@ class Mistake:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Position:
-    """A place in a file; line and column count from 1."""
+    """A position in a file; line and column count from 1."""
 
     line: int
     column: int
 
     def mistake(self, text: str, hint: str = "") -> Mistake:
-        """Return a mistake at this place."""
+        """Return a mistake at this position."""
         return Mistake(self.line, self.column, text, hint)
 
 
@@ -53,9 +53,9 @@ class YamlTree:
 
     Attributes:
         data: Mappings with text keys, lists and scalars.
-        values: Where each value starts.
-        keys: Where the key of each value in a mapping stands.
-        mistakes: What plain YAML data may not hold: duplicate keys, keys that are not text, odd tags.
+        values: Position of each value.
+        keys: Position of the key of each value in a mapping.
+        mistakes: Invalid parts: duplicate keys, keys that are not text, unknown tags.
     """
 
     data: object = None
@@ -65,7 +65,7 @@ class YamlTree:
 
 
 class YamlSyntaxError(Exception):
-    """The text is not a YAML document at all."""
+    """The text is not a YAML document."""
 
     def __init__(self, mistake: Mistake) -> None:
         super().__init__(mistake.text)
@@ -76,13 +76,13 @@ def read_yaml(text: str) -> YamlTree:
     """Parse one YAML 1.2 document.
 
     Args:
-        text: The document; its size is the caller's business.
+        text: The document; the caller limits its size.
 
     Returns:
         The tree; `data` is None for an empty document.
 
     Raises:
-        YamlSyntaxError: Not valid YAML, several documents, or nested or multiplied beyond the limits.
+        YamlSyntaxError: Not valid YAML, several documents, or nested or expanded beyond the limits.
     """
     try:
         _refuse_excess(text)
@@ -92,7 +92,7 @@ def read_yaml(text: str) -> YamlTree:
     except MarkedYAMLError as error:
         raise YamlSyntaxError(_syntax_mistake(error)) from None
     except (YAMLError, ValueError, LookupError, AttributeError, AssertionError) as error:
-        # The parser lets a few of its own slips through on mangled directives and escapes.
+        # The parser lets some of its own exceptions escape on malformed directives and escapes.
         raise YamlSyntaxError(TOP.mistake(f"not valid YAML: {shown(str(error))}")) from None
     tree = YamlTree()
     if root is not None:
@@ -105,7 +105,7 @@ def _yaml() -> YAML:
 
 
 def _refuse_excess(text: str) -> None:
-    """Look at the stream of events first: composing a hundred thousand open brackets exhausts the stack."""
+    """Check the event stream first: composing a hundred thousand open brackets exhausts the stack."""
     depth = 0
     for count, event in enumerate(_yaml().parse(text)):
         kind = type(event).__name__
@@ -144,7 +144,7 @@ def _syntax_mistake(error: MarkedYAMLError) -> Mistake:
 
 
 class _Reader:
-    """Turns nodes into plain values and notes where they stand."""
+    """Converts nodes to plain values and records their positions."""
 
     def __init__(self, tree: YamlTree) -> None:
         self._tree = tree
@@ -178,7 +178,7 @@ class _Reader:
                 continue
             self._tree.keys[(*path, key)] = where
             found[key] = self.value(value_node, (*path, key))
-            if value_node.value == "":  # a value that is not there begins wherever the next thing does
+            if value_node.value == "":  # an empty value would otherwise be placed at the next token
                 self._tree.values[(*path, key)] = where
         return found
 
@@ -198,13 +198,13 @@ class _Reader:
             return str(node.value)
 
 
-# A date, and the `=` and `<<` of older YAML, are text here.
+# Dates, and the `=` and `<<` of older YAML, are plain text here.
 _TEXT_TAGS = frozenset({"!!str", "!!timestamp", "!!value", "!!merge"})
 _PLAIN_TAGS = _TEXT_TAGS | {"!!int", "!!float", "!!bool", "!!null"}
 
 
 def nearest_position(positions: Mapping[TreePath, Position], path: Iterable[str | int]) -> tuple[TreePath, Position]:
-    """Return the deepest known part of a path and where it stands; parts that name nothing in the file are skipped."""
+    """Return the longest known prefix of a path and its position; parts that are not in the file are skipped."""
     known: TreePath = ()
     for part in path:
         if (*known, part) in positions:

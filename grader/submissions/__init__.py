@@ -1,1 +1,1 @@
-"""Turns what students hand in, folders and archives, into values of the core."""
+"""Reads submissions, folders and archives, as values of `grader.core`."""

@@ -1,4 +1,4 @@
-"""Unpacks an archive in memory, within limits and by rules of our own; nothing is written."""
+"""Unpacks archives in memory, within limits and by strict rules; nothing is written."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from grader.submissions.collected import (
     collision,
     folders_of,
     generated_folders,
-    objection,
-    passed_over,
+    is_skipped,
+    name_problem,
     shown,
 )
 
@@ -42,13 +42,13 @@ FEWER = "pack only your own .py files"
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One member of an archive, not yet unpacked.
+    """A member of an archive, not yet unpacked.
 
     Attributes:
-        name: As the archive has it, with `/` between the parts and none at the end; may be hostile.
-        kind: `FILE`, `FOLDER`, or the words for what else it is, such as `a link`.
-        size: Bytes it claims to have.
-        read: Unpacks it and returns at most so many bytes of it.
+        name: Name in the archive, with `/` between the parts and none at the end; may be hostile.
+        kind: `FILE`, `FOLDER`, or words for anything else, such as `a link`.
+        size: Size that the archive declares, in bytes.
+        read: Unpacks the member and returns at most the given number of bytes.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Member:
 
 
 class UnusableArchiveError(Exception):
-    """An archive cannot be used; whoever reads it adds which one it is.
+    """An archive cannot be used; the caller adds its name.
 
     Args:
         problem: What was expected and what was found.
@@ -73,19 +73,19 @@ class UnusableArchiveError(Exception):
 
 BLOCK = 512
 
-#: Longest header that only describes the next member.
+#: Largest header that only describes the next member, in bytes.
 MAX_EXTENDED_BYTES = 64 << 10
 
-#: Compressed streams one after the other that are read as one: parallel compressors write several.
+#: Maximum number of concatenated compressed streams; parallel compressors write several.
 MAX_STREAMS = 100
 
-#: Most memory of a decompressor of xz, in bytes; `xz -9` asks for 65 MiB.
+#: Memory limit of the xz decompressor, in bytes; `xz -9` needs 65 MiB.
 MAX_XZ_BYTES = 128 << 20
 
 _ENCODING, _ERRORS = "utf-8", "surrogateescape"
 _PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
 _EXTENDED = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
-# In older versions of Python, tarfile needs time that grows with the square of such a run.
+# In older versions of Python, tarfile needs quadratic time for such a run.
 _MANY_DIGITS = re.compile(rb"[0-9]{40}")
 _KINDS = {tarfile.LNKTYPE: "a link", tarfile.SYMTYPE: "a link", tarfile.DIRTYPE: FOLDER}
 
@@ -108,7 +108,7 @@ _STREAMS: dict[str, Callable[[], _Stream]] = {
 
 
 def is_tar(head: bytes) -> bool:
-    """Return whether data begins with the header of a tar archive, which holds a checksum of itself."""
+    """Return whether data begins with a tar header, which contains a checksum of itself."""
     try:
         tarfile.TarInfo.frombuf(head[:BLOCK], _ENCODING, _ERRORS)
     except tarfile.HeaderError:
@@ -117,16 +117,16 @@ def is_tar(head: bytes) -> bool:
 
 
 def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
-    """Return what compressed data holds.
+    """Return the decompressed data.
 
     Args:
         data: The whole compressed file.
         compression: `gzip`, `bzip2` or `xz`.
-        most: Most bytes of the result; nothing is computed beyond.
-        limit: The same in words.
+        most: Maximum size of the result, in bytes; nothing is decompressed beyond it.
+        limit: That limit in words.
 
     Raises:
-        UnusableArchiveError: The data is damaged or cut off, or holds more.
+        UnusableArchiveError: The data is damaged or cut off, or its content is larger than `most`.
     """
     whole = bytearray()
     for _ in range(MAX_STREAMS):
@@ -146,14 +146,14 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
 
 
 def tar_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of an uncompressed tar archive in their order.
+    """Return the members of an uncompressed tar archive, in order.
 
     Args:
         data: The whole archive.
-        most: Most members.
+        most: Maximum number of members.
 
     Raises:
-        UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses what no student needs.
+        UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses unusual features.
     """
     places = _places(data, most)
     try:
@@ -168,7 +168,7 @@ def _tar_member(data: bytes, info: tarfile.TarInfo, places: set[tuple[int, int]]
     if not info.isreg():
         kind = _KINDS.get(info.type, "a device, pipe or other special file")
         return Member(info.name, kind, 0, lambda most: b"")  # noqa: ARG005 - there is nothing to read
-    # An extended header can move and stretch a member; then the two readings of the archive differ.
+    # An extended header can move and enlarge a member; then the two readings of the archive differ.
     if info.issparse() or (info.offset_data, info.size) not in places:
         raise _unusual()
     start, size = info.offset_data, info.size
@@ -176,7 +176,7 @@ def _tar_member(data: bytes, info: tarfile.TarInfo, places: set[tuple[int, int]]
 
 
 def _places(data: bytes, most: int) -> set[tuple[int, int]]:
-    """Walk over the headers and return where the contents lie, as offset and size; tarfile trusts what is said here."""
+    """Return offset and size of each member's content, read from the headers; tarfile trusts these values."""
     places: set[tuple[int, int]] = set()
     at = headers = 0
     while True:
@@ -213,7 +213,7 @@ def _size(block: bytes) -> int:
 
 
 def _check_extended(header: bytes, *, pax: bool) -> None:
-    """Refuse records that are not exactly `LENGTH KEY=VALUE` and a line break, and those about sparse files."""
+    """Reject records that are not exactly `LENGTH KEY=VALUE` and a line break, and those about sparse files."""
     if not pax:
         return
     if b"GNU.sparse" in header or _MANY_DIGITS.search(header):
@@ -236,31 +236,31 @@ def _unusual() -> UnusableArchiveError:
 
 
 _DIRECTORY_ENTRY = b"PK\x01\x02"
-_ENCRYPTED = 0x1 | 0x40 | 0x2000  # with a password, strongly, the directory too
+_ENCRYPTED = 0x1 | 0x40 | 0x2000  # with a password, with strong encryption, with an encrypted directory
 _NAMED_IN_UTF8 = 0x800
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-# What zipfile and zlib raise for a damaged archive.
+# Exceptions of zipfile and zlib for damaged archives.
 _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, NotImplementedError, KeyError)
 
 
 def zip_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of a zip archive in the order of its directory.
+    """Return the members of a zip archive, in the order of its directory.
 
     Args:
         data: The whole archive.
-        most: Most members.
+        most: Maximum number of members.
 
     Raises:
-        UnusableArchiveError: The archive is damaged, encrypted, compressed in an uncommon way, or has too many members.
+        UnusableArchiveError: The archive is damaged, encrypted, uses an uncommon compression, or has too many members.
     """
-    # Before zipfile builds an object for each: of a few megabytes it could make gigabytes.
+    # Checked before zipfile creates an object for each member: a few megabytes could become gigabytes.
     if data.count(_DIRECTORY_ENTRY) > most:
         raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _DAMAGE:
         raise _damaged_zip() from None
-    # Members that share their bytes could be unpacked for hours, however little comes out.
+    # Unpacking members that share their bytes could take hours, however small the result.
     if sum(info.compress_size for info in archive.infolist()) > len(data):
         raise _damaged_zip()
     return [_zip_member(archive, info) for info in archive.infolist()]
@@ -285,13 +285,13 @@ def _zip_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Member:
 
 
 def _name(info: zipfile.ZipInfo) -> str:
-    """Return a member's whole name; zipfile would cut it at a NUL."""
+    """Return a member's full name; zipfile would cut it at a NUL."""
     name = info.orig_filename
     if not info.flag_bits & _NAMED_IN_UTF8:
-        # macOS writes UTF-8 and does not say so.
+        # macOS writes UTF-8 without setting the flag.
         with contextlib.suppress(UnicodeError):
             name = name.encode("cp437").decode("utf-8")
-    return name.replace("\\", "/")  # what old Windows programs write between the parts
+    return name.replace("\\", "/")  # the separator of old Windows programs
 
 
 def _kind(info: zipfile.ZipInfo, name: str) -> str:
@@ -307,21 +307,21 @@ def _damaged_zip() -> UnusableArchiveError:
     return UnusableArchiveError("expected a whole zip archive, found a damaged or incomplete one")
 
 
-#: Largest archive.
+#: Largest archive, in bytes.
 MAX_ARCHIVE_BYTES = 64 << 20
 
-#: Most that compressed tar archives unpack to, headers and files that are left out included.
+#: Maximum size of an unpacked tar archive, including headers and skipped files, in bytes.
 MAX_UNPACKED_BYTES = 64 << 20
 
-#: Most bytes that one byte of an archive may become, once more than `RATIO_FREE_BYTES` have come of it.
+#: Maximum expansion: bytes of content per byte of archive, once the content exceeds `RATIO_FREE_BYTES`.
 MAX_RATIO = 200
 RATIO_FREE_BYTES = 4 << 20
 _RATIO = f"{MAX_RATIO} times the size of the archive"
 
-#: Bytes of a file that tell what kind of archive it is.
+#: Number of leading bytes that identify the kind of an archive.
 HEAD_BYTES = BLOCK
 
-#: What archives are called; what is in them decides.
+#: Suffixes of archives; their content decides the kind.
 ARCHIVE_SUFFIXES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".tbz2", ".xz", ".txz", ".zst", ".7z", ".rar")
 
 _MAGIC = {
@@ -340,7 +340,7 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 
 def archive_kind(head: bytes) -> str | None:
-    """Return what kind of archive or compressed file begins like this, or None.
+    """Return the kind of archive or compressed file that begins with these bytes, or None.
 
     Args:
         head: The first `HEAD_BYTES` of a file, or all of a shorter one.
@@ -355,18 +355,17 @@ def archive_kind(head: bytes) -> str | None:
 
 
 def collect_archive(data: bytes, *, where: str) -> Collected:
-    """Return the files that an archive holds.
+    """Return the files of an archive.
 
-    What a folder would be copied without is left out in the same way, so the same files give the same result packed or
-    not.
+    The same files are skipped as in a folder, so a submission gives the same result packed or not.
 
     Args:
         data: The whole archive, at most `MAX_ARCHIVE_BYTES`.
-        where: The archive as messages show it.
+        where: The archive's name in messages.
 
     Raises:
-        SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system
-            could not keep or would keep elsewhere.
+        SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could
+            not store or would store elsewhere.
     """
     if len(data) > MAX_ARCHIVE_BYTES:
         raise SubmissionError(f"{where}: expected at most {MAX_ARCHIVE_BYTES >> 20} MiB, found more", FEWER)
@@ -403,15 +402,15 @@ def _allowed(packed: int) -> int:
 
 
 def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
-    """Yield the files that are the student's, with clean names; raises for what no archive may hold."""
+    """Yield the student's files with normalised names; raises for members that no archive may contain."""
     for member in members:
         name = _relative(member)
-        if not name:  # the top itself
+        if not name:  # the top folder itself
             continue
-        problem = objection(name)
+        problem = name_problem(name)
         if problem:
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
-        if passed_over(name if member.kind != FOLDER else f"{name}/x"):
+        if is_skipped(name if member.kind != FOLDER else f"{name}/x"):
             continue
         if member.kind == FOLDER:
             continue
@@ -422,7 +421,7 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
 
 
 def _relative(member: Member) -> str:
-    """Return a member's name without the `./` that `tar -c .` writes; empty for the top of the archive."""
+    """Return a member's name without the `./` of `tar -c .`; empty for the top folder."""
     name = member.name
     while name.startswith("./"):
         name = name[2:]
@@ -430,7 +429,7 @@ def _relative(member: Member) -> str:
 
 
 def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> list[tuple[str, Member]]:
-    """Leave out what tools made, then hold the rest to the limits that need no unpacking."""
+    """Drop generated files, then apply the limits that need no unpacking."""
     every = list(named)
     generated = generated_folders(name for name, _ in every)
     kept = []
@@ -452,14 +451,14 @@ def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> li
 
 
 def _contents(members: Sequence[tuple[str, Member]], packed: int, left: LeftOut) -> Iterator[tuple[str, bytes]]:
-    """Unpack, counting what really comes and not what was promised."""
+    """Unpack the members, counting actual sizes, not declared ones."""
     total = 0
     for name, member in members:
         content = member.read(MAX_FILE_BYTES + 1) if member.size <= MAX_FILE_BYTES else None
         if content is None or len(content) > MAX_FILE_BYTES:
             left.add(f"larger than {MAX_FILE_BYTES >> 20} MiB", name)
             continue
-        if len(content) != member.size:  # another program would see another file
+        if len(content) != member.size:  # another program would unpack a different file
             raise UnusableArchiveError("expected a whole archive, found a damaged or incomplete one")
         total += len(content)
         if total > MAX_TOTAL_BYTES:

@@ -1,4 +1,4 @@
-"""What an intake collected before anything is written, and which names it may hold."""
+"""The files of a submission before they are written, and which names are allowed or skipped."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ SHOWN_LENGTH = 80
 
 
 def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
-    """Return text as one printable line: control characters and lone surrogates escaped, cut in the middle.
+    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle.
 
     Args:
-        text: Anything: file names and YAML scalars may hold line breaks, escapes and undecodable bytes.
-        limit: Longest result, in characters.
+        text: Any text: file names and YAML scalars may hold line breaks, escapes and undecodable bytes.
+        limit: Maximum length of the result, in characters.
     """
     kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
@@ -28,28 +28,28 @@ def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
 
 
 def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
-    """Return names as a phrase: `a`, `a or b`, `a, b or c`; at least one name."""
+    """Return names as a phrase: `a`, `a or b`, `a, b or c`; needs at least one name."""
     if len(names) == 1:
         return names[0]
     return f"{', '.join(names[:-1])} {conjunction} {names[-1]}"
 
 
-#: A folder that holds one of these was made by a tool: a virtual environment, or what `colcon build` left behind.
+#: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
 
-#: Longest path inside a submission: the system refuses longer ones once the staging folder stands before it.
+#: Longest path inside a submission: with the staging folder in front, the system rejects longer ones.
 MAX_PATH_BYTES = 2_000
 
-#: Longest name of one file or folder that Linux can hold.
+#: Longest name of one file or folder on Linux, in bytes.
 MAX_NAME_BYTES = 255
 
 _BY_SYSTEMS = frozenset({"__pycache__", "__MACOSX"})
 _SKIPPED_FOLDERS = _BY_SYSTEMS | {"venv", "node_modules"}
-# What file managers leave in every folder; `._x` is what macOS puts beside every file x in an archive.
+# Files that file managers create in every folder; macOS puts `._x` beside every file x of an archive.
 _SKIPPED_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?")
-# Windows drops these, so that two names become one; other systems keep them.
+# Windows drops these at the end of a name, so that two names become one; other systems keep them.
 _ENDS_ODDLY = re.compile(r"[ .]\Z")
 _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
@@ -65,36 +65,36 @@ _OBJECTIONS: dict[str, Callable[[str], object]] = {
 }
 
 
-def passed_over_folder(name: str) -> bool:
-    """Return whether a folder of this name is no work of the student: caches, environments, version control."""
+def is_skipped_folder(name: str) -> bool:
+    """Return whether a folder of this name is skipped: caches, environments, version control."""
     return name in _SKIPPED_FOLDERS or name.startswith(".")
 
 
-def passed_over_file(name: str) -> bool:
-    """Return whether a file of this name was put there by an operating system."""
+def is_skipped_file(name: str) -> bool:
+    """Return whether an operating system created a file of this name."""
     return name in _SKIPPED_FILES or name.startswith("._")
 
 
-def unnoticed(name: str, *, is_folder: bool) -> str:
-    """Return why a submission of this name would be passed over, as a phrase.
+def why_skipped(name: str, *, is_folder: bool) -> str:
+    """Return why a submission of this name would be skipped, as a phrase.
 
-    Empty if it would not be, or if a system or interpreter has put it there: then nobody looks for it.
+    Empty if it would not be, or if a system or interpreter created it: then nobody expects it to be found.
     """
-    if passed_over_file(name) or (is_folder and name in _BY_SYSTEMS):
+    if is_skipped_file(name) or (is_folder and name in _BY_SYSTEMS):
         return ""
     if name.startswith("."):
         return "its name begins with a dot"
-    return "its name is that of a tool's folder" if is_folder and passed_over_folder(name) else ""
+    return "its name is that of a tool's folder" if is_folder and is_skipped_folder(name) else ""
 
 
-def passed_over(path: str) -> bool:
-    """Return whether a path, relative and with `/`, is or lies in something that is passed over."""
+def is_skipped(path: str) -> bool:
+    """Return whether a relative path, with `/`, is or lies in something that is skipped."""
     *folders, name = path.split("/")
-    return passed_over_file(name) or any(map(passed_over_folder, folders))
+    return is_skipped_file(name) or any(map(is_skipped_folder, folders))
 
 
 def generated_folders(paths: Iterable[str]) -> dict[str, str]:
-    """Return the folders made by a tool, as path -> marker; never the whole submission."""
+    """Return the folders made by a tool, as path -> marker file; never the top folder."""
     found: dict[str, str] = {}
     for path in paths:
         folder, _, name = path.rpartition("/")
@@ -105,22 +105,22 @@ def generated_folders(paths: Iterable[str]) -> dict[str, str]:
 
 
 def folders_of(path: str) -> Iterator[str]:
-    """Yield the folders that a path lies in, the outermost first."""
+    """Yield the parent folders of a path, the outermost first."""
     at = path.find("/")
     while at >= 0:
         yield path[:at]
         at = path.find("/", at + 1)
 
 
-def objection(path: str) -> str:
-    """Return what is wrong with the name of a member of an archive, as a phrase; empty if nothing is."""
+def name_problem(path: str) -> str:
+    """Describe what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
     return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
 
 
 def collision(files: Iterable[str]) -> tuple[str, str] | None:
-    """Return two names of which some system could keep only one, or None.
+    """Return two names that cannot both exist on some system, or None.
 
-    Two files of one name, names that differ only in case or in how letters are composed, and a file where another
+    These are duplicate names, names that differ only in case or in Unicode composition, and a file where another path
     needs a folder.
     """
     kept: dict[str, tuple[str, bool]] = {}
@@ -152,17 +152,17 @@ MAX_TOTAL_BYTES = 50 << 20
 MAX_FILE_BYTES = 8 << 20
 MAX_DEPTH = 20
 
-#: Entries of any kind that are looked at before a folder or an archive is taken for something else than a submission.
+#: Entries of any kind that are examined before a folder or an archive is rejected as not being a submission.
 MAX_ENTRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class Collected:
-    """Files that were read, not yet written anywhere.
+    """Files that were read, not yet written.
 
     Attributes:
-        files: Relative POSIX path and content; every path stays inside, and no two are the same.
-        notes: Sentences about what was left out.
+        files: Relative POSIX path and content; every path stays inside, and paths are unique.
+        notes: Sentences about skipped files.
     """
 
     files: tuple[tuple[str, bytes], ...]
@@ -171,16 +171,16 @@ class Collected:
 
 @dataclass(slots=True)
 class LeftOut:
-    """Names of what was left out, by the reason."""
+    """Names of skipped files and folders, by reason."""
 
     by_reason: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def add(self, reason: str, relative: str) -> None:
-        """Take note of a path that is left out, once."""
+        """Record a skipped path once."""
         self.by_reason.setdefault(reason, {})[relative] = None
 
     def notes(self) -> tuple[str, ...]:
-        """Return one sentence per reason, in an order that does not depend on how the system lists folders."""
+        """Return one sentence per reason, in an order that does not depend on the file system."""
         return tuple(
             self._note(reason, sorted(names, key=os.fsencode)) for reason, names in sorted(self.by_reason.items())
         )

@@ -1,4 +1,4 @@
-"""The text of the graded files, and what in it reaches for the insides of its process."""
+"""Reads the graded files as text, and finds names that reach into the internals of their process."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-#: What is said of a file that is too long to be looked through.
+#: Reported for a file that is too long to be examined.
 LONG = "a very long file"
-#: Modules that show or change the insides of a process, or start others.
+#: Modules that show or change the internals of a process, or start others.
 _MODULES = _words(
     "gc ctypes cffi inspect dis marshal types tracemalloc faulthandler resource psutil time_machine "
     "freezegun subprocess multiprocessing pty fcntl mmap _thread _socket _ctypes _posixsubprocess pickle code codeop "
     "runpy imp weakref builtins __main__ site sysconfig importlib pkgutil zipimport cProfile profile pdb bdb select "
     "selectors forbiddenfruit wrapt mock platform"
 )
-#: Names in modules that anybody uses: whole dotted names.
+#: Names in modules that ordinary programs use: full dotted names.
 _NAMES = _words(
     "sys._getframe sys._current_frames sys._current_exceptions sys.modules sys.settrace sys.setprofile sys.gettrace "
     "sys.getprofile sys.addaudithook sys.meta_path sys.path_hooks sys.flags sys.orig_argv sys.getrefcount "
@@ -43,7 +43,7 @@ _NAMES = _words(
     "traceback.format_stack traceback.print_stack traceback.walk_tb traceback.extract_tb traceback.StackSummary "
     "traceback.FrameSummary traceback.TracebackException numpy.datetime64 uuid.uuid1"
 )
-#: Attributes of whatever they are read.
+#: Attributes that reach internals, whatever object they are read from.
 _ATTRIBUTES = _words(
     "__closure__ __globals__ __code__ __wrapped__ __builtins__ __subclasses__ __mro__ __bases__ __getattribute__ "
     "__loader__ __spec__ __self__ __func__ __defaults__ __kwdefaults__ __qualname__ __module__ __dict__ cell_contents "
@@ -54,17 +54,17 @@ _ATTRIBUTES = _words(
     "tm_yday year month day toordinal fromordinal "
     "__traceback__ tb_next relativeCreated"
 )
-#: Functions of Python that run or find what no text names.
+#: Built-in functions that run code or look up names at run time.
 _BUILTINS = _words("exec eval compile __import__ globals locals vars dir memoryview breakpoint id")
-#: Functions that tell what kind of thing something is; asked about a function of a module they tell who replaced it.
+#: Functions that classify an object; applied to a module's function, they reveal that it was replaced.
 _ASKING = _words("type repr str isinstance issubclass hasattr getattr setattr delattr callable hash format")
-#: Parts of texts that name places or settings of the process.
+#: Parts of string literals that name paths or settings of the process.
 _TEXTS = (
     *("/proc", "/sys/", "/dev/shm", "/dev/fd", "/submission", "_grader", "grader_host"),  # noqa: S108 - looked for
     *("RCUTILS_", "FASTRTPS", "FASTDDS", "PYTHONHASHSEED", "LD_PRELOAD", "_ROS_WHEELS", "GRADER_"),
     *("_rclpy", "__class__", "__code__", "__wrapped__", "__globals__"),
 )
-#: What tells the time, by the clock that it reads: a program with two may compare them.
+#: Functions that read the time, by the clock they use: a program with two may compare them.
 _CLOCKS = {
     "time.time": "system",
     "time.time_ns": "system",
@@ -76,19 +76,19 @@ _CLOCKS = {
     "time.perf_counter": "steady",
     "time.perf_counter_ns": "steady",
 }
-#: What tells the date or the time of day; comparing it, or a part of it, with anything is more than telling it.
+#: Functions that return the date or the time of day; comparing the result, or a part of it, is more than printing.
 _CALENDARS = _words(
     "time.strftime time.ctime time.asctime time.localtime time.gmtime email.utils.formatdate datetime.date.today"
 )
 _TOLD = _words("strftime isoformat isocalendar isoweekday weekday timetuple ctime")
-#: Differences of clocks that no program acts upon.
+#: Clock differences that programs do not act on.
 _TINY_S = 1e-3
-#: Seconds, or nanoseconds, since 1970 between these are a date that a program compares with.
+#: A number between these, in seconds or nanoseconds since 1970, is a date that a program compares with.
 _DATES = ((1.5e9, 2.5e9), (1.5e18, 2.5e18))
 
 
 def reaching(text: str) -> tuple[str, ...]:
-    """Return by what names a file reaches for the insides of its process, each once, in order; empty for most files."""
+    """Return the names by which a file reaches into its process, in order without duplicates; usually none."""
     source = read("", text)
     if source.tree is None:
         return (LONG,) if len(text) > LONGEST_SOURCE or _can_run(text) else ()
@@ -143,11 +143,11 @@ def _is_private(name: str) -> bool:
 
 
 def _computed(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
-    """Yield names that are looked up by a text that is worked out, and functions that are asked what they are."""
+    """Yield names looked up by computed text, and functions whose type is asked for."""
     spelt = _loops_over_texts(nodes)
     for call in (node for node in nodes if isinstance(node, ast.Call)):
         name = chain(call.func)
-        if name in ("getattr", "setattr", "delattr") and not _is_spelt_out(call, spelt):
+        if name in ("getattr", "setattr", "delattr") and not _shows_attribute(call, spelt):
             yield f"{name} of a name that is worked out"
         elif name in ("getattr", "setattr", "delattr", "hasattr") and _named_by_text(call, source):
             yield f"{name} of {_named_by_text(call, source)}"
@@ -158,7 +158,7 @@ def _computed(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
 
 
 def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
-    """Return the names that loops give to texts which stand in the file, and that nothing else gives."""
+    """Return the loop variables that only take string literals of the file."""
     inner = [n.generators for n in nodes if isinstance(n, (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp))]
     loops: list[ast.For | ast.comprehension] = [n for n in nodes if isinstance(n, ast.For)]
     loops += [loop for generators in inner for loop in generators]
@@ -167,28 +167,28 @@ def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
         for loop in loops
         if isinstance(loop.target, ast.Name)
         and isinstance(loop.iter, (ast.Tuple, ast.List, ast.Set))
-        and not any(_is_telling(text) for text in loop.iter.elts)
+        and not any(_may_name_internals(text) for text in loop.iter.elts)
     ]
     given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return frozenset(name for name in named if given.count(name) == named.count(name))
 
 
-def _is_telling(node: ast.expr) -> bool:
-    """Return whether an expression is anything but a text that names nothing inside."""
+def _may_name_internals(node: ast.expr) -> bool:
+    """Return whether an expression may be anything but a text that names nothing internal."""
     if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
         return True
     return node.value in _ATTRIBUTES or any(node.value == name.rpartition(".")[2] for name in _NAMES)
 
 
-def _is_spelt_out(call: ast.Call, spelt: frozenset[str]) -> bool:
-    """Return whether it can be read which attribute a call is about; what a program sets in itself is its own."""
+def _shows_attribute(call: ast.Call, spelt: frozenset[str]) -> bool:
+    """Return whether the text shows which attribute a call uses, or the call sets one in `self`."""
     if len(call.args) > 1 and (isinstance(call.args[1], ast.Constant) or chain(call.args[1]) in spelt):
         return True
     return chain(call.func) == "setattr" and bool(call.args) and chain(call.args[0]) == "self"
 
 
 def _named_by_text(call: ast.Call, source: Source) -> str:
-    """Return the name that a call looks up by its text, if it is one that is looked for; empty otherwise."""
+    """Return the name that a call looks up by its text, if it is a suspicious one; empty otherwise."""
     if len(call.args) < 2 or not isinstance(call.args[1], ast.Constant) or not isinstance(call.args[1].value, str):
         return ""
     name = f"{source.resolved(call.args[0])}.{call.args[1].value}"
@@ -196,7 +196,7 @@ def _named_by_text(call: ast.Call, source: Source) -> str:
 
 
 def _of_module(node: ast.expr, source: Source) -> bool:
-    """Return whether an expression is something in a module, or a module, and not what calling it gives."""
+    """Return whether an expression is a module or an attribute of one, and not the result of a call."""
     name = chain(node)
     called = isinstance(node, ast.Call)
     return not called and name.partition(".")[0] in source.aliases and name.rpartition(".")[2][:1].islower()
@@ -207,7 +207,7 @@ def _takes_environ(call: ast.Call) -> bool:
 
 
 def _timing(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
-    """Yield two clocks in one file, and loops that count how often they look at one."""
+    """Yield two clocks in one file, and loops that count how often they read one."""
     names = [node for node in nodes if isinstance(node, (ast.Attribute, ast.Name))]
     clocks = {clock for node in names if (clock := _CLOCKS.get(source.resolved(node)))}
     if len(clocks) > 1:
@@ -223,7 +223,7 @@ def _timing(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
 
 
 def _compares(node: ast.AST, source: Source) -> bool:
-    """Return whether a date is compared with anything, or a clock as nobody does who waits for time to pass."""
+    """Return whether a date is compared, or a clock in a way that merely waiting for time to pass never needs."""
     if isinstance(node, (ast.Subscript, ast.Attribute)):
         return _is_date(node.value, source) and (
             isinstance(node, ast.Subscript) or node.attr in ("startswith", "endswith")
@@ -257,16 +257,16 @@ def _is_date(node: ast.AST, source: Source) -> bool:
 _WAITING = _words("sleep wait spin spin_once spin_until_future_complete join get publish sleep_for sleep_until")
 
 
-#: Of a file that is longer, no text is given.
+#: Longer files are not read, in bytes.
 MAX_SOURCE_BYTES = 1 << 20
-#: Of more than this in all files nothing more is read.
+#: Maximum total size of the files read, in bytes.
 MAX_PROGRAM_BYTES = 4 << 20
-#: Modules that Python imports without their source.
+#: Suffixes of modules that Python imports without their source.
 COMPILED = (".so", ".pyc", ".pyo", ".pth")
 
 
 def read_sources(submission: Submission) -> dict[str, str]:
-    """Return wanted file name -> text, of the staged files that were found and can be decoded as Python does it."""
+    """Return wanted file name -> text of the staged files that were found and that Python can decode."""
     texts = {
         wanted: source_text(submission.root / file.found)
         for wanted, file in submission.files.items()
@@ -276,9 +276,9 @@ def read_sources(submission: Submission) -> dict[str, str]:
 
 
 def read_reaches(root: Path) -> tuple[str, ...]:
-    """Return by what names the files of a staged submission reach for the insides of their process, each once.
+    """Return the names by which the files of a staged submission reach into their process, without duplicates.
 
-    A module that is no text, or more text than anybody reads, counts as reaching.
+    A module that is not text, or has more text than is read, counts as reaching.
     """
     found: list[str] = []
     size = 0
@@ -295,7 +295,7 @@ def read_reaches(root: Path) -> tuple[str, ...]:
 
 
 def source_text(path: Path) -> str | None:
-    """Return the text of a staged file, or None if it is too long or not text in the encoding that it names."""
+    """Return the text of a staged file; None if it is too long or not text in its declared encoding."""
     try:
         with path.open("rb") as file:
             content = file.read(MAX_SOURCE_BYTES + 1)

@@ -1,4 +1,4 @@
-"""Collects what a student handed in as a folder or file, which is only read, and copies it to a place of our own."""
+"""Reads the files of a submitted folder, without changing it, and writes staged copies."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from grader.submissions.collected import (
     MAX_TOTAL_BYTES,
     Collected,
     LeftOut,
-    passed_over_file,
-    passed_over_folder,
+    is_skipped_file,
+    is_skipped_folder,
 )
 
 _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -33,8 +33,8 @@ def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
 
     Args:
         folder: The student's folder.
-        into: Where they will be copied; if that lies in the student's folder, it is no part of the submission.
-        where: The folder as messages show it.
+        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
+        where: The folder's name in messages.
 
     Returns:
         The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out
@@ -65,10 +65,10 @@ def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
 
 
 def read_start(file: Path, most: int, *, where: str) -> bytes:
-    """Return the first bytes of a file that was named, at most so many; a link to it is followed.
+    """Return at most `most` bytes from the start of a named file; a link to it is followed.
 
     Raises:
-        SubmissionError: The file cannot be read, or is no plain file.
+        SubmissionError: The file cannot be read, or is not a regular file.
     """
     try:
         with os.fdopen(os.open(file, _OPEN_FLAGS & ~os.O_NOFOLLOW), "rb") as opened:
@@ -80,7 +80,7 @@ def read_start(file: Path, most: int, *, where: str) -> bytes:
 
 
 def write_files(collected: Collected, into: Path) -> str:
-    """Write what was collected into an empty folder of the caller's, readable by everybody, in the same layout.
+    """Write the files that were read into an empty folder, readable by everybody, in the same layout.
 
     Returns:
         The digest: `sha256:` and 64 hex digits over names and contents.
@@ -91,7 +91,7 @@ def write_files(collected: Collected, into: Path) -> str:
     digest = hashlib.sha256()
     for relative, content in sorted(collected.files, key=lambda file: os.fsencode(file[0])):
         _write(into / relative, content)
-        # Lengths first: without them, two different sets of files could give the same bytes.
+        # Lengths come first: without them, two different sets of files could produce the same bytes.
         for part in (os.fsencode(relative), content):
             digest.update(len(part).to_bytes(8, "big"))
             digest.update(part)
@@ -100,7 +100,7 @@ def write_files(collected: Collected, into: Path) -> str:
 
 @dataclass(slots=True)
 class _Walk:
-    """Lists a folder; works on descriptors, because paths may be longer than the system takes."""
+    """Lists a folder by file descriptors, because paths may be longer than the system allows."""
 
     where: str
     left: LeftOut
@@ -109,7 +109,7 @@ class _Walk:
     found: int = 0
 
     def files(self, descriptor: int, prefix: str = "", depth: int = 0) -> Iterator[str]:
-        """Yield the relative paths of plain files, in no particular order."""
+        """Yield the relative paths of regular files, in no particular order."""
         for name in self._names(descriptor):
             relative = f"{prefix}{name}"
             try:
@@ -135,7 +135,7 @@ class _Walk:
         return names
 
     def _file(self, relative: str, name: str) -> Iterator[str]:
-        if passed_over_file(name):
+        if is_skipped_file(name):
             return
         if len(os.fsencode(relative)) > MAX_PATH_BYTES:
             self.left.add("the path is too long", relative)
@@ -146,7 +146,7 @@ class _Walk:
         yield relative
 
     def _folder(self, parent: int, name: str, relative: str, depth: int, info: os.stat_result) -> Iterator[str]:
-        if passed_over_folder(name) or _identity(info) == self.own:
+        if is_skipped_folder(name) or _identity(info) == self.own:
             return
         if depth > MAX_DEPTH:
             raise _too_much(self.where, f"{MAX_DEPTH} folders inside each other")
@@ -188,7 +188,7 @@ def _kind(mode: int) -> str:
 
 
 def _content(top: int, relative: str, left: LeftOut) -> bytes | None:
-    """Return what a file holds, or None and a note if it cannot or must not be read."""
+    """Return the content of a file, or None and a note if it cannot or must not be read."""
     try:
         with os.fdopen(_opened(top, relative), "rb") as file:
             info = os.fstat(file.fileno())
@@ -207,7 +207,7 @@ def _content(top: int, relative: str, left: LeftOut) -> bytes | None:
 
 
 def _opened(top: int, relative: str) -> int:
-    """Open a file below a folder without following any link, also none that came after the folder was listed."""
+    """Open a file below a folder without following links, including those created after the listing."""
     *folders, name = relative.split("/")
     here = os.dup(top)
     try:
@@ -221,7 +221,7 @@ def _opened(top: int, relative: str) -> int:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a staged file that everybody may read, whatever the umask: nodes run as another user."""
+    """Write a staged file readable by everybody, whatever the umask: nodes run as another user."""
     try:
         missing = [parent for parent in path.parents if not parent.exists()]
         for parent in reversed(missing):

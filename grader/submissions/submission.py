@@ -1,4 +1,4 @@
-"""Takes in what a student handed in: a staged copy, and which file of it belongs to which process."""
+"""Reads a student's submission: stages a copy, and maps its files to processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIV
 from grader.submissions.collected import MAX_FILE_BYTES, Collected, listed, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
 
-#: Names at least this alike are shown as a possible misspelling.
+#: Names at least this similar are shown as a possible misspelling.
 SIMILARITY = 0.8
 
 #: Misspelt names shown for one file.
@@ -24,7 +24,7 @@ MAX_SIMILAR = 3
 
 _EXPECTED = "a folder, a .py file or an archive"
 
-# What browsers, editors and file managers put behind a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
+# Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`.
 _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py))+$")
 _COPY_MARK = re.compile(r"[\s_-]*(?:\(\d+\)|copy|copia|kopie)\s*\d*$")
 
@@ -33,29 +33,29 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
     """Copy a submission and find the wanted files in it.
 
     Args:
-        path: A folder, an archive or one .py file, as the user typed it. A folder or archive without a .py file that
-            holds one archive stands for that: so learning platforms deliver what students upload.
+        path: A folder, an archive or one .py file, as the user typed it. If a folder or archive holds no .py file but
+            one archive, that archive is used: learning platforms deliver uploads this way.
         wanted: File names of all exercises being graded.
-        into: Empty folder of the caller's, which receives the copy.
+        into: Empty folder that receives the copy.
 
     Returns:
-        The submission; a file that is not there has `found` None and names that look like it.
+        The submission; a missing file has `found` None and the names that look like it.
 
     Raises:
-        SubmissionError: No such path, not a folder, archive or .py file, no .py file inside, a limit is exceeded, or an
-            archive cannot be used.
+        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
+            is exceeded, or an archive cannot be used.
         HarnessError: The copy cannot be written.
     """
     return stage_collected(collect_submission(path, wanted, into), path, wanted, into)
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
-    """Read a submission without writing anything; as `stage_submission`, which says what is raised.
+    """Read a submission without writing anything; raises what `stage_submission` raises.
 
     Args:
-        path: As there.
-        wanted: As there.
-        into: Where the files will be copied; if that lies in the student's folder, it is no part of the submission.
+        path: As for `stage_submission`.
+        wanted: As for `stage_submission`.
+        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
     """
     where = shown(path, 500)
     source = Path(path)
@@ -65,11 +65,11 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 
 
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
-    """Write what was read of a submission, and find the wanted files in it.
+    """Write the files that were read, and find the wanted ones among them.
 
     Args:
-        collected: What was read, here or on another machine.
-        path: What the submission is called; nothing needs to be there any more.
+        collected: The files, read here or on another machine.
+        path: Name of the submission; it need not exist any more.
         wanted: As for `stage_submission`.
         into: As for `stage_submission`.
 
@@ -109,7 +109,7 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
     content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
     kind = archive_kind(content[:HEAD_BYTES])
-    # By chance or on purpose, a program may look like an old tar.
+    # A program may look like an old tar archive, by chance or on purpose.
     if source.suffix.casefold() == ".py" and kind in (None, "tar"):
         if len(content) > MAX_FILE_BYTES:
             raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
@@ -120,7 +120,7 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
 
 
 def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
-    """Return what holds .py files: this, or the only archive in it."""
+    """Return the files if there are .py files among them, or else those of the only archive in them."""
     names = [name for name, _ in collected.files]
     if _has_python(names):
         return collected
@@ -155,7 +155,7 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
 
 
 def _name(source: Path) -> str:
-    """Return the name a report shows: the last part of the path, also for `.` and `..`."""
+    """Return the name that reports show: the last part of the path, also for `.` and `..`."""
     return source.name if source.name not in ("", "..") else source.resolve().name or "/"
 
 
@@ -178,7 +178,7 @@ def _several(file: StudentFile) -> str:
 
 
 def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:
-    """Return files that look like a misspelling of a wanted name, nearest first."""
+    """Return files whose name looks like a misspelling of a wanted name, nearest first."""
     plain = _plain(wanted)
     ranked = []
     for relative in files:
@@ -197,7 +197,7 @@ def _may_be_python(name: str) -> bool:
 
 
 def _plain(name: str) -> str:
-    """Return a file name without what people vary: case, separators, copy marks, extensions."""
+    """Return a file name without case, separators, copy marks and extensions."""
     stem = _EXTENSIONS.sub("", unicodedata.normalize("NFKC", name).casefold())
     return re.sub(r"[\W_]+", "", _COPY_MARK.sub("", stem))
 

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from grader.judging.checks import CHECKS
-from grader.rubrics.manuals import manual_of
+from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.model import StimulusShape
 
 GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "authors.md"

@@ -131,7 +131,7 @@ def printing(text: str = "sent", stream: str = "stdout") -> Recording:
 
 
 def hearing(topic: str = "/odom", type_: str = ODOMETRY, durability: str = "volatile") -> Recording:
-    """A node that listens and says nothing."""
+    """A node that subscribes and publishes nothing."""
     rec = driving()
     rec.items = [o for o in rec.items if not hasattr(o, "endpoints")]
     rec.ends = []
@@ -191,7 +191,7 @@ def _at(rec: Recording, line: int, delay_s: float = 0.0) -> Recording:
 
 
 def sensing(what: str = "drawn", period: float = 0.2, topic: str = "/temperature") -> Recording:
-    """A sensor alone, which never hears of a fan."""
+    """A sensor alone, without a fan."""
     rng = random.Random(5)
     values: dict[str, Callable[[int], float]] = {
         "drawn": lambda _: rng.uniform(20, 30),
@@ -207,7 +207,7 @@ def sensing(what: str = "drawn", period: float = 0.2, topic: str = "/temperature
 
 
 def fanned(what: str = "", topic: str = "/fan_speed", durability: str = "volatile", type_: str = FLOAT32) -> Recording:
-    """A sensor that is told fan speeds, and what it logs of them."""
+    """A sensor that receives fan speeds, and its logs of them."""
     rec = scripted((100.0, 0.0, 63.0, 17.0, 100.0), "/fan_speed", stop_s=12.2)
     rec.process = "temperature_sensor.py"
     rec.endpoint("publisher", "/temperature", FLOAT32, "/temperature_sensor")
@@ -288,7 +288,7 @@ def latching(until: float = 0.0) -> Recording:
 
 
 def mute(hears: str = "/temperature") -> Recording:
-    """A controller that hears and never answers."""
+    """A controller that subscribes and never answers."""
     rec = scripted()
     rec.endpoint("publisher", "/fan_speed", FLOAT32, "/fan_controller")
     return rec.endpoint("subscription", hears, FLOAT32, "/fan_controller")

@@ -94,7 +94,7 @@ def test_goals_results_and_feedback(check: Any, rec: Recording, credit: int, sai
 
 
 def test_a_rejected_goal_has_no_feedback() -> None:
-    """The result's criterion says so."""
+    """The result's criterion reports it."""
     assert FEEDBACK.judge(one(accepted=False).trace()).blocked_by == "action_result"
 
 

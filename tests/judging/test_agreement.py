@@ -69,7 +69,7 @@ AGREE: dict[str, Program] = {
 
 @pytest.mark.parametrize("program", AGREE.values(), ids=AGREE)
 def test_a_program_that_is_the_same_agrees(program: Program) -> None:
-    """Chance, jitter, the time of day and what nobody had subscribed to yet are no differences."""
+    """Chance, jitter, the time of day and messages before any subscription are not differences."""
     assert aspects(program(virtual(), 0), program(wall(), 1)) == []
 
 
@@ -95,7 +95,7 @@ def _logging(builder: TraceBuilder) -> TraceBuilder:
 
 @pytest.mark.parametrize(("aspect", "program"), DIFFER.values(), ids=DIFFER)
 def test_a_program_that_is_another_differs(aspect: Aspect, program: Program) -> None:
-    """The first difference is of the kind that shows it, and is told in one sentence."""
+    """The first difference is of the expected kind, and is reported in one sentence."""
     found = differences(program(virtual(), 0).trace(), program(wall(), 1).trace())
     assert aspect in [d.aspect for d in found]
     assert sentence(found[0], ClockKind.VIRTUAL).startswith("the node behaved differently on the wall clock: ")

@@ -101,7 +101,7 @@ def letters(n: int) -> str:
 
 @pytest.mark.parametrize("write", RIGHT.values(), ids=RIGHT)
 def test_any_fixed_way_of_writing_shows_the_speed(write: Write) -> None:
-    """However many numbers stand beside it; printed it is half."""
+    """The number of other numbers does not matter; printing gives half the points."""
     finding = SPEED.judge(speeds(write).trace())
     assert finding.credit == 1, finding.reason
     assert SPEED.judge(speeds(write, printed=True).trace()).credit == Fraction(1, 2)
@@ -109,7 +109,7 @@ def test_any_fixed_way_of_writing_shows_the_speed(write: Write) -> None:
 
 @pytest.mark.parametrize("write", WRONG.values(), ids=WRONG)
 def test_numbers_that_are_written_whatever_comes_show_no_speed(write: Write) -> None:
-    """The reason says among how many the value stands, and the hint what to do; printed they show nothing either."""
+    """The reason counts the other numbers, and the hint tells what to do; printing does not help."""
     finding = SPEED.judge(speeds(write).trace())
     assert finding.credit == 0
     assert "values of /fan_speed are not told from other numbers" in finding.reason

@@ -173,7 +173,7 @@ def test_findings_are_plain_and_steady(check: Check, rec: Recording) -> None:
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.lists(OBSERVATIONS, max_size=25), st.sampled_from(list(ClockKind)), st.integers(0, 30 * NS_PER_S))
 def test_no_recording_makes_a_check_raise(observations: list[Any], clock: ClockKind, stop_ns: int) -> None:
-    """Whatever was observed, every check finds something or says that it was not asked."""
+    """Whatever was observed, every check returns a finding or raises HarnessError."""
     trace = Trace("alone", clock, stop_ns, tuple(sorted(observations, key=lambda o: o.t_ns)))
     for check in INSTANCES.values():
         finding = asked(check, trace)

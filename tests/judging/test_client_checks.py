@@ -123,7 +123,7 @@ def test_wrong_decisions_are_named(write: Callable[[Answer], Said], check: Check
 
 
 def test_the_threshold_itself_is_not_above() -> None:
-    """The hint says so where only that is wrong."""
+    """The hint names this if nothing else is wrong."""
     finding = BELOW.judge(asking(deciding(lambda v: v >= 20), (battery(84.5), battery(20.0), battery(15.0))).trace())
     assert "compare with > and not with >=" in finding.hint
     assert "warn(...)" in BELOW.judge(asking(low_is_info).trace()).hint

@@ -213,7 +213,7 @@ def right_programs(file: str) -> dict[str, str]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("file", "name", "arguments"), OTHERWISE)
 def test_right_programs_are_not_blamed(file: str, name: str, arguments: dict[str, Any]) -> None:
-    """Even where a recording says that they did wrong, what is right in the text is not called wrong."""
+    """Correct code is not called wrong, even if a recording shows a failure."""
     scenario, build = RECORDINGS[name]
     traces = {scenario: build(**arguments).trace(scenario)}
     programs = right_programs(file)

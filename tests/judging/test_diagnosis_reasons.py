@@ -30,7 +30,7 @@ def test_wrong_positions_are_shown_beside_the_right_ones(text: str, said: str) -
 
 
 def test_the_further_lines_of_an_exceptions_text_are_not_printing() -> None:
-    """They stand at the margin below the traceback, as printed lines do."""
+    """They are not indented below the traceback, as printed lines are not."""
     text = "InvalidTopicNameException: Invalid topic name: it must not contain a space: '/cmd vel' ^"
     rec = Recording(1.0, process="node.py").fault(0.0, FaultKind.EXCEPTION, text, 9)
     rows = ["Traceback (most recent call last):", "InvalidTopicNameException: Invalid topic name: it must not contain"]

@@ -50,7 +50,7 @@ def test_policies_of_an_endpoint(check: Qos, credit: int, said: str) -> None:
 
 
 def test_a_depth_that_nobody_tells_is_not_judged() -> None:
-    """The middleware leaves it out for some; a deadline is told."""
+    """The middleware leaves it out for some; a deadline is reported."""
     with pytest.raises(HarnessError):
         Qos("/a", "publisher", depth=10).judge(with_end(depth=0).trace())
     assert Qos("/a", "publisher", "best_effort", depth=10).judge(with_end(depth=0).trace()).credit == 0
@@ -132,7 +132,7 @@ def test_an_edge_needs_one_type_and_perhaps_two_processes_and_one_moment() -> No
 
 
 def test_no_fault_means_none_before_the_stop() -> None:
-    """Of the process named, or of any."""
+    """For one process, or for any."""
     assert NoFault().judge(talking().trace()).credit == 1
     found = NoFault().judge(talking().crashed(3.0).exited(4.0, 1).trace())
     assert found.reason == "t = 3.000 s: node.py:12: ValueError: no; 2 faults in all"

@@ -87,7 +87,7 @@ def test_the_first_violation_is_named_with_its_temperature() -> None:
     ],
 )
 def test_wrong_logic_is_recognised(name: str, side: int, said: str) -> None:
-    """Inverted and constant answers are said to be so."""
+    """The reason names inverted and constant answers."""
     assert said in both(each_speed(WRONG_FANS[name][0]))[side].reason
 
 
@@ -97,7 +97,7 @@ def test_rounding_is_recognised() -> None:
 
 
 def test_an_unsaid_first_state_must_be_said() -> None:
-    """Before any message nobody knows the state; the first temperature at or below must be answered."""
+    """Before any message the state is unknown; the first temperature at or below must be answered."""
     on, off = both(on_change(right_speed, 0.0))
     assert on.credit == 1
     assert off.credit == 0
@@ -105,7 +105,7 @@ def test_an_unsaid_first_state_must_be_said() -> None:
 
 
 def test_a_controller_that_stops_answering_loses() -> None:
-    """Stuck after 5 s: what it said last is no answer to later temperatures."""
+    """Stuck after 5 s: its last answer does not count for later temperatures."""
     rec = each_speed(right_speed)
     rec.items = [o for o in rec.items if type(o).__name__ != "Message" or o.t_ns < 5_000_000_000]
     assert earned(rec) == (0, 0)
@@ -145,7 +145,7 @@ def test_whole_number_types_are_tried_at_their_own_steps() -> None:
     ],
 )
 def test_no_answer_at_all_is_explained(rec: Recording, said: str) -> None:
-    """Whether it listened, what it published instead, how it ended; said once, and the other side waits for it."""
+    """Whether it subscribed, what it published instead, how it ended; reported once, and the other side is blocked."""
     for finding in both(rec):
         assert finding.credit == 0
         assert finding.blocked_by == "threshold_response"
@@ -186,7 +186,7 @@ def test_any_timer_up_to_a_second_is_met(period: float, phase: float) -> None:
 
 @pytest.mark.parametrize("lag", [0.6, 1.0, 3.0, 6.2])
 def test_answers_that_come_late_are_called_late(lag: float) -> None:
-    """They are wrong, but not because of the threshold, and nothing is said of it."""
+    """They are wrong, but not because of the threshold, so the reason does not mention it."""
     rec = scripted()
     for k in range(80):
         value = held_at(0.5 + 0.2 * k - lag)

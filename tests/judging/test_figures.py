@@ -25,8 +25,7 @@ from grader.core.chart import Chart, GraphFigure, Look, Tone
 from grader.core.exercise import Exercise
 from grader.core.submission import StudentFile, Submission
 from grader.core.trace import FaultKind, Mark, Request, Response, Trace
-from grader.judging.charts import expectation, figures_of, illustrated
-from grader.judging.charts.drawing import MOST_POINTS, MOST_TEXTS, kept_indices
+from grader.judging.charts import MOST_POINTS, MOST_TEXTS, expectation, figures_of, illustrated, kept_indices
 from grader.judging.checks import CHECKS
 from grader.judging.checks.rate import TopicRate
 from grader.judging.judge_run import judge_exercise
@@ -90,14 +89,14 @@ def test_logged_positions_lie_on_the_path() -> None:
 
 
 def test_wrong_positions_are_drawn_as_wrong() -> None:
-    """Swapped x and y are off the path, and say so."""
+    """Swapped x and y are drawn off the path, and the caption mentions it."""
     trace = position_logs(lambda x, y: f"x={y:.3f} y={x:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
     assert [s.tone for s in chart.panels[0].series] == [Tone.FAINT, Tone.BAD]
 
 
 def test_a_position_far_away_does_not_shrink_the_path() -> None:
-    """It is told in words."""
+    """The caption describes it."""
     trace = position_logs(lambda x, y: f"x={1000 * x + 9000:.3f} y={y:.3f}").trace("waiting_then_driving")
     chart = titled(figures_of(TWO, {"waiting_then_driving": trace}), "The path")
     assert len(chart.panels[0].series) == 1
@@ -164,7 +163,7 @@ def test_the_timeline_has_a_row_for_each_kind_of_thing() -> None:
 
 
 def test_the_timeline_has_a_row_for_each_service_that_was_called() -> None:
-    """Requests and responses with what they say, and when servers and processes came and went."""
+    """Requests and responses with their content, and when servers and processes appeared and ended."""
     kind, value = "std_srvs/srv/Trigger", {"message": "85.0"}
     asked = Request(10**9, "/battery", kind, 1, "grader", 1, {})
     answered = Response(2 * 10**9, "/battery", kind, 1, "student", 1, value)

@@ -125,7 +125,7 @@ def test_no_message_is_explained() -> None:
 
 
 def test_time_may_stand_in_a_formula_and_jitters_on_the_wall_clock() -> None:
-    """T counts from the first message; 50 ms are let pass where a machine may be late."""
+    """T counts from the first message; on the wall clock, 50 ms are accepted."""
     check = FieldFunction("/cmd_vel", "2 * t", field="linear.x", tolerance=0.001)
     for clock, late, credit in (
         (ClockKind.VIRTUAL, 0.0, 1),

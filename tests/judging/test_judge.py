@@ -1,4 +1,4 @@
-"""Judging an exercise: points, blocking, missing files, faults and what nobody knows."""
+"""Judging an exercise: points, blocking, missing files, faults and undecided criteria."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SECOND = 1_000_000_000
 
 @dataclass(frozen=True)
 class Says:
-    """A check that finds what it is told to find."""
+    """A check that returns a given finding."""
 
     credit: Fraction = Fraction(1)
     blocked_by: str | None = None
@@ -134,7 +134,7 @@ def test_a_finding_can_name_what_blocks_it() -> None:
 
 
 def test_two_findings_that_wait_for_each_other_are_not_both_blocked() -> None:
-    """One of them must say what is wrong."""
+    """One of them must name the cause."""
     given = judged(criterion("a", Says(Fraction(0), blocked_by="b")), criterion("b", Says(Fraction(0), blocked_by="a")))
     assert [v.outcome for v in given.values()] == [Outcome.NOT_MET, Outcome.BLOCKED]
 
@@ -149,7 +149,7 @@ def test_a_finding_can_name_the_kind_of_check_that_blocks_it() -> None:
 
 
 def test_the_kind_of_check_that_blocks_may_ask_about_another_scenario_of_the_same_files() -> None:
-    """A client that asks no more in one situation asked no more in the other: it is told once."""
+    """A client that stops calling in one scenario also stops in the other: it is reported once."""
     rate = CHECKS["topic_rate"]("/temperature", 5.0, 0.25, 10 * SECOND)
     scenarios = tuple(Scenario(name, files, Span(SECOND)) for name, files in (("a", (FILE,)), ("b", (FILE,))))
     criteria = (criterion("pace", rate, scenario="a"), criterion("late", Says(Fraction(0), "topic_rate"), scenario="b"))
@@ -172,14 +172,14 @@ def test_a_failed_recording_leaves_everything_undecided() -> None:
 
 
 def test_what_cannot_be_asked_waits_for_the_criterion_that_it_needs() -> None:
-    """A server of the wrong type is never called: that is the student's to mend, and no fault of the machine."""
+    """A server of the wrong type is never called: that is the student's mistake, not a failure of the machine."""
     given = judged(criterion("a", Says(Fraction(0))), criterion("b", Raises(), "a"))
     assert [v.outcome.value for v in given.values()] == ["not_met", "blocked"]
     assert given["b"].reason == "not judged: needs a (not met)"
 
 
 def test_what_needs_an_undecided_criterion_is_undecided() -> None:
-    """Nobody knows whether it could have been judged."""
+    """It is unknown whether it could have been judged."""
     given = judged(criterion("a", Raises()), criterion("b", Says(), "a"), criterion("c", Says()))
     assert [v.outcome.value for v in given.values()] == ["undecided", "undecided", "met"]
     assert given["b"].reason == "not judged: needs a (undecided)"

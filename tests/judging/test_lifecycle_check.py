@@ -56,7 +56,7 @@ def living(
     ],
 )
 def test_transitions_states_and_silence(rec: Recording, credit: int, said: str) -> None:
-    """What comes at the very instant of a transition is let pass."""
+    """Messages at the instant of a transition are accepted."""
     finding = CHECK.judge(rec.trace())
     assert finding.credit == credit, finding.reason
     assert said in finding.reason

@@ -64,7 +64,7 @@ RIGHT = {
 
 @pytest.mark.parametrize("rec", RIGHT.values(), ids=RIGHT)
 def test_one_log_for_ten_messages_is_met(rec: Recording) -> None:
-    """Whatever it says, and with whichever message it begins."""
+    """With any wording, and starting at any message."""
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 1, finding.reason
 
@@ -100,7 +100,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("rec", "said"), WRONG.values(), ids=WRONG)
 def test_another_rhythm_is_not(rec: Recording, said: str) -> None:
-    """The reason says which, and what was expected."""
+    """The reason names it, and the expected value."""
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0
     assert said in finding.reason
@@ -109,7 +109,7 @@ def test_another_rhythm_is_not(rec: Recording, said: str) -> None:
 
 
 def test_printing_in_the_rhythm_is_half() -> None:
-    """The hint says how to log; printing in another rhythm is nothing."""
+    """The hint tells how to log; printing at another rate earns nothing."""
     finding = CHECK.judge(written(chapter, printed=True).trace())
     assert finding.credit == Fraction(1, 2)
     assert "self.get_logger().info" in finding.hint

@@ -108,7 +108,7 @@ def test_wrong_conversions_are_named(write: Callable[[float], str], said: str) -
 
 
 def test_messages_that_are_left_out_are_counted() -> None:
-    """Every tenth is not each; a share may be enough where the rubric says so."""
+    """Every tenth is not each; a share is enough if the rubric allows it."""
     rec = hearing(chapter, when=lambda k: k % 2 == 0)
     finding = CHECK.judge(rec.trace())
     assert finding.credit == 0

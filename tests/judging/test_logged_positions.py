@@ -83,7 +83,7 @@ def test_values_of_other_fields_are_recognised(cause: str, text: str) -> None:
 
 
 def test_positions_that_lag_are_said_to_lag() -> None:
-    """A node that works through a long queue logs old poses; by how much is said."""
+    """A node that works through a long queue logs old poses; the reason tells by how much."""
     rec = driving()
     for k in range(13):
         rec.log(8.0 + k, plain(*pose_at(6.0 + k)[:2]))
@@ -231,7 +231,7 @@ def test_positions_of_another_place_never_count(name: str, dx: float, dy: float)
 
 
 def test_an_exit_in_the_middle_is_the_reason_for_a_broken_period() -> None:
-    """Logs that stop with the process say so."""
+    """If logs stop because the process ended, the reason mentions it."""
     rec = position_logs(plain, [6.0 + k for k in range(5)]).exited(10.5)
     finding = PERIOD.judge(rec.trace())
     assert finding.credit == 0

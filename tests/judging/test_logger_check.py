@@ -27,7 +27,7 @@ def test_a_record_of_any_severity_is_met(severity: str) -> None:
 
 
 def test_printing_is_half() -> None:
-    """The hint says how to log."""
+    """The hint tells how to log."""
     for stream in ("stdout", "stderr"):
         finding = CHECK.judge(Recording().line(1.0, "hello", stream).trace())
         assert finding.credit == Fraction(1, 2)
@@ -43,7 +43,7 @@ def test_nothing_is_nothing() -> None:
 
 
 def test_a_quotation_is_the_same_in_every_run() -> None:
-    """An object that is printed tells where it lay in memory; the report leaves that out."""
+    """The repr of an object contains its address; the report leaves that out."""
     finding = CHECK.judge(Recording().log(1.0, "made <node.Talker object at 0x7f3a5c0d1e50>").trace())
     assert finding.reason.endswith("made <node.Talker object>")
 

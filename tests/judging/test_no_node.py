@@ -19,7 +19,7 @@ def nobody() -> Recording:
 
 
 def test_a_file_that_is_no_node_earns_nothing() -> None:
-    """Neither by logging nor by printing; the hint says what to do."""
+    """Neither logged nor printed; the hint tells what to do."""
     for rec in (nobody().log(1.0, "speed 1"), nobody().line(1.0, "speed 1"), nobody().line(0.0, "speed 1").exited(0.0)):
         for check in (CHECK, MATCHING):
             finding = check.judge(rec.trace())

@@ -106,7 +106,7 @@ def test_no_fault_is_graceful(kind: FaultKind) -> None:
 
 
 def test_silence_after_the_data_came_leaves_the_question_open() -> None:
-    """Alive, but no sign that it works: the position criterion says what is wrong."""
+    """Alive, but without a sign that it works: the position criterion names the mistake."""
     finding = WAITS.judge(driving().log(0.0, "started").trace())
     assert finding.blocked_by == "logs_position"
     assert "no sign that the data arrived" in finding.reason
@@ -121,7 +121,7 @@ def test_a_recording_without_the_silence_cannot_be_judged() -> None:
 
 
 def test_waiting_that_goes_on_as_before_is_no_sign_of_data() -> None:
-    """A node that never spins says that it waits, before the data and after."""
+    """A node that never spins logs that it waits, before the data and after."""
     rec = driving()
     for t in range(1, 24):
         rec.log(float(t), "waiting for odometry", process="odom_subscriber.py")

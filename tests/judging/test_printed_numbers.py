@@ -44,7 +44,7 @@ def values(text: str) -> list[float]:
     ],
 )
 def test_numbers_in_text(text: str, found: list[float]) -> None:
-    """Numbers are read in every common notation; digits of names, addresses and colours are none."""
+    """Numbers are read in every common notation; digits of names, addresses and colours are ignored."""
     assert values(text) == pytest.approx(found)
 
 

@@ -77,7 +77,7 @@ def test_every_rule_is_recognised(rule: Callable[[int], float], named: str) -> N
 
 
 def test_a_few_values_are_only_asked_whether_they_differ() -> None:
-    """Nothing can be said about three values."""
+    """Three values are too few for a judgement."""
     assert pattern_of([]) is None
     assert pattern_of([25.0]) is None
     assert pattern_of([25.0, 25.0]) == "constant"

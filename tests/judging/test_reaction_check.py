@@ -81,7 +81,7 @@ def test_right_reactions_are_met(rec: Recording) -> None:
 
 
 def test_the_old_goal_may_go_on_until_the_next_period() -> None:
-    """A node on a timer of half a second says the old thing once more."""
+    """A node on a timer of half a second publishes the old value once more."""
     check = Reaction(CHECK.input, CHECK.output, CHECK.cases[:2], tolerance=0.01)
     rec = planner(
         lambda w: [(0.1, goal(0.0, 0.0)), *((d, v) for _, v in at_once(w) for d in (0.6, 1.1, 1.6))],

@@ -61,7 +61,7 @@ def test_the_edges_are_inside(edge: float) -> None:
 
 @pytest.mark.parametrize("value", [25.0, 22.5])
 def test_a_constant_is_not_random(value: float) -> None:
-    """The value and the count are said."""
+    """The reason has the value and the count."""
     finding = RANGE.judge(sensed([value] * 60).trace())
     assert finding.credit == 0
     assert f"constant, {value:g} °C in all 60 messages" in finding.reason
@@ -74,7 +74,7 @@ def test_a_ramp_is_not_random() -> None:
 
 
 def test_one_value_leaves_the_question_open() -> None:
-    """Chance cannot be seen in one value; the rate says what is wrong."""
+    """Chance cannot be seen in one value; the rate criterion names the mistake."""
     assert RANGE.judge(sensed([25.3]).trace()).blocked_by == "topic_rate"
     assert RANGE.judge(sensed([25.3, 21.0]).trace()).credit == 1
     assert RANGE.judge(sensed([25.0, 25.0]).trace()).blocked_by == "topic_rate"

@@ -129,7 +129,7 @@ def test_the_words_and_the_numbers_are_two_questions() -> None:
 
 
 def test_a_field_at_its_default_was_forgotten() -> None:
-    """The hint says where it is set."""
+    """The hint names the place where it is set."""
     hint = RESPONSE.judge(answering(9, WRONG_TEXTS["no success"]).trace()).hint
     assert hint == "set response.success before the response is returned"
     assert RESPONSE.judge(answering(9, WRONG_TEXTS["two decimals"]).trace()).hint == ""
@@ -206,7 +206,7 @@ def test_a_slow_answer_is_late_on_one_clock_and_let_pass_on_the_other() -> None:
 
 
 def test_what_cannot_have_been_answered_yet_is_left_out() -> None:
-    """A request at the very end is nobody's fault."""
+    """A request at the very end needs no answer."""
     rec = answering(5)
     rec.request(29.9, BATTERY, 6)
     assert ALL.judge(rec.trace()).credit == 1

@@ -149,7 +149,7 @@ def test_a_sleep_elsewhere_is_none_in_a_callback(text: str) -> None:
 
 
 def test_globals_can_be_forbidden() -> None:
-    """Only where the rubric says so."""
+    """Only if the rubric sets it."""
     text = PLAIN.replace(TICK, TICK + "global count\n        ")
     finding = SourceAvoids("node.py", globals=True).judge_sources(Recording().trace(), {"node.py": text})
     assert (finding.credit, finding.location) == (0, Location("node.py", 11))
@@ -172,7 +172,7 @@ def test_what_cannot_be_read_is_the_students_only_with_a_syntax_error() -> None:
 
 
 def test_an_exercise_hands_over_the_files() -> None:
-    """The place is that of the file in the submission; without texts nobody knows."""
+    """The place is that of the file in the submission; without texts it is unknown."""
     text = PLAIN.replace(TICK, TICK + "time.sleep(1)\n        ").replace("import rclpy\n", "import rclpy, time\n")
     row = Criterion("calm", "Calm", Fraction(5), "alone", SLEEPS)
     scenario = Scenario("alone", ("node.py",), Span(NS_PER_S))

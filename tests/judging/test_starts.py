@@ -34,5 +34,5 @@ def test_only_what_is_not_ordinary_is_noted(way: StartWay, target: str, notes: t
     ],
 )
 def test_a_message_that_reads_like_parts_of_a_reason_is_quoted(text: str, told: str) -> None:
-    """A semicolon separates what the grader says: an exception cannot go on in its place."""
+    """A semicolon separates the grader's own words: the text of an exception cannot follow it."""
     assert fault_sentence(Fault(0, "a.py", FaultKind.EXCEPTION, text, "a.py", 3)) == told

@@ -80,7 +80,7 @@ def test_every_wrong_rule_is_found(seed: int, way: Callable[..., Recording], nam
 @pytest.mark.parametrize("way", [together, on_change])
 @pytest.mark.parametrize("until", [0.3, 5.0, 15.0])
 def test_a_controller_that_stops_is_found(way: Callable[..., Recording], until: float) -> None:
-    """What it said last does not fit for long."""
+    """Its last answer stops fitting soon."""
     finding = CHECK.judge(way(until=until).trace())
     assert finding.credit == 0
     assert "nothing after" in finding.reason
@@ -201,7 +201,7 @@ def test_silence_is_explained() -> None:
 
 @pytest.mark.parametrize(("behind", "said"), [(2, "2 messages before"), (7, "7 messages before")])
 def test_answers_to_an_earlier_value_are_recognised(behind: int, said: str) -> None:
-    """A controller that compares what it stored last time is told so."""
+    """A controller that compares the previously stored value gets a hint."""
     rec, sent = sensor()
     for k, (t, _) in enumerate(sent):
         rec.number(

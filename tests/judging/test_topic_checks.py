@@ -48,7 +48,7 @@ def test_one_message_is_enough() -> None:
     ],
 )
 def test_the_nearest_thing_is_named_when_nothing_was_published(rec: Recording, said: list[str]) -> None:
-    """Other topic, other type, idle publisher, fault, or nothing: the reason says which."""
+    """Other topic, other type, idle publisher, fault, or nothing: the reason names it."""
     rec.message(1.0, "/rosout", {}, "rcl_interfaces/msg/Log")
     finding = PUBLISHES.judge(rec.trace())
     assert finding.credit == 0
@@ -88,7 +88,7 @@ def test_right_values_are_met() -> None:
     ],
 )
 def test_a_wrong_field_is_named_with_its_likely_slip(check: FieldValues, value: dict[str, Any], hint: str) -> None:
-    """Sign, place and unit are recognised; where nothing is sure nothing is said."""
+    """Sign, place and unit are recognised; in unclear cases there is no hint."""
     finding = check.judge(velocity(**value).trace())
     assert finding.credit == 0
     assert hint in finding.hint
@@ -98,7 +98,7 @@ def test_a_wrong_field_is_named_with_its_likely_slip(check: FieldValues, value: 
 
 
 def test_the_first_wrong_message_is_named() -> None:
-    """One wrong message among many is enough, and its time is said."""
+    """One wrong message among many is enough, and the reason has its time."""
     rec = velocity().message(4.02, "/cmd_vel", twist((0, 0, 0)), TWIST)
     finding = LINEAR.judge(rec.trace())
     assert finding.reason == "t = 4.020 s, /cmd_vel: linear.x is 0, expected 0.5; wrong in 1 of 201 messages"
@@ -114,7 +114,7 @@ def test_a_message_without_the_field_earns_nothing() -> None:
 
 @pytest.mark.parametrize("value", ["0.5", True, None, [0.5], {"x": 0.5}])
 def test_only_numbers_are_numbers(value: Any) -> None:
-    """A string, a bool or a list in a field is none."""
+    """A string, a bool or a list in a field is not a number."""
     message = {"linear": {"x": value, "y": 0.0, "z": 0.0}}
     assert LINEAR.judge(Recording().message(1.0, "/cmd_vel", message, TWIST).trace()).credit == 0
 

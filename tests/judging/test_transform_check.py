@@ -80,7 +80,7 @@ def test_a_static_one_comes_once() -> None:
 
 
 def test_frames_the_wrong_way_round_and_crashes_are_named() -> None:
-    """The hint says which is which."""
+    """The hint tells which is which."""
     finding = CHECK.judge(sent(parent="laser", child="base_link").trace())
     assert finding.hint == "header.frame_id is the parent, base_link, and child_frame_id is laser"
     assert FAULT_KEY in CHECK.judge(Recording().crashed(0.0).trace()).evidence

@@ -340,7 +340,7 @@ def test_members_that_share_their_bytes_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_declared_size_is_not_believed(tmp_path: Path) -> None:
-    """A member that says one byte and holds a mebibyte, and the other way round, is damaged."""
+    """A member that declares one byte and holds a mebibyte, or the other way round, is damaged."""
     for number, size in enumerate((1, 7 << 20)):
         data = bytearray(zipped({"velocity_publisher.py": b"#" * (1 << 20)}))
         for mark, at in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
@@ -350,7 +350,7 @@ def test_a_declared_size_is_not_believed(tmp_path: Path) -> None:
 
 
 def test_an_xz_that_asks_for_gigabytes_of_memory_is_refused(tmp_path: Path) -> None:
-    """The size of the window is what the archive says; only a bounded one is given."""
+    """The archive sets the size of the window; only a limited one is allocated."""
     filters = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 16 << 20}]
     data = bytearray(lzma.compress(tarred(FILES), filters=filters))
     # Byte 17 of the first block's header is the size of the window; 39 means 3 GiB. The header's checksum follows it.
@@ -403,7 +403,7 @@ def test_an_archive_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> No
     ],
 )
 def test_what_is_no_usable_archive_is_told(tmp_path: Path, data: bytes, name: str, found: str) -> None:
-    """What was found decides, not the name; each refusal says what to hand in instead."""
+    """The content decides, not the name; each error names what to submit instead."""
     if found.endswith("none"):
         with pytest.raises(SubmissionError, match=found):
             hand_in(tmp_path, data, name)
@@ -414,7 +414,7 @@ def test_what_is_no_usable_archive_is_told(tmp_path: Path, data: bytes, name: st
 
 
 def test_an_encrypted_zip_is_told(tmp_path: Path) -> None:
-    """The flag is enough: nobody is asked for a password."""
+    """The flag is enough: there is no password prompt."""
     data = bytearray(zipped(FILES))
     at = -1
     while (at := data.find(b"PK\x01\x02", at + 1)) >= 0:

@@ -105,7 +105,7 @@ def test_parameters_of_every_kind_are_read(tmp_path: Path, written: str, wanted:
     ],
 )
 def test_what_cannot_be_read_is_refused_at_its_place(tmp_path: Path, written: str, said: str) -> None:
-    """Line and column, and what should stand there."""
+    """Line and column, and what was expected there."""
     with pytest.raises(RubricError) as raised:
         read(tmp_path, written)
     assert said in raised.value.message

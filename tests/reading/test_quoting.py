@@ -11,7 +11,7 @@ from grader.submissions.collected import listed, shown
 
 @given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))
 def test_shown_text_is_one_short_printable_line(text: str, limit: int) -> None:
-    """Whatever goes in, lone surrogates too, the result is printable, encodable and no longer than asked."""
+    """For any input, including lone surrogates, the result is printable, encodable and no longer than asked."""
     line = shown(text, limit)
     assert line.isprintable()
     assert len(line) <= limit

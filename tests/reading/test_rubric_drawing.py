@@ -1,4 +1,4 @@
-"""What a rubric leaves to the seed besides values: how it is written, and what is said of a mistake in it."""
+"""Parts of a rubric drawn from the seed besides values: their syntax, and the messages about mistakes in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a rubric says about feedback: for the whole, for one criterion, and from when on all is shown."""
+"""Feedback in a rubric: for the whole, for one criterion, and until which day."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_without_a_word_all_is_shown(feedback: Callable[..., Any]) -> None:
 
 
 def test_the_rubric_speaks_for_criteria_that_say_nothing(feedback: Callable[..., Any]) -> None:
-    """What a criterion says goes before it, in either direction."""
+    """A criterion's own setting takes precedence, in either direction."""
     assert feedback(top="feedback: outcome_only", one="feedback: all") == [OPEN, Feedback(Shows.OUTCOME)]
 
 

@@ -88,7 +88,7 @@ def refused(rubric: Callable[..., Any], content: bytes | str) -> RubricError | R
 
 
 def criterion(*values: Any) -> Criterion:
-    """Return a criterion; the stand-ins are no checks, for they judge nothing."""
+    """Return a criterion; the stand-ins have no judge method."""
     return Criterion(*values)
 
 
@@ -204,7 +204,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(rubric: Callable
 
 
 def test_a_file_full_of_mistakes_is_cut_short(rubric: Callable[..., Any]) -> None:
-    """A page of messages helps nobody."""
+    """A page of messages helps no author."""
     text = GOOD + "".join(f"key{number}: 1\n" for number in range(50))
     assert len(refused(rubric, text).message.splitlines()) == MAX_MISTAKES + 1
 
@@ -232,7 +232,7 @@ def test_what_is_no_rubric_at_all_is_one_line(rubric: Callable[..., Any], conten
 
 
 def test_aliases_that_multiply_are_refused(rubric: Callable[..., Any]) -> None:
-    """A small file that stands for a billion values is not unfolded."""
+    """A small file that expands to a billion values is rejected."""
     rows = ["a: &a [x, x, x, x, x, x, x, x, x, x]"]
     rows += [f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]" for a, b in zip("abcdefgh", "bcdefghi", strict=True)]
     assert "found aliases that multiply it" in refused(rubric, "\n".join(rows)).message

@@ -1,4 +1,4 @@
-"""The limits of a rubric: what they come to, and what their author is told about a mistake in them."""
+"""The limits of a rubric: their values, and the messages about mistakes in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stimuli and scenarios of rubric files: what can be written, and what is said of a mistake, with its place."""
+"""Stimuli and scenarios of rubric files: what can be written, and the message and place of each mistake."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ stimuli:
 
 
 def test_parameters_and_transitions_are_calls(scenario: Callable[..., Any]) -> None:
-    """Of the services behind them; without a node it is the only one."""
+    """The equivalent service calls; without `node` the only node is meant."""
     found = scenario("""\
 stimuli:
   - parameter: {name: speed, set: 0.5, start: 2 s}
@@ -180,7 +180,7 @@ CALLS = "stimuli:\n  - calls: {service: /a, type: std_srvs/srv/Trigger, %s}"
     ],
 )
 def test_a_mistake_is_named_with_its_place(scenario: Callable[..., Any], lines: str, message: str) -> None:
-    """Line and column of what is wrong, here behind the bar, and what should stand there."""
+    """Line and column of the mistake, here behind the bar, and what was expected."""
     before = lines.partition("|")[0].split("\n")
     place = f"{HEAD.count(chr(10)) + len(before)}:{5 + len(before[-1])}"
     with pytest.raises(RubricError) as refused:

@@ -96,7 +96,7 @@ def test_it_is_the_rubric_with_the_values_written_out(read: Callable[..., Any]) 
 
 
 def test_without_a_student_such_a_rubric_is_refused(read: Callable[..., Any]) -> None:
-    """The message says what to add."""
+    """The message tells what to add."""
     with pytest.raises(RubricError) as refusal:
         read()
     assert refusal.value.message == "r.yaml:4:1: expected a student, because this rubric has variants, found none"
@@ -104,7 +104,7 @@ def test_without_a_student_such_a_rubric_is_refused(read: Callable[..., Any]) ->
 
 
 def test_what_was_graded_can_be_judged_without_the_key(read: Callable[..., Any]) -> None:
-    """Kept values are taken as they are; one that was not kept is told by name."""
+    """Kept values are used unchanged; the message names one that was not kept."""
     graded = read(draw=Nth(3))
     kept = {"pump": dict(graded.variant.values)}
     assert read(draw=Recorded(Drawn("ada", kept))) == graded
@@ -164,7 +164,7 @@ def test_values_between_two_are_exact(
     ],
 )
 def test_a_mistake_is_named_with_its_place(read: Callable[..., Any], old: str, new: str, message: str) -> None:
-    """Whichever value is drawn: a rubric that only some students could be graded by is none."""
+    """For every drawn value: a rubric that fits only some students is invalid."""
     with pytest.raises(RubricError) as refusal:
         read(RUBRIC.replace(old, new), draw=First())
     assert f"r.yaml:{message}" in refusal.value.message

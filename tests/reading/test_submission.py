@@ -114,7 +114,7 @@ def test_another_file_is_not_taken_for_a_misspelling(work: Path, into: Path, nam
 
 
 def test_a_file_of_another_exercise_is_no_misspelling(work: Path, into: Path) -> None:
-    """`fan_controller2.py` stands beside `fan_controller.py`: neither is offered for the other."""
+    """`fan_controller2.py` is beside `fan_controller.py`: neither is suggested for the other."""
     put(work, "fan_controller.py")
     put(work, "fan_controller2.py")
     wanted = ("fan_controller.py", "fan_controllers.py")
@@ -421,7 +421,7 @@ def test_a_path_too_long_to_copy_is_skipped(work: Path, into: Path) -> None:
 
 
 def refuse(monkeypatch: pytest.MonkeyPatch, target: str) -> None:
-    """Make one name unreadable, as the system would for anybody but root."""
+    """Make one name unreadable, as the system does for everybody but root."""
     real = os.open
 
     def opened(path: Path | str, *arguments: int, **keywords: int) -> int | None:
@@ -519,7 +519,7 @@ def test_a_folder_exchanged_for_a_link_meanwhile_is_not_followed(
 
 
 def test_what_file_managers_leave_is_passed_over(work: Path, into: Path) -> None:
-    """Their files are nobody's work, and change no digest."""
+    """Their files are not part of the submission, and do not change the digest."""
     put(work, "velocity_publisher.py")
     for name in (".DS_Store", "sub/Thumbs.db", "desktop.ini", "._velocity_publisher.py"):
         put(work, name)

@@ -231,7 +231,7 @@ def crashed() -> Report:
 
 
 def undecided() -> Report:
-    """Return a report that is not final, made without walls."""
+    """Return a report that is not final, made without a sandbox."""
     lost = "the worker ended before the scenario did (signal 9)"
     environment = Environment("0.1.0", "jazzy", "7.1.6", "rmw_fastrtps_cpp", "3.11.9", "none")
     return report(

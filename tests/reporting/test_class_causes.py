@@ -140,7 +140,7 @@ def test_what_costs_more_comes_first_among_equals() -> None:
 
 
 def test_one_cause_shows_in_several_forms() -> None:
-    """Hints that say different things are shown apart, within one cause."""
+    """Hints with different content are shown separately, within one cause."""
     forms = [("every 20 s: 20 is the rate", 2), ("every 0.1 s, which is 10 Hz", 3)]
     reports = [report(criterion(hint=hint, evidence={"diagnosis": "period"})) for hint, n in forms for _ in range(n)]
     (cause,) = causes(list(enumerate(reports)))
@@ -176,7 +176,7 @@ def test_what_waits_for_a_missing_file_counts_with_it() -> None:
 
 
 def test_the_same_cause_in_two_criteria_is_one() -> None:
-    """The diagnosis says so in the very words that are looked for."""
+    """The diagnosis uses exactly the words that are looked for."""
     root = criterion("linear", evidence={"diagnosis": "exchanged"})
     other = criterion("angular", hint=same_as("linear"), evidence={"diagnosis": "exchanged"})
     (cause,) = causes([(0, report(root, other))])

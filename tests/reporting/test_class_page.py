@@ -16,8 +16,16 @@ from urllib.parse import unquote
 import class_reports
 import pytest
 
-from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RunFacts, StudentRow
-from grader.reporting.class_page.counts import distribution, exercise_counts
+from grader.reporting.class_page.contents import (
+    ClassPage,
+    Listing,
+    PageEntry,
+    PageLink,
+    RunFacts,
+    StudentRow,
+    distribution,
+    exercise_counts,
+)
 from grader.reporting.class_page.render import class_assets, page_link, render_class, result_link
 from grader.reporting.json_report import report_to_json
 
@@ -173,7 +181,7 @@ def test_scores_that_are_not_final_are_no_scores() -> None:
 
 
 def test_a_class_without_reports_has_a_page() -> None:
-    """Also one of nobody at all."""
+    """Also for a class without students."""
     for students in ((), (StudentRow("", "Zoë", status="nothing handed in"),)):
         found, data = parsed(*students)
         assert data["causes"] == []
@@ -234,7 +242,7 @@ def test_links_are_encoded_and_stay_in_the_folder(folder: str, link: str) -> Non
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "../x", "a//b", "", "https://x.example/", "a/../../b"])
 def test_other_pages_lie_in_the_folder(path: str) -> None:
-    """Whoever adds a page to the class cannot lead out of it."""
+    """A page added to the class cannot link out of it."""
     assert page_link(PageLink("t", path)) == ""
 
 
@@ -260,7 +268,7 @@ def test_the_page_stands_alone_or_shares_its_scripts() -> None:
 
 
 def test_the_table_is_a_table_for_whoever_listens() -> None:
-    """Headings with a scope, a caption, an order that is said, and a name for each control."""
+    """Headings with a scope, a caption, an announced order, and a name for each control."""
     found, _ = parsed(student())
     scopes = [v for t, n, v in found.attributes if (t, n) == ("th", "scope")]
     assert scopes.count("col") >= 15

@@ -139,7 +139,7 @@ def test_after_the_date_students_see_everything(name: str) -> None:
 
 
 def test_without_a_word_formats_for_platforms_are_for_students() -> None:
-    """Whoever runs the command reads the others."""
+    """The person who runs the command reads the others."""
     found = {name: SECRET in visible(name, rendered(name, sample(), LAYOUT, Readers(None, BEFORE))) for name in FORMATS}
     assert [name for name, there in found.items() if there] == ["json", "text", "html", "markdown", "junit"]
 
@@ -193,7 +193,7 @@ def test_an_outcome_alone_has_its_points() -> None:
 
 
 def test_a_reason_without_numbers_still_says_what_is_wrong() -> None:
-    """Words stand for numbers, hints with numbers go; the place in the student's own file stays."""
+    """Words replace numbers, hints with numbers go; the place in the student's own file stays."""
     numbers = for_student(sample(), BEFORE).exercises[0].verdicts[1]
     assert numbers.reason == "/flow: average rate: a rate, expected a rate over a time"
     assert numbers.hint == "use a timer"
@@ -201,7 +201,7 @@ def test_a_reason_without_numbers_still_says_what_is_wrong() -> None:
 
 
 def test_faults_are_shown_as_openly_as_what_is_judged_on_their_scenario() -> None:
-    """A program may tell in a fault whatever it was told there."""
+    """A fault's text may contain whatever the program received."""
     free = replace(fault("free", 8), text="ValueError: 12")
     whole = sample()
     whole = replace(whole, exercises=(replace(whole.exercises[0], faults=(*whole.exercises[0].faults, free)),))
@@ -221,7 +221,7 @@ def test_pictures_stay_where_nothing_of_their_scenario_is_withheld() -> None:
 
 
 def test_an_exercise_of_which_nothing_is_shown_is_gone() -> None:
-    """A note says so; the report can still be written in every format."""
+    """A note mentions it; the report can still be written in every format."""
     whole = sample()
     closed = dict.fromkeys([v.id for v in whole.exercises[0].verdicts], Feedback(Shows.NOTHING))
     whole = replace(whole, exercises=(replace(whole.exercises[0], feedback=closed),), pending=("pump",))
@@ -247,7 +247,7 @@ def test_gradescope_hides_in_its_own_way(until: str, visibility: str) -> None:
 
 
 def test_an_exit_code_tells_students_no_more_than_their_report() -> None:
-    """With --audience student what is told besides is of the same report."""
+    """With --audience student, other output is from the same report."""
     whole = sample()
     assert told(whole, Readers(None, BEFORE)) is whole
     assert told(whole, STUDENT) == for_student(whole, BEFORE)

@@ -27,13 +27,13 @@ def result(sample: Report) -> dict[str, Any]:
 
 
 def console_total(found: Mapping[str, Any]) -> float:
-    """Return what the reporter prints at the end of the log: the share of rows that passed, of the maximum."""
+    """Return the share of passed rows, of the maximum, as the reporter prints it at the end of the log."""
     passed = sum(test["status"] == "pass" for test in found["tests"])
     return float(passed / len(found["tests"]) * found["max_score"])
 
 
 def annotation_total(found: Mapping[str, Any]) -> float:
-    """Return what the reporter annotates: the sum of the rows."""
+    """Return the sum of the rows, as the reporter annotates it."""
     return float(sum(test["score"] for test in found["tests"]))
 
 
@@ -102,7 +102,7 @@ def test_rows_are_as_coarse_as_the_scores_allow() -> None:
 
 
 def test_scores_in_tiny_steps_are_rounded() -> None:
-    """Nobody reads ten thousand rows; the exact score stands beside them."""
+    """Ten thousand rows would be useless; the exact score is beside them."""
     odd = Verdict("a", "A", Outcome.PARTLY, Fraction(1000, 997), Fraction(30), "x")
     found = result(report(exercise("e", "1", "E", odd)))
     assert len(found["tests"]) == 30 <= MOST_ROWS

@@ -59,7 +59,7 @@ def test_rows_say_why() -> None:
 
 
 def test_the_last_row_has_no_points_and_tells_whether_the_result_is_final() -> None:
-    """An undecided result is not taken for a low one in silence."""
+    """An undecided result does not silently look like a low one."""
     last = result(undecided())["tests"][-1]
     assert (last["test-name"], last["passed"], last["max-score"]) == ("This result is not final", False, 0)
     assert last["isolation"] == "none"

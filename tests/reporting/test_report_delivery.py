@@ -54,7 +54,7 @@ def test_every_format_can_be_printed(
 def test_a_format_that_lacks_its_surroundings_is_refused_before_grading(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Nobody waits for a run whose result cannot be written."""
+    """The command fails before the run if its result cannot be written."""
     for name in HANDED_IN:
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(GraderError, match="classroom50: expected CLASSROOM, ASSIGNMENT"):

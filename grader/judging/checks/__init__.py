@@ -1,4 +1,4 @@
-"""The questions that a rubric can ask of a trace; CHECKS is the table of all of them."""
+"""The checks that rubrics can use; CHECKS lists all of them."""
 
 from grader.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
 from grader.judging.checks.clients import CallsOfClient, NoGoWithoutAnswer, ReactsToResponses, WaitsForService
@@ -22,7 +22,7 @@ from grader.judging.checks.timing import Latency, Period, Reaction, Silence
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
 
-#: Name in a rubric -> check; the fields of the class are the parameters.
+#: Name in a rubric -> check class; the fields of the class are the parameters.
 CHECKS: dict[str, type] = {
     "publishes": Publishes,
     "topic_rate": TopicRate,

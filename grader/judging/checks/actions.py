@@ -23,8 +23,8 @@ from grader.judging.values import (
     breach,
     broken_rules,
     published,
+    rules_text,
     shown,
-    told,
     value_at,
 )
 from grader.judging.wording import counted, listed, moment, nearest, number, quote, span
@@ -51,10 +51,10 @@ class ActionResult:
 
     Attributes:
         action: Action name as on the wire, e.g. `/fibonacci`.
-        status: How a goal has to end; `rejected` for one that must not be accepted.
+        status: Status with which a goal must end; `rejected` for one that must not be accepted.
         result: What is expected by field path of the result: a value, or `{equals, items, tolerance, low, high,
             pattern, example}`.
-        within: How long it may take from the goal to its result; free if left out.
+        within: Longest time from the goal to its result; free if left out.
     """
 
     action: str
@@ -65,12 +65,12 @@ class ActionResult:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        result = f" with {told(self.result)}" if self.result else ""
+        result = f" with {rules_text(self.result)}" if self.result else ""
         within = "" if self.within is None else f" within {number(seconds(self.within))} s"
         return f"every goal for {self.action} {self.status}{result}{within}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all goals end so; the reason names the first that does not."""
+        """Return full credit if all goals end as expected; the reason names the first that does not."""
         goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
         if not goals:
             return explain_no_action(trace, self.action)
@@ -82,10 +82,10 @@ class ActionResult:
                 reason = f"{moment(goal.request.t_ns)}, {self.action}, goal {place}: {flaw}"
                 return _unless_crashed(trace, not_met(reason, evidence, hint=hint), goal)
         reason = f"{self.action}: {counted(len(goals), 'goal')} {self.status}"
-        return met(f"{reason}{', ' + told(self.result) if self.result else ''}", evidence)
+        return met(f"{reason}{', ' + rules_text(self.result) if self.result else ''}", evidence)
 
     def _flaw(self, trace: Trace, goal: Call, results: Sequence[Call]) -> tuple[str, str]:
-        """Return what is wrong with the end of a goal, and a hint; empty if nothing is."""
+        """Describe what is wrong with the end of a goal, and a hint; empty if nothing is."""
         if goal.response is None:
             return "no answer to the goal", "spin the node, and return a GoalResponse from its goal callback"
         accepted = goal.response.value.get("accepted") is True
@@ -122,15 +122,15 @@ class ActionResult:
 
 @dataclass(frozen=True, slots=True)
 class ActionFeedback:
-    """While a goal is worked on, a student's action server publishes feedback: so often, rightly, and growing.
+    """While a goal runs, a student's action server publishes feedback: enough, with the right content, and growing.
 
     Attributes:
         action: Action name as on the wire.
-        at_least: Fewest messages of feedback for each goal.
-        at_most: Most messages of feedback for each goal; any number if left out.
-        fields: What is expected in each of them by field path of the feedback, as in `action_result`.
-        grows: Field path of a number that rises, or of a list that gets longer, from each to the next.
-        period: Average time expected from one to the next; free if left out.
+        at_least: Fewest feedback messages for each goal.
+        at_most: Most feedback messages for each goal; any number if left out.
+        fields: Expected fields of each message by field path, as in `action_result`.
+        grows: Field path of a number that rises, or of a list that gets longer, with each message.
+        period: Average time expected from one message to the next; free if left out.
         tolerance: Largest difference of the average, as a share of the period.
     """
 
@@ -146,7 +146,7 @@ class ActionFeedback:
     def expected(self) -> str:
         """What is expected, in one phrase."""
         grows = f", {self.grows} growing" if self.grows else ""
-        each = f", in each {told(self.fields)}" if self.fields else ""
+        each = f", in each {rules_text(self.fields)}" if self.fields else ""
         return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -230,7 +230,7 @@ def _size(message: Message, path: str) -> float | None:
 
 
 def _unless_crashed(trace: Trace, finding: Finding, goal: Call) -> Finding:
-    """Return the finding, or the fault that came after the goal was sent and explains it."""
+    """Return the finding, or the fault after the goal was sent that explains it."""
     fault = first_fault(trace)
     if fault is None or fault.t_ns < goal.request.t_ns:
         return finding
@@ -238,10 +238,10 @@ def _unless_crashed(trace: Trace, finding: Finding, goal: Call) -> Finding:
 
 
 def explain_no_action(trace: Trace, action: str) -> Finding:
-    """Return no credit and why no goal could be sent to an action.
+    """Return no credit with the reason why no goal could be sent to an action.
 
     Raises:
-        HarnessError: There was nothing to keep one from being sent.
+        HarnessError: Nothing prevented sending a goal.
     """
     fault = first_fault(trace)
     if fault is not None:
@@ -266,7 +266,7 @@ _TRANSITIONS: Mapping[int, str] = {
     6: "shutdown",
     7: "shutdown",
 }
-#: Where a transition leads.
+#: State after each transition.
 _LEADS_TO = {
     "configure": "inactive",
     "activate": "active",
@@ -278,15 +278,15 @@ _LEADS_TO = {
 
 @dataclass(frozen=True, slots=True)
 class LifecycleStates:
-    """A lifecycle node makes every transition it is asked for, tells the states expected, and publishes only if active.
+    """A lifecycle node makes every requested transition, reports the expected states, and publishes only while active.
 
-    The scenario has to ask: `transition` and `state`.
+    The scenario needs the stimuli `transition` and `state`.
 
     Attributes:
-        states: The states that it tells, in the order in which it was asked: `unconfigured`, `inactive`, `active` or
-            `finalized`; not looked at if left out.
-        topic: Topic that it publishes while active, and not otherwise; not looked at if left out.
-        node: Fully qualified name of the node; the one that was asked if left out.
+        states: The states that the node reports, in the order of the requests: `unconfigured`, `inactive`, `active` or
+            `finalized`; not checked if left out.
+        topic: Topic that the node publishes while active, and only then; not checked if left out.
+        node: Fully qualified name of the node; the one that the stimuli address if left out.
     """
 
     states: tuple[str, ...] = ()
@@ -301,7 +301,7 @@ class LifecycleStates:
         return f"every transition made{states}{topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of that holds; the reason names the first moment at which it does not."""
+        """Return full credit if all of this holds; the reason names the first violation."""
         changes, asked = self._calls(trace, "change_state"), self._calls(trace, "get_state")
         if not changes and not asked:
             return self._never_asked(trace)
@@ -343,7 +343,7 @@ class LifecycleStates:
         return ""
 
     def _publishing(self, trace: Trace, changes: Sequence[Call], evidence: dict[str, Any]) -> Finding | None:
-        """Return that it speaks out of turn or is mute when active; None if neither."""
+        """Return a finding if the node publishes while inactive, or does not while active; None otherwise."""
         topic = self.topic or ""
         jitter = JITTER_NS[trace.clock]
         spans = _active(changes, trace.stop_ns)
@@ -400,7 +400,7 @@ def _state(call: Call) -> str:
 
 
 def _active(changes: Sequence[Call], stop_ns: int) -> list[tuple[int, int]]:
-    """Return the spans of time in which the node is active; what is asked and answered at their edges is in doubt."""
+    """Return the intervals in which the node is active; the time of a transition itself is left out."""
     spans: list[tuple[int, int]] = []
     since: int | None = None
     for call in changes:

@@ -1,4 +1,4 @@
-"""Checks on a student's service client: how often it asks, that it waits, and what it does with the answers."""
+"""Checks on a student's service client: how often it calls, that it waits, and how it handles responses."""
 
 from __future__ import annotations
 
@@ -42,14 +42,15 @@ _WAIT_HINT = "wait in a loop: while not client.wait_for_service(timeout_sec=1.0)
 
 @dataclass(frozen=True, slots=True)
 class CallsOfClient:
-    """A student's client asks the grader's server so many times, with a period where one is given.
+    """A student's client sends the expected number of requests to the grader's server, with a period if one is given.
 
-    A gap may be longer by the time that its own response took. After a call without a response it may have any length.
+    A gap may be longer by the time that the server took to respond. After a call without a response, the gap may have
+    any length.
 
     Attributes:
         service: Service name as on the wire.
-        calls: How many requests there must be.
-        at_most: How many there may be, if more than `calls` are no mistake.
+        calls: Smallest number of requests.
+        at_most: Largest number of requests; `calls` if left out.
         period: Time expected from one request to the next; free if left out.
         tolerance: Largest difference of each gap from the period.
     """
@@ -69,7 +70,7 @@ class CallsOfClient:
         return f"{said}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if number and gaps are right; the reason names the first gap that is not."""
+        """Return full credit if number and gaps are right; the reason names the first wrong gap."""
         calls = calls_of(trace, self.service, "student")
         if not calls:
             return explain_no_client(trace, self.service)
@@ -92,7 +93,7 @@ class CallsOfClient:
         return not_met(reason, evidence, hint=f"wait {span(self.period or 0)} after each answer before asking again")
 
     def _wrong_gap(self, trace: Trace, calls: Sequence[Call]) -> tuple[int, int] | None:
-        """Return the number of the first call that another follows too soon or too late, and the gap."""
+        """Return the number of the first call whose gap to the next is wrong, and the gap."""
         slack = LATENESS_NS[trace.clock] + self.tolerance
         period = self.period or 0
         for place, (one, following) in enumerate(pairwise(calls), 1):
@@ -120,14 +121,15 @@ class CallsOfClient:
 
 @dataclass(frozen=True, slots=True)
 class WaitsForService:
-    """A client lives through the time before its server appears, says that it waits, and asks once it is there.
+    """A client survives the time before its server appears, logs that it waits, and calls once the server is there.
 
-    What it says is free, as long as it is no ERROR or FATAL record. Saying so by printing only is half of it.
+    The wording is free, but a record of severity ERROR or FATAL does not count. Printing it instead of logging gives
+    half the points.
 
     Attributes:
         process: File name of the client.
         service: Service name as on the wire.
-        within: How soon after the server appeared the first request must come.
+        within: Longest time from the server's appearance to the first request.
     """
 
     process: str
@@ -154,7 +156,7 @@ class WaitsForService:
         return self._said(trace, appears_ns, asked[0])
 
     def _gave_up(self, trace: Trace, appears_ns: int) -> Finding | None:
-        """Return that the client did not live through the wait, or took it for an error; None if it did neither."""
+        """Return a finding if the client ended while waiting, or logged an error; None otherwise."""
         fault = first_fault(trace, self.process)
         when = f"while {self.service} was not there"
         if fault is not None and fault.t_ns < appears_ns:
@@ -202,7 +204,7 @@ class WaitsForService:
         return not_met(f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT)
 
 
-#: A client that has not asked again for so long does not ask again.
+#: A client that has sent no request for this long is not expected to send another.
 _ASKS_AGAIN_NS = 5 * NS_PER_S
 _SAID = {
     CallKind.FAILED: "a response without success",
@@ -213,21 +215,21 @@ _SAID = {
 
 @dataclass(frozen=True, slots=True)
 class ReactsToResponses:
-    """A client goes on where a response holds a number above a threshold, and warns where it is at or below it.
+    """A client continues after a response with a number above a threshold, and warns if the number is at or below it.
 
-    To warn is a record of severity WARN or higher after the response and before the next request. To go on is to write
-    anything at all in that time, but no such record. Wording is free. Responses without success or without a number are
-    not asked about. Doing it by printing only is half of it.
+    A warning is a record of severity WARN or higher between the response and the next request. Continuing means any
+    output in that time without such a record. The wording is free. Responses without success or without a number are
+    ignored. Printing instead of logging gives half the points.
 
     Attributes:
         process: File name of the client.
         service: Service name as on the wire.
         threshold: Where the reaction changes; the threshold itself is not above.
-        side: Which side this criterion is about.
+        side: The side that this criterion judges.
         field: Path of the number, or of the text that holds it.
-        success: Path of the truth value without which a response is not asked about; `none` if there is none.
-        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if
-            left out.
+        success: Path of the truth value without which a response is ignored; `none` if there is none.
+        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if left
+            out.
     """
 
     process: str
@@ -247,7 +249,7 @@ class ReactsToResponses:
         return f"{self.process} {said}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every response on this side is reacted to rightly."""
+        """Return full credit if the reaction to every response on this side is right."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)
@@ -268,12 +270,12 @@ class ReactsToResponses:
         return self._explain(trace, wrong, evidence)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
-        """Return what is wrong with the reaction to a response; empty if nothing is."""
+        """Describe what is wrong with the reaction to a response; empty if nothing is."""
         if episode.kind is CallKind.LOW:
             return "" if complaints(episode.outputs) else "no record of severity WARN"
         before = episodes[episode.place - 2] if episode.place > 1 else None
         late = before is not None and before.kind is not CallKind.GOOD
-        # a client that looks at an answer when it asks again warns then about the one before
+        # a client that reads a response only when it calls again warns then about the previous one
         early = () if late else episode.awaiting
         warned = [r for r in complaints((*early, *episode.sure)) if not (late and r.t_ns <= episode.asked_ns)]
         if warned:
@@ -288,7 +290,7 @@ class ReactsToResponses:
         return met(reason, evidence)
 
     def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
-        """Return that warnings are printed: lines that come after low numbers only; empty if they are not."""
+        """Return that warnings are printed: lines that come only after low numbers; empty if they are not."""
         good = {s for e in episodes if e.kind is CallKind.GOOD for s in e.shapes}
         low = [e for e in mine if e.kind is CallKind.LOW]
         told = [_lines(e.outputs, good) for e in low]
@@ -329,22 +331,22 @@ class ReactsToResponses:
 
 @dataclass(frozen=True, slots=True)
 class NoGoWithoutAnswer:
-    """A client does not go on after an answer without success or without a number, or when no answer comes.
+    """A client does not continue after a response without success or without a number, or without any response.
 
-    What it writes when it goes on is learned from the responses above the threshold: texts of a shape that comes after
-    every one of them, and neither before the first response nor after a number at or below the threshold. None of these
-    may come in the time from a useless answer to the next request. A crash at such an answer is told and costs nothing.
-    The server should answer with a delay, so that what comes before an answer can be told from what comes after it, and
-    one of its numbers should be at or below the threshold; without these, what is not plain is let pass.
+    What the client writes when it continues is learned from the responses above the threshold: texts of a shape that
+    follows every one of them, and occurs neither before the first response nor after a number at or below the
+    threshold. None of these may come between a useless response and the next request. A crash at such a response is
+    reported and costs nothing. The server should respond with a delay, to separate output before and after a response,
+    and one of its numbers should be at or below the threshold; without these, unclear cases are accepted.
 
     Attributes:
         process: File name of the client.
         service: Service name as on the wire.
-        threshold: Numbers above it are what the client goes on with.
+        threshold: The client continues with numbers above it.
         field: Path of the number, or of the text that holds it.
-        success: Path of the truth value that says whether the number counts; `none` if there is none.
-        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if
-            left out.
+        success: Path of the truth value that tells whether the number counts; `none` if there is none.
+        pattern: Regular expression whose first group, or whole match, is the number in a text; its first number if left
+            out.
     """
 
     process: str
@@ -360,7 +362,7 @@ class NoGoWithoutAnswer:
         return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if nothing of what is written when going on comes after a useless answer."""
+        """Return full credit if no output that signals continuing follows a useless response."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)
@@ -381,18 +383,18 @@ class NoGoWithoutAnswer:
         return met(reason, evidence)
 
     def _going(self, trace: Trace, episodes: Sequence[Episode]) -> frozenset[str]:
-        """Return the shapes of what is written only when the client goes on."""
+        """Return the shapes of texts that are written only when the client continues."""
         good = [e for e in episodes if e.kind is CallKind.GOOD]
         low = [e for e in episodes if e.kind is CallKind.LOW]
         shapes = frozenset.intersection(*(e.shapes for e in good))
         shapes -= shapes_before(trace, self.process, self.service, cautious=not low)
         if low:
             return shapes.difference(*(e.shapes for e in low))
-        # without another case to compare with, what tells the answer itself says nothing about going on
+        # without another case to compare with, text that shows the response itself does not signal continuing
         return shapes - {shape_of(o.text) for e in good for o in e.outputs if _quotes(o, e)}
 
     def _due(self, episode: Episode, episodes: Sequence[Episode], found: Output, going: frozenset[str]) -> bool:
-        """Return whether what is written at the instant of asking still belongs to the good answer before."""
+        """Return whether output at the instant of a request still belongs to the previous good response."""
         before = episodes[episode.place - 2] if episode.place > 1 else None
         if before is None or before.kind is not CallKind.GOOD or found.t_ns > episode.asked_ns:
             return False
@@ -429,10 +431,10 @@ def _not_asked(trace: Trace, process: str, service: str) -> Finding:
 
 
 def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Episode]) -> Finding:
-    """Return no credit where a client ended or asked no more before an answer of the kind in question came.
+    """Return no credit if a client ended or stopped calling before a response of the needed kind came.
 
     Raises:
-        HarnessError: It did neither, so no such answer was sent.
+        HarnessError: Neither is true, so the server sent no such response.
     """
     last = episodes[-1]
     asked = f"{service}: {process} asked {counted(len(episodes), 'time')}"

@@ -1,4 +1,4 @@
-"""The check on a controller that switches at a threshold, tried on scripted numbers."""
+"""The check on a controller that switches at a threshold, tested with scripted numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Trace
-from grader.judging.charts.drawing import (
+from grader.judging.charts import (
     answer_panel,
     happenings,
     input_panel,
@@ -38,19 +38,19 @@ from grader.judging.values import (
 )
 from grader.judging.wording import counted, moment, number, numbers, quote, span, unit_of
 
-#: How long after a new input an answer to the one before is still accepted.
+#: How long after a new input the answer to the previous one is still accepted.
 _GRACE_NS = 300 * NS_PER_MS
 #: The same for a controller that answers on a timer: one of its periods, at most this.
 _LONGEST_GRACE_NS = 1_200 * NS_PER_MS
-#: A controller that speaks at least this often repeats itself; silence then means that it stopped.
+#: A controller that publishes at least this often repeats itself; silence then means that it stopped.
 _REPEATING_NS = 1_200 * NS_PER_MS
-#: So many answers, and this share of them, that come in the instant of an input are no timer's.
+#: With this many answers, and this share of them at the instant of an input, the controller does not use a timer.
 _FEWEST_AT_ONCE, _SHARE_AT_ONCE = 10, 0.97
 
 
 @dataclass(frozen=True, slots=True)
 class _Violation:
-    """A held input that was answered wrongly; `got` is None where there was no answer."""
+    """A held input with a wrong answer; `got` is None if there was no answer."""
 
     t_ns: int
     held: Held
@@ -61,9 +61,9 @@ class _Violation:
 class ThresholdResponse:
     """A controller alone answers held inputs: one value above a threshold, another at or below it.
 
-    It may answer each input, publish on change only, or publish on a timer of up to a second. After a new input the old
-    answer may still come for a while, but not once the new one is there, and no other. One that answers in the
-    instant in which an input comes must answer that input, and not the one before.
+    It may answer each input, publish only on change, or publish on a timer of up to a second. After a new input the old
+    answer is accepted for a while, until the new one has come, and no other. A controller that answers at the instant
+    of an input must answer that input, and not the previous one.
 
     Attributes:
         input: Topic that the numbers are published on.
@@ -71,7 +71,7 @@ class ThresholdResponse:
         threshold: Where the answer changes; the threshold itself is not above.
         above: Answer expected above the threshold.
         otherwise: Answer expected at or below it.
-        side: Which side this criterion is about.
+        side: The side that this criterion judges.
     """
 
     input: str
@@ -89,7 +89,7 @@ class ThresholdResponse:
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input on this side is answered rightly."""
+        """Return full credit if every input on this side has the right answer."""
         inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:
@@ -118,7 +118,7 @@ class ThresholdResponse:
         return met(reason, evidence)
 
     def _once(self, finding: Finding) -> Finding:
-        """Return a finding that says the same about both sides, so that the second waits for the first."""
+        """Return a finding that is the same for both sides, so that the second side waits for the first."""
         return replace(finding, blocked_by="threshold_response")
 
     def _on_side(self, value: float) -> bool:
@@ -148,14 +148,14 @@ class ThresholdResponse:
         return None if self._right(carried, asked.value) else _Violation(asked.start_ns, asked, carried)
 
     def _behind(self, asked: Held, prompt: Sequence[Reading]) -> _Violation | None:
-        """Return that who answers in the instant of an input still answered the one before; None if that is not so."""
+        """Return a violation if a prompt controller still answered the previous input; None otherwise."""
         at_once = next((a for a in prompt if a.t_ns == asked.start_ns), None)
         if at_once is None or self._right(at_once.value, asked.value):
             return None
         return _Violation(at_once.t_ns, asked, at_once.value)
 
     def _unsettled(self, asked: Held, during: Sequence[Reading], before: Sequence[Reading]) -> Reading | None:
-        """Return the first answer that is neither the old one, as long as no new one has come, nor right for good."""
+        """Return the first answer that is neither the old one, before the new one has come, nor the right one."""
         old = (before or during)[-1 if before else 0].value
         came = False
         for answer in during:
@@ -208,7 +208,7 @@ class ThresholdResponse:
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
     ) -> tuple[str, str]:
-        """Return what to add to the reason, and a hint; both may be empty."""
+        """Return an addition to the reason, and a hint; both may be empty."""
         limit = f"{number(self.threshold)}{unit_of(self.input)}"
         rule = f"publish {number(self.above)} above {limit} and {number(self.otherwise)} at or below it"
         logic = self._logic(inputs, answers)
@@ -224,7 +224,7 @@ class ThresholdResponse:
         return "", rule
 
     def _logic(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> str:
-        """Return what the answers follow instead of the threshold; empty if that is not plain."""
+        """Return the rule that the answers follow instead of the threshold; empty if that is unclear."""
         if self._inverted(inputs, answers):
             return "; the answers are the wrong way round for every value"
         if len({a.value for a in answers}) == 1:
@@ -244,12 +244,12 @@ class ThresholdResponse:
                 pairs.append((asked.value, state[-1]))
         flipped = {self.above: self.otherwise, self.otherwise: self.above}
         both = {v > self.threshold for v, _ in pairs} == {True, False}
-        # exactly at the threshold, inverted logic may fall on either side
+        # exactly at the threshold, inverted logic may give either answer
         away = [(v, got) for v, got in pairs if v != self.threshold]
         return both and all(within(got, flipped[self._expected(v)], EXACT) for v, got in away)
 
     def _silent(self, trace: Trace) -> Finding:
-        """Return why the controller never answered; that it did subscribe is said too."""
+        """Return why the controller never answered, and whether it had subscribed."""
         why = explain_no_message(trace, self.output)
         heard = student_endpoints(trace, "subscription", self.input)
         if first_fault(trace) is not None or why.evidence.get("messages"):
@@ -268,7 +268,7 @@ class ThresholdResponse:
         return faulted(fault, f"no answer on {self.output}")
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers given to a controller and its answers under them, or None if nothing was given."""
+        """Return the inputs of a controller with its answers below them, or None without inputs."""
         sent = delivered_numbers(trace, self.input)
         answers = published_numbers(trace, self.output)
         if not sent:
@@ -293,7 +293,7 @@ def _deaf(subscriptions: Sequence[Any]) -> str:
 
 
 def _answers_at_once(trace: Trace, topic: str, answers: Sequence[Reading]) -> bool:
-    """Return whether a controller answers each input in its own instant, which only virtual time tells for sure."""
+    """Return whether a controller answers each input at its own instant, which only virtual time can tell."""
     asked = {r.t_ns for r in delivered_numbers(trace, topic)}
     prompt = sum(a.t_ns in asked for a in answers)
     enough = trace.clock is ClockKind.VIRTUAL and prompt >= _FEWEST_AT_ONCE and 2 * prompt >= len(asked)
@@ -312,6 +312,6 @@ def _grace(answers: Sequence[Reading]) -> int:
 
 
 def _repeats(answers: Sequence[Reading]) -> bool:
-    """Return whether the controller repeats its answers, rather than publishing on change only."""
+    """Return whether the controller repeats its answers, instead of publishing only on change."""
     gaps = _gaps(answers)
     return bool(gaps) and statistics.median(gaps) <= _REPEATING_NS

@@ -1,4 +1,4 @@
-"""Checks on the numbers in the messages on a topic: their values, their range, a formula, or chance."""
+"""Checks on the numbers in a topic's messages: their values, their range, a formula, or randomness."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, Formula, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart
+from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
@@ -25,20 +25,20 @@ from grader.judging.values import (
     number_at,
     published,
     published_numbers,
-    told,
+    rules_text,
 )
 from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
 
 
 @dataclass(frozen=True, slots=True)
 class FieldEqual:
-    """Every message on a topic holds what is expected in each field named: numbers, texts, truth values or lists.
+    """Every message on a topic has the expected value in each named field: numbers, texts, truth values or lists.
 
     Attributes:
         topic: Topic name as on the wire.
         fields: What is expected by field path: a value, or `{equals, items, tolerance, low, high, pattern, example}`.
-        tolerance: Largest difference of a number that is given without a tolerance of its own.
-        at_least: How many messages there must be to tell.
+        tolerance: Largest difference of a number without a tolerance of its own.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -49,7 +49,7 @@ class FieldEqual:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        return f"{told(self.fields)} in every message on {self.topic}"
+        return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if no message differs; the reason names the first that does."""
@@ -59,7 +59,7 @@ class FieldEqual:
         wrong = [m for m in messages if broken_rules(m.value, self.fields, self.tolerance)]
         evidence = {"topic": self.topic, "messages": len(messages), "wrong": len(wrong)}
         if not wrong:
-            return met(f"{self.topic}: {told(self.fields)} in {counted(len(messages), 'message')}", evidence)
+            return met(f"{self.topic}: {rules_text(self.fields)} in {counted(len(messages), 'message')}", evidence)
         path = broken_rules(wrong[0].value, self.fields, self.tolerance)[0]
         clause = breach(wrong[0].value, path, as_rule(self.fields[path], self.tolerance))
         reason = f"{moment(wrong[0].t_ns)}, {self.topic}: {clause}; wrong in {len(wrong)} of "
@@ -76,7 +76,7 @@ class FieldInRange:
         low: Smallest value allowed; none if left out.
         high: Largest value allowed; none if left out.
         field: Path of the number.
-        at_least: How many messages there must be to tell.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -119,8 +119,8 @@ class FieldMonotone:
         topic: Topic name as on the wire.
         direction: `rising` or `falling`.
         field: Path of the number.
-        strictly: Whether equal neighbours are a mistake; a series that never moves always is.
-        at_least: How many messages there must be to tell.
+        strictly: Whether equal neighbours are a mistake; a constant series always is.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -172,7 +172,7 @@ def _numbers(messages: Sequence[Message], path: str) -> Finding | tuple[float, .
 
 
 def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Finding:
-    """Return no credit and why there are not enough messages on a topic."""
+    """Return no credit with the reason why a topic has too few messages."""
     if found == 0:
         return explain_no_message(trace, topic)
     reason = f"{topic}: {counted(found, 'message')}, expected at least {wanted}"
@@ -191,8 +191,8 @@ class FieldFunction:
         formula: What the field holds, e.g. `sin(0.1 * n)`.
         field: Path of the field, e.g. `data` or `linear.x`.
         tolerance: Largest difference, unit of the field.
-        start_tolerance: How many messages may have been lost before the first one was seen.
-        at_least: How many messages there must be to tell.
+        start_tolerance: Number of messages that may be lost before the first one received.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -240,7 +240,7 @@ class FieldFunction:
         return met(reason, evidence)
 
     def _best_start(self, wanted: Curve, samples: Sequence[Sample], jitter_s: float) -> tuple[int, list[Sample]]:
-        """Return the number of the first message that leaves the fewest wrong, 0 unless another is better."""
+        """Return the number of the first message that gives the fewest errors; 0 unless another is better."""
         starts = range(max(0, self.start_tolerance) + 1)
         ways = [[s for s in samples if not self._right(wanted, s, jitter_s, start)] for start in starts]
         best = min(starts, key=lambda start: len(ways[start]))
@@ -283,17 +283,17 @@ class FieldFunction:
 
 #: Rounding to single precision must not push a value out of its range.
 _EDGE = 1e-5
-#: So many equal values or fewer may have been drawn: whole numbers repeat.
+#: Up to this many equal values may be random: whole numbers repeat.
 _FEWEST_FOR_CONSTANT = 5
 _RANDOM_HINT = "draw a new value for every message: random.uniform({low}, {high})"
 
 
 @dataclass(frozen=True, slots=True)
 class RandomInRange:
-    """Every number on a topic lies in a range, and the numbers are drawn: no constant, cycle, ramp or smooth curve.
+    """Every number on a topic is in a range, and the numbers are random: no constant, cycle, ramp or smooth curve.
 
     Attributes:
-        topic: Topic name as on the wire; its messages carry one number, as `data` or `temperature`.
+        topic: Topic name as on the wire; its messages hold one number, as `data` or `temperature`.
         low: Smallest value allowed, the edge inside.
         high: Largest value allowed, the edge inside.
     """
@@ -309,7 +309,7 @@ class RandomInRange:
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside and the values may have been drawn."""
+        """Return full credit if no value is outside and the values may be random."""
         messages = published(trace, self.topic)
         if not messages:
             silent = explain_no_message(trace, self.topic)
@@ -374,7 +374,7 @@ class RandomInRange:
         return met(reason, self._evidence(values))
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers on a topic in the range that they may come from, or None without numbers."""
+        """Return the numbers on a topic with their range, or None without numbers."""
         values = published_numbers(trace, self.topic)
         if not values:
             return None

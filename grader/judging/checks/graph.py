@@ -19,7 +19,7 @@ Pair = tuple[Endpoint, Endpoint]
 
 @dataclass(frozen=True, slots=True)
 class BidirectionalGraph:
-    """At one moment the live graph joins two processes by two topics, one in each direction, with the types agreeing.
+    """At one moment, the live graph connects two processes by two topics, one in each direction, with matching types.
 
     Attributes:
         forward: Topic that the first process publishes and the second subscribes to, e.g. `/temperature`.
@@ -125,17 +125,17 @@ _QOS_HINT = "pass a QoSProfile with that policy where the {kind} is created"
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """A publisher or subscription of a student's node on a topic has the QoS policies that are named.
+    """A publisher or subscription of a student's node on a topic has the given QoS policies.
 
-    Of several endpoints one that fits is enough. The middleware does not tell every depth: where it does not, what
-    depends on it stays undecided.
+    One matching endpoint is enough. The middleware does not report every depth; without it, a criterion that depends on
+    it stays undecided.
 
     Attributes:
         topic: Topic name as on the wire.
         kind: `publisher` or `subscription`.
         reliability: `reliable` or `best_effort`; free if left out.
         durability: `volatile` or `transient_local`; free if left out.
-        deadline: Deadline offered or asked for; `0 s` for none; free if left out.
+        deadline: Offered or requested deadline; `0 s` for none; free if left out.
         depth: Smallest history depth; free if left out.
     """
 
@@ -160,7 +160,7 @@ class Qos:
         return " and ".join(parts) or "any QoS"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if an endpoint has all of it; the reason says what the others have."""
+        """Return full credit if an endpoint has all of them; the reason lists those of the others."""
         mine = student_endpoints(trace, self.kind, self.topic)
         if not mine:
             return self._absent(trace)
@@ -207,7 +207,7 @@ def _seen(names: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class NodeName:
-    """A node of a name is in the ROS graph.
+    """A node with a given name is in the ROS graph.
 
     Attributes:
         name: Fully qualified, e.g. `/velocity_publisher`.
@@ -237,7 +237,7 @@ class NodeName:
 
 @dataclass(frozen=True, slots=True)
 class TopicNames:
-    """The students' nodes publish and subscribe to the topics named, at least or exactly; types are free.
+    """The students' nodes publish and subscribe to the given topics, at least or exactly; types are free.
 
     Topics that every node has are not counted.
 
@@ -245,7 +245,7 @@ class TopicNames:
         publishes: Topics that are published.
         subscribes: Topics that are subscribed to.
         exactly: Whether other topics are a mistake.
-        node: Fully qualified name of the node that is meant; all of them if left out.
+        node: Fully qualified name of the node; all nodes if left out.
     """
 
     publishes: tuple[str, ...] = ()
@@ -261,7 +261,7 @@ class TopicNames:
         return f"{self.node or 'the program'} {' and '.join(parts)}{' and nothing else' if self.exactly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no topic is missing, nor too many if that is asked."""
+        """Return full credit if no topic is missing, and none is extra if `exactly` is set."""
         made = [e for e in student_endpoints(trace) if self.node in (None, e.node)]
         out, back = (sorted({e.topic for e in made if e.kind == k}) for k in ("publisher", "subscription"))
         flaws = [*_flaws("published", self.publishes, out, exactly=self.exactly)]
@@ -285,7 +285,7 @@ def _flaws(word: str, wanted: Sequence[str], found: Sequence[str], *, exactly: b
 
 @dataclass(frozen=True, slots=True)
 class GraphEdge:
-    """One edge of the ROS graph; a node that is left out may be any of the students'.
+    """An edge of the ROS graph; a node that is left out may be any of the students'.
 
     Attributes:
         topic: Topic name as on the wire.
@@ -298,18 +298,18 @@ class GraphEdge:
     target: str | None = None
 
     def __str__(self) -> str:
-        """Return the edge as reports draw it."""
+        """Return the edge in the form of reports."""
         return f"{self.source or 'a node'} ─{self.topic}→ {self.target or 'a node'}"
 
 
 @dataclass(frozen=True, slots=True)
 class GraphEdges:
-    """The live graph has edges from a student's node by a topic to a student's node, the types agreeing.
+    """The live graph has edges between students' nodes by given topics, with matching types.
 
     Attributes:
-        edges: Each with `topic`, and `source` and `target` where the nodes' names matter.
-        at_once: Whether one moment must show all of them.
-        between_processes: Whether the two nodes must be of different processes.
+        edges: Each with `topic`, and `source` and `target` if the nodes' names matter.
+        at_once: Whether all edges must exist at one moment.
+        between_processes: Whether the two nodes must belong to different processes.
     """
 
     edges: tuple[GraphEdge, ...]

@@ -1,4 +1,4 @@
-"""Checks on whether a node writes through its logger, what, how often, and with how many of its messages."""
+"""Checks on a node's log records: whether it writes any, their content, and how often they come."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 
 
 def no_node(trace: Trace, process: str, evidence: Mapping[str, Any]) -> Finding:
-    """Return no credit for what was written by a process without a node."""
+    """Return no credit for output of a process without a node."""
     reason = f"{process}: no node in the ROS graph in {span(trace.stop_ns)}; what is written without one does not count"
     fault = first_fault(trace, process)
     if fault is not None:
@@ -49,10 +49,10 @@ def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[
 
 @dataclass(frozen=True, slots=True)
 class UsesLogger:
-    """A process writes at least one record through an rclpy logger, of any severity that is shown.
+    """A process writes at least one record through an rclpy logger, of any visible severity.
 
-    Lines that are printed instead are half of it. A process that has no node in the ROS graph logs nothing, and the
-    prompt of an `input()` is no line.
+    Lines that are printed instead give half the points. A process without a node in the ROS graph logs nothing, and the
+    prompt of an `input()` is not a line.
 
     Attributes:
         process: File name of the student process, e.g. `velocity_publisher.py`.
@@ -91,15 +91,15 @@ _LONGEST = 2_000
 
 @dataclass(frozen=True, slots=True)
 class LogsMatching:
-    """A process writes log records that match a pattern, of a level, so many of them, with a period where one is given.
+    """A process writes enough log records that match a pattern, of a level, with a period if one is given.
 
-    Lines that match are half of it, if they are enough and come in that period.
+    Matching printed lines give half the points, if their number and period are right.
 
     Attributes:
         process: File name of the student process.
         pattern: Regular expression that is found in the text; every text if left out.
         level: Lowest severity that counts.
-        exactly: Whether a higher severity does not count.
+        exactly: Whether higher severities do not count.
         at_least: Fewest records.
         at_most: Most records; any number if left out.
         period: Average time expected from one to the next.
@@ -178,11 +178,11 @@ class LogsMatching:
         return f"; logged: {listed(seen, 2)}" if seen else "; nothing was logged"
 
 
-#: Share of the texts of one shape that must show the published number for the shape to count as its log.
+#: Minimum share of the texts of one shape that must show the published number for the shape to count as its log.
 _SHOWING = 0.6
-#: Share of the messages with a log from which on it is one for every message.
+#: Minimum share of the messages with a log for the logs to count as one for every message.
 _FLOOD = 0.5
-#: Largest difference of the average, as a share of the distance asked for.
+#: Largest difference of the average, as a share of the expected distance.
 _AVERAGE = 0.05
 _MOST_IN_EVIDENCE = 60
 
@@ -200,16 +200,15 @@ class _Rhythm:
 
 @dataclass(frozen=True, slots=True)
 class LogsEvery:
-    """A process writes one log for every so many messages that it publishes, and not one for each.
+    """A process writes one log for every n messages that it publishes, and not one for each.
 
-    The logs that count are those that hold the published number; where none does, all that come with or after the first
-    message. With which message the first of them comes is free, and a gap may be off by one message. Logs that are
-    printed instead are half of it.
+    The logs that hold the published number count; without any, all logs with or after the first message. The first log
+    may come with any message, and a gap may be off by one message. Logs that are printed instead give half the points.
 
     Attributes:
         process: File name of the student process.
         topic: Topic that it publishes.
-        every: How many messages there are from one log to the next.
+        every: Number of messages from one log to the next.
         field: Path of the published number.
     """
 
@@ -226,7 +225,7 @@ class LogsEvery:
         )
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for records in that rhythm, half for printed lines."""
+        """Return full credit for records with that spacing, half for printed lines."""
         messages = published(trace, self.topic)
         if not messages:
             return waiting_for("publishes", explain_no_message(trace, self.topic))
@@ -248,7 +247,7 @@ class LogsEvery:
         return self._wrong(messages, logged or printed)
 
     def _rhythms(self, trace: Trace, messages: Sequence[Message], outputs: Sequence[Output]) -> list[_Rhythm]:
-        """Return the rhythms that the outputs may be meant in, the likeliest first; that of them all is among them."""
+        """Return the possible interpretations of the outputs, the likeliest first, including that of all outputs."""
         jitter_ns = JITTER_NS[trace.clock]
         times = [m.t_ns for m in messages]
         placed = [(bisect_right(times, o.t_ns + jitter_ns) - 1, o) for o in outputs]
@@ -270,7 +269,7 @@ class LogsEvery:
         return hits >= _SHOWING * len(group)
 
     def _flaw(self, found: _Rhythm, messages: Sequence[Message]) -> str:
-        """Return what is wrong with a rhythm, as a clause; empty if nothing is."""
+        """Describe what is wrong with the spacing, as a clause; empty if nothing is."""
         places, last = found.places, len(messages) - 1
         if len(places) < 2:
             return f"only with message {places[0] + 1}"
@@ -285,7 +284,7 @@ class LogsEvery:
         return f"none after message {places[-1] + 1}" if last - places[-1] > self.every + slack else ""
 
     def _flooded(self, found: Sequence[_Rhythm], messages: Sequence[Message]) -> Finding | None:
-        """Return that there is a log for every message or nearly so; None if there is not."""
+        """Return a finding if there is a log for nearly every message; None otherwise."""
         most = max(found, key=lambda rhythm: len(rhythm.places), default=_Rhythm(()))
         if self.every < 3 or len(most.places) < _FLOOD * len(messages):
             return None

@@ -1,4 +1,4 @@
-"""Checks on logged positions: whether they are right, how often they come, and what happens while there are none."""
+"""Checks on logged positions: that they are right, how often they come, and what happens without odometry."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.checks.logs import complained
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
 from grader.judging.output import printed_lines, student_records, written
-from grader.judging.position_logs.analysis import (
+from grader.judging.position_causes import cause_of
+from grader.judging.position_logs import (
     Analysis,
     Group,
     Track,
@@ -29,21 +30,20 @@ from grader.judging.position_logs.analysis import (
     printed_positions,
     track_of,
 )
-from grader.judging.position_logs.causes import cause_of
 from grader.judging.wording import counted, moment, number, quote, span
 
 _LOGGER_HINT = "write the position through the node's logger: self.get_logger().info(...)"
 _TIMER_HINT = "log from a timer of that period, or give the logger throttle_duration_sec"
-#: Longest gap between two logs, in periods, and longest wait at both ends of the stream.
+#: Longest gap between two logs, and longest wait at both ends of the stream, in periods.
 _LONGEST_GAP = 2.2
-#: Share of the messages from which on logs are taken for one a message.
+#: Minimum share of messages with a log for the logs to count as one per message.
 _ONE_A_MESSAGE = 0.8
 _MOST_IN_EVIDENCE = 60
 _DIGIT = re.compile(r"\d")
 
 
 def _track(trace: Trace, process: str, topic: str) -> Track | Finding:
-    """Return the odometry played; where a fault ended the recording before it, a finding that says so."""
+    """Return the odometry played; if a fault ended the recording before it, a finding about the fault."""
     track = track_of(trace, topic)
     if track is not None:
         return track
@@ -60,14 +60,14 @@ def _ended_early(fault: Fault) -> Finding:
 
 @dataclass(frozen=True, slots=True)
 class LogsPosition:
-    """A process logs the (x, y) of the odometry that is played, in any wording, to the precision that it prints.
+    """A process logs the (x, y) of the odometry that is played, with any wording, to the precision that it prints.
 
     A logged pair must show a pose that was current when it was written: the newest one, or one replaced less than half
-    a second before. Positions that are printed instead of logged are half of it.
+    a second before. Positions that are printed instead of logged give half the points.
 
     Attributes:
         process: File name of the student process.
-        topic: Topic that the odometry is played on.
+        topic: Topic of the odometry.
     """
 
     process: str
@@ -93,7 +93,7 @@ class LogsPosition:
         return self._explain(trace, track, chosen)
 
     def _shows(self, trace: Trace, found: Analysis) -> bool:
-        """Return whether the position is shown: how often is the period's question, unless a fault cut it short."""
+        """Return whether the position is logged; `log_period` judges how often, unless a fault cut it short."""
         lived = first_fault(trace, self.process) is None
         return found.met or (lived and bool(found.right) and not found.wrong)
 
@@ -120,7 +120,7 @@ class LogsPosition:
         return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the path that was driven with the logged positions on it, or None if nothing was played."""
+        """Return the driven path with the logged positions on it, or None without odometry."""
         track = track_of(trace, self.topic)
         if track is None:
             return None
@@ -136,7 +136,7 @@ class LogsPosition:
         return Chart(
             id=f"path {self.topic}",
             title=f"The path on {self.topic} and the logged positions",
-            about=_told_path(self.topic, track, pairs, len(pairs) - len(shown)),
+            about=_describe_path(self.topic, track, pairs, len(pairs) - len(shown)),
             criteria=(),
             x_title="x",
             x_unit="m",
@@ -158,14 +158,14 @@ def _evidence(found: Analysis) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class LogPeriod:
-    """A process logs positions with a period while odometry is played, not one for every message.
+    """A process logs positions with a period while odometry is played, and not one for every message.
 
-    Judged on the position logs; where none is right, on the commonest log that holds a number.
+    The position logs are judged; if none is right, the most frequent log with a number.
 
     Attributes:
         process: File name of the student process.
-        topic: Topic that the odometry is played on.
-        period: Time expected from one log to the next, on average.
+        topic: Topic of the odometry.
+        period: Average time expected from one log to the next.
         tolerance: Largest difference of the average, as a share of the period; the edge is inside.
     """
 
@@ -218,7 +218,7 @@ class LogPeriod:
         )
 
     def _off(self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, Any]) -> Finding:
-        """Return that the average is wrong, which `reason` says, or that each message is logged."""
+        """Return a finding that the average is wrong, with `reason`, or that each message is logged."""
         played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
         if len(times) < _ONE_A_MESSAGE * played:
             return not_met(reason, evidence, hint=_TIMER_HINT)
@@ -232,7 +232,7 @@ class LogPeriod:
         return next(((a, b) for a, b in gaps if b - a > _LONGEST_GAP * self.period + track.jitter_ns), None)
 
     def log_times(self, trace: Trace, track: Track) -> tuple[int, ...]:
-        """Return when positions were logged, or what comes nearest to that; whatever the stream's bounds."""
+        """Return when positions, or the most similar texts, were logged, also outside the stream."""
         logged = logged_positions(trace, self.process, track)
         if logged.right:
             return logged.times_ns
@@ -247,7 +247,7 @@ class LogPeriod:
         return ()
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return when positions were logged, against the grid of the period; None if there was nothing to log."""
+        """Return when positions were logged, on the grid of the period; None if there was nothing to log."""
         track = track_of(trace, self.topic)
         if track is None:
             return None
@@ -264,7 +264,7 @@ class LogPeriod:
         return time_chart(
             f"period {self.topic}",
             "When positions were logged",
-            _told_period(times, self),
+            _describe_period(times, self),
             (
                 Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
                 Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
@@ -274,18 +274,18 @@ class LogPeriod:
 
 
 def _commonest(groups: Sequence[Group]) -> Group | None:
-    """Return the template seen most often; of equals the one that holds two numbers."""
+    """Return the most frequent template; of equally frequent ones, the one with two numbers."""
     return max(groups, key=lambda g: (len(g.entries), bool(g.pairs)), default=None)
 
 
 @dataclass(frozen=True, slots=True)
 class WaitsGracefully:
-    """A process lives through a silence on a topic without an exception or an ERROR record, and works once data comes.
+    """A process survives a silence on a topic without an exception or ERROR record, and works once data arrives.
 
     Attributes:
         process: File name of the student process.
-        topic: Topic that stays silent at first.
-        silence: How long at least it must have been silent in the recording.
+        topic: Topic that is silent at first.
+        silence: Minimum duration of the silence in the recording.
     """
 
     process: str
@@ -299,7 +299,7 @@ class WaitsGracefully:
         return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if nothing went wrong and something was written after the first message."""
+        """Return full credit if nothing failed and something was written after the first message."""
         fault = first_fault(trace, self.process)
         if fault is not None:
             return self._faulted(trace, fault)
@@ -328,7 +328,7 @@ class WaitsGracefully:
     def _works(self, trace: Trace, first_ns: int) -> Finding:
         outputs = written(trace, self.process)
         before = {o.text for o in outputs if o.t_ns < first_ns and not _DIGIT.search(o.text)}
-        # a text without a number that goes on as before the data is the waiting, not the data
+        # a text without a number that was also written before the data is about waiting, not about the data
         after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
@@ -337,7 +337,7 @@ class WaitsGracefully:
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
 
 
-#: A logged pair further away than this many sizes of the path is told, not drawn: it would shrink the path to a dot.
+#: A logged pair farther away than this many path sizes is mentioned, not drawn: it would shrink the path to a dot.
 _FAR = 2.0
 
 
@@ -351,7 +351,7 @@ class _LoggedPair:
 
 
 def _pairs(found: Analysis) -> list[_LoggedPair]:
-    """Return the pairs of the templates that hold positions; where none does, of the commonest with two numbers."""
+    """Return the pairs of the position templates; without any, those of the most frequent template with two numbers."""
     right = [g for g in found.groups if g.pair is not None and g.right]
     rest = [g for g in found.groups if g.pair is not None]
     chosen = right or sorted(rest, key=lambda g: -len(g.entries))[:1]
@@ -379,7 +379,7 @@ def _dots(name: str, pairs: Sequence[_LoggedPair], tone: Tone) -> list[Series]:
     return [series(name, [p.point for p in pairs], look=Look.DOTS, tone=tone, texts=[p.text for p in pairs])]
 
 
-def _told_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
+def _describe_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
     right = sum(p.right for p in pairs)
     first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
     said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
@@ -394,7 +394,7 @@ def _place(x: float, y: float) -> str:
     return f"({x:.2f}, {y:.2f}) m"
 
 
-def _told_period(times: Sequence[int], check: LogPeriod) -> str:
+def _describe_period(times: Sequence[int], check: LogPeriod) -> str:
     wanted = f"Expected: one every {number(seconds(check.period))} s ± {number(100 * check.tolerance)} % on average."
     if len(times) < 2:
         return f"One log, at {moment(times[0])}. {wanted}"

@@ -1,4 +1,4 @@
-"""Checks on a program itself: its parameters, how it ends, and what its text uses."""
+"""Checks on a program: its parameters, how it ends, and what its source uses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,14 @@ from grader.judging.findings import (
     met,
     not_met,
 )
-from grader.judging.service_calls import LATENESS_NS, Got, Set, asked_for, got, settings
+from grader.judging.service_calls import (
+    LATENESS_NS,
+    ParameterSetting,
+    ReportedParameter,
+    asked_for,
+    reported_parameter,
+    settings,
+)
 from grader.judging.source import Source, read, subtree
 from grader.judging.values import FieldRule, as_number, published, shown, value_at
 from grader.judging.wording import counted, listed, moment, number, quote, span
@@ -32,16 +39,16 @@ _READ_HINT = "read the parameter each time it is used, self.get_parameter('{name
 
 @dataclass(frozen=True, slots=True)
 class ParameterDeclared:
-    """A student's node has a parameter, with the value and of the type named; read before anybody sets it.
+    """A student's node has a parameter with the given value and type; read before it is set.
 
-    The scenario has to ask for it: `parameter` without `set`.
+    The scenario needs the stimulus `parameter` without `set`.
 
     Attributes:
         name: Name of the parameter.
-        node: Fully qualified name of the node; the one that was asked if left out.
-        value: Default value expected; free if left out.
-        tolerance: Largest difference from a number expected.
-        type: Type expected; a whole and a fractional number are alike if left out.
+        node: Fully qualified name of the node; the one that the stimulus addresses if left out.
+        value: Expected default value; free if left out.
+        tolerance: Largest difference from an expected number.
+        type: Expected type; if left out, whole and fractional numbers are equal.
     """
 
     name: str
@@ -58,9 +65,9 @@ class ParameterDeclared:
         return f"the parameter {self.name}{kind}{value}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the first answer to the question for it fits."""
+        """Return full credit if the first response for the parameter fits."""
         calls = asked_for(trace, self.name, self.node)
-        answers = [found for call in calls if (found := got(call, self.name)) is not None]
+        answers = [found for call in calls if (found := reported_parameter(call, self.name)) is not None]
         if not answers:
             return _unanswered(trace, self.name, self.node, asked=bool(calls))
         found = min(answers, key=lambda a: a.t_ns)
@@ -72,7 +79,7 @@ class ParameterDeclared:
         said = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
         return not_met(f"{said}, expected {flaw}", evidence) if flaw else met(said, evidence)
 
-    def _flaw(self, found: Got) -> str:
+    def _flaw(self, found: ReportedParameter) -> str:
         if self.type not in (None, found.type):
             return f"type {self.type}"
         if self.value is None or FieldRule(equals=self.value, tolerance=self.tolerance).allows(found.value):
@@ -81,10 +88,10 @@ class ParameterDeclared:
 
 
 def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Finding:
-    """Return no credit and why nobody told a parameter.
+    """Return no credit with the reason why no node reported a parameter.
 
     Raises:
-        HarnessError: Nobody asked a node that was there.
+        HarnessError: The node was there, but nobody asked it.
     """
     fault = first_fault(trace)
     if fault is not None:
@@ -101,19 +108,19 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
 
 @dataclass(frozen=True, slots=True)
 class ParameterTakesEffect:
-    """After a parameter was set, what the node publishes follows it: a field, a rate or a period.
+    """After a parameter was set, the published messages follow it: a field, a rate or a period.
 
-    The scenario has to set it: `parameter` with `set`. Each value that was set is looked at from the time allowed up to
-    the next one, and a value that the node refuses is a mistake.
+    The scenario needs the stimulus `parameter` with `set`. Each value is judged from the allowed delay up to the next
+    value; a value that the node rejects is a mistake.
 
     Attributes:
         name: Name of the parameter.
-        topic: Topic on which the effect shows.
-        effect: `field`: the field equals the value; `rate`: messages come at that many hertz; `period`: one comes in
-            that many seconds.
+        topic: Topic that shows the effect.
+        effect: `field`: the field equals the value; `rate`: the value is the rate in hertz; `period`: the value is the
+            time between messages in seconds.
         field: Path of the field.
         tolerance: Largest difference; of a field in its unit, of a rate or period as a share of it.
-        within: How soon the effect must show.
+        within: Longest delay of the effect.
         node: Fully qualified name of the node; the one whose parameter was set if left out.
     """
 
@@ -132,7 +139,7 @@ class ParameterTakesEffect:
         return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every value set took effect; the reason names the first that did not."""
+        """Return full credit if every value took effect; the reason names the first that did not."""
         tries = settings(trace, self.name, self.node)
         if not any(s.answered for s in tries):
             return _unanswered(trace, self.name, self.node, asked=bool(tries))
@@ -152,8 +159,8 @@ class ParameterTakesEffect:
         values = ", ".join(shown(s.value) for s in tries)
         return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
 
-    def _flaw(self, one: Set, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
-        """Return what is wrong after one value was set, and a hint; empty if nothing is."""
+    def _flaw(self, one: ParameterSetting, stop_ns: int, messages: Sequence[Message]) -> tuple[str, str]:
+        """Describe what is wrong after a value was set, and a hint; empty if nothing is."""
         if not one.answered:
             return "no answer", "spin the node: rclpy.spin(node)"
         if not one.taken:
@@ -167,7 +174,7 @@ class ParameterTakesEffect:
             return self._field_flaw(one, after), hint
         return self._pace_flaw(one, after), hint
 
-    def _field_flaw(self, one: Set, after: Sequence[Message]) -> str:
+    def _field_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
         if not after:
             return f"no message on {self.topic} afterwards"
         if isinstance(one.value, (list, tuple)):
@@ -179,7 +186,7 @@ class ParameterTakesEffect:
             return ""
         return f"{self.field} is {shown(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
 
-    def _pace_flaw(self, one: Set, after: Sequence[Message]) -> str:
+    def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
         wanted = as_number(one.value)
         if wanted is None or not wanted > 0:
             raise HarnessError(f"{self.name}: {shown(one.value)} is no rate and no period")
@@ -201,9 +208,9 @@ _SHUTDOWN_HINT = "end on Ctrl-C: except KeyboardInterrupt: pass, then destroy th
 
 @dataclass(frozen=True, slots=True)
 class NoFault:
-    """A process, or every one, lives through the recording: no exception, no early end, no hanging.
+    """A process, or every one, survives the recording: no exception, no early end, no hanging.
 
-    What happens after the stop signal is not asked about.
+    Anything after the stop signal is ignored.
 
     Attributes:
         process: File name of the student process; all of them if left out.
@@ -217,7 +224,7 @@ class NoFault:
         return f"{self.process or 'every process'} runs to the end without an exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if there is no fault; the reason names the first."""
+        """Return full credit without faults; the reason names the first."""
         faults = faults_before_stop(trace, self.process)
         if not faults:
             return met(f"{self.process or 'every process'}: no fault in {span(trace.stop_ns)}", {"faults": 0})
@@ -229,13 +236,13 @@ class NoFault:
 
 @dataclass(frozen=True, slots=True)
 class CleanShutdown:
-    """A process that is stopped with Ctrl-C (SIGINT) ends soon: with code 0 or by that very signal, by no other error.
+    """A process stopped with Ctrl-C (SIGINT) ends soon, with exit code 0 or by that signal, and without another error.
 
     The scenario has to stop it: `shutdown` in the rubric.
 
     Attributes:
         process: File name of the student process.
-        within: How long it may take.
+        within: Longest time to its end.
     """
 
     process: str
@@ -247,7 +254,7 @@ class CleanShutdown:
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it ended in time; the reason says what happened instead."""
+        """Return full credit if it ended in time; the reason tells what happened instead."""
         signals = trace.marks("stop_signal", self.process)
         faults = trace.faults(self.process)
         if not signals:
@@ -278,14 +285,14 @@ class CleanShutdown:
 
 @dataclass(frozen=True, slots=True)
 class SourceUses:
-    """A student's file holds what is named: a class that derives from another, and calls of functions or methods.
+    """A student's file contains a class that derives from a given one, and calls of given functions or methods.
 
-    It is read, not run: imports under other names are followed, and whether a line is ever reached is not asked.
+    The file is read, not run: imports under other names are followed, and unreachable lines count.
 
     Attributes:
         process: File name of the student process.
-        derives_from: Classes of which one has to be a base, e.g. `rclpy.node.Node`; none if left out.
-        calls: What has to be called, each of them: a whole name such as `rclpy.spin`, or the name of a method such as
+        derives_from: Classes of which one must be a base, e.g. `rclpy.node.Node`; none if left out.
+        calls: Functions that must all be called: a full name such as `rclpy.spin`, or the name of a method such as
             `create_timer`.
     """
 
@@ -300,11 +307,11 @@ class SourceUses:
         return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
 
     def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise: the recording alone does not hold the file."""
+        """Raise HarnessError: the recording does not contain the file."""
         raise HarnessError(f"{self.process}: its text was not kept")
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if everything is there; the reason names what is not."""
+        """Return full credit if everything is there; the reason names what is missing."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source
@@ -326,16 +333,16 @@ class SourceUses:
 
 @dataclass(frozen=True, slots=True)
 class SourceAvoids:
-    """A file does not call what is named, anywhere or in callbacks, and writes to no global variable if that is asked.
+    """A file does not call given functions, anywhere or in callbacks, and optionally has no `global` statement.
 
-    It is read, not run: imports under other names are followed. A callback is what is handed to a timer, subscription,
-    service, action or future, with every function of the file that it calls.
+    The file is read, not run: imports under other names are followed. A callback is a function passed to a timer,
+    subscription, service, action or future, including every function of the file that it calls.
 
     Attributes:
         process: File name of the student process.
-        calls: What must not be called: a whole name such as `time.sleep`, or the name of a method such as `sleep`.
+        calls: Forbidden calls: a full name such as `time.sleep`, or the name of a method such as `sleep`.
         where: `anywhere`, or `callbacks` only.
-        globals: Whether `global` must not be written either.
+        globals: Whether `global` is forbidden as well.
     """
 
     process: str
@@ -350,11 +357,11 @@ class SourceAvoids:
         return f"in {self.process}{' in callbacks' if self.where == 'callbacks' else ''} {' and '.join(parts)}"
 
     def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise: the recording alone does not hold the file."""
+        """Raise HarnessError: the recording does not contain the file."""
         raise HarnessError(f"{self.process}: its text was not kept")
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if nothing of it is there; the reason names the first place."""
+        """Return full credit if nothing forbidden is there; the reason names the first place."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source
@@ -378,10 +385,10 @@ class SourceAvoids:
 
 
 def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | Finding:
-    """Return a file with its names resolved, or no credit and why it cannot be read.
+    """Return a file with its names resolved, or no credit with the reason why it cannot be read.
 
     Raises:
-        HarnessError: It is not there, or too long to be read.
+        HarnessError: The file is missing, or too long to be read.
     """
     if process not in sources:
         raise HarnessError(f"{process}: its text was not kept; there are {listed(sorted(sources)) or 'no texts'}")

@@ -1,4 +1,4 @@
-"""The check on how often a topic is published, worded as `ros2 topic hz` words it."""
+"""The check on how often a topic is published, in the terms of `ros2 topic hz`."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import counted, moment, number, quote, span
 
-#: How much later than two periods the last message may lie before the end: rounding, or a busy machine.
+#: How much later than two periods before the end the last message may be missing: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
-#: Fewer messages of the last quarter say nothing about its rate.
+#: Fewer messages in the last quarter give no rate.
 _FEWEST_LATER = 10
 
 
@@ -40,7 +40,7 @@ class _Measured:
 
     @property
     def steady(self) -> bool:
-        """Whether at least half of the intervals are of the average length, give or take a half."""
+        """Whether at least half of the intervals are within half of the average."""
         gaps = [b - a for a, b in zip(self.times_ns, self.times_ns[1:], strict=False)]
         least, most = 0.5 * self.average_ns, 1.5 * self.average_ns
         usual = sum(least <= g <= most for g in gaps)
@@ -57,15 +57,15 @@ class _Measured:
 class TopicRate:
     """A topic is published at a rate, measured from its first message on.
 
-    The rate is (n - 1) / (t_last - t_first) over the window, as `ros2 topic hz` has it. Messages must go on to the end
-    of the window and be spread over it: bursts of the right average do not count. Without a window all of the
-    observation counts, and its last quarter must fit within twice the tolerance. The type is free.
+    The rate is (n - 1) / (t_last - t_first) over the window, like that of `ros2 topic hz`. Messages must continue to
+    the end of the window and be spread over it: bursts with the right average do not count. Without a window, the whole
+    observation counts, and its last quarter must be within twice the tolerance. The type is free.
 
     Attributes:
         topic: Topic name as on the wire.
-        rate: Rate expected.
+        rate: Expected rate.
         tolerance: Largest difference for full credit; the edge is inside.
-        window: How long is looked at, from the first message on; to the end of the observation if left out.
+        window: Duration that is measured, from the first message on; to the end of the observation if left out.
         partly_tolerance: Largest difference for half credit; none if left out.
     """
 
@@ -85,7 +85,7 @@ class TopicRate:
         return said
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full, half or no credit by how far the rate is off."""
+        """Return full, half or no credit, depending on the difference of the rate."""
         times = [m.t_ns for m in published(trace, self.topic)]
         if not times:
             return explain_no_message(trace, self.topic)
@@ -108,7 +108,7 @@ class TopicRate:
         return f"expected {number(self.rate)} ± {number(self.tolerance)} Hz{over}"
 
     def _slack(self, found: _Measured, evidence: dict[str, object]) -> Finding | None:
-        """Return that a node let go at the end, which the average hides; None if it did not."""
+        """Return a finding if the rate changed at the end, which the average hides; None otherwise."""
         first, last = found.times_ns[0], found.times_ns[-1]
         later = tuple(t for t in found.times_ns if t >= (first + 3 * last) // 4)
         if self.window is not None or len(later) < _FEWEST_LATER or later[-1] == later[0]:
@@ -143,7 +143,7 @@ class TopicRate:
         return not_met(reason, evidence, hint=self._hint(found.rate_hz))
 
     def _flaw(self, trace: Trace, found: _Measured, evidence: dict[str, object]) -> Finding | None:
-        """Return why a window cannot be taken at its average, or None if it can."""
+        """Return why the average of a window is not meaningful, or None if it is."""
         first, last = found.times_ns[0], found.times_ns[-1]
         seen = f"{self.topic}: {found.sentence()}"
         if not found.steady:
@@ -195,7 +195,7 @@ class TopicRate:
         return rule
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the picture of a rate, or None if fewer than two messages came."""
+        """Return the chart of a rate, or None with fewer than two messages."""
         times = sorted(m.t_ns for m in published(trace, self.topic))
         if len(times) < 2 or times[0] == times[-1]:
             return None
@@ -203,7 +203,7 @@ class TopicRate:
         return time_chart(
             f"rate {self.topic}",
             f"How often {self.topic} came",
-            _told_rate(self, inside),
+            _describe_rate(self, inside),
             (_rate_panel(self, times), _interval_panel(self, times)),
             happenings(trace),
         )
@@ -214,13 +214,13 @@ def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:
     # n - 1 gaps, not n: counting messages overstates a short window
     rate_hz = (len(times) - 1) / seconds(times[-1] - times[0])
     low, high = min(gaps), max(gaps)
-    # an exact sum of squares takes long, and in virtual time there is seldom any deviation
+    # an exact sum of squares is slow, and in virtual time there is rarely any deviation
     deviation = statistics.pstdev(gaps) if high > low else 0.0
     return _Measured(times, stop_ns, rate_hz, low, high, deviation)
 
 
 def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | None]:
-    """Return how to say that messages stopped before the window did, and the fault that ended them if one did."""
+    """Return a clause about messages that stopped before the window ended, and the fault that stopped them, if any."""
     stopped = f"stopped after {span(last_ns - first_ns)}"
     fault = next((f for f in trace.faults() if last_ns <= f.t_ns <= trace.stop_ns), None)
     if fault is not None:
@@ -230,7 +230,7 @@ def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | Non
     return (f"{stopped}: {quote(limit.detail)}" if limit else stopped), None
 
 
-#: The rate at a moment is that of so much time before it, or of so many periods if they are longer.
+#: The rate at a moment is measured over this time before it, or over this many periods if they are longer.
 _TRAILING_NS = NS_PER_S
 _TRAILING_PERIODS = 4
 
@@ -265,7 +265,7 @@ def _rates(times: Sequence[int], trailing_ns: int) -> list[Point]:
     return points
 
 
-def _told_rate(check: TopicRate, times: Sequence[int]) -> str:
+def _describe_rate(check: TopicRate, times: Sequence[int]) -> str:
     gaps = [(b - a) / NS_PER_MS for a, b in pairwise(times)]
     if len(times) < 2 or times[-1] == times[0]:
         return f"{counted(len(times), 'message')} on {check.topic} in the window."

@@ -1,4 +1,4 @@
-"""Checks on a node that logs what it receives: each number, or each message converted into one unit or several."""
+"""Checks on a node that logs what it receives: each number, or each message converted to one or more units."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.core.trace import Endpoint, Trace
-from grader.judging.charts.drawing import happenings, plain_topic, points_of, series, time_chart, written_in_lane
+from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
 from grader.judging.output import (
-    Heard,
+    LoggedNumbers,
     Output,
     Sought,
-    crowd,
     followed,
     in_window,
     numbers_in,
@@ -27,6 +26,7 @@ from grader.judging.output import (
     shows_about,
     standing,
     student_records,
+    surroundings,
     times,
     wrong_conversion,
 )
@@ -43,16 +43,16 @@ from grader.judging.values import (
 )
 from grader.judging.wording import counted, moment, number, numbers, quote, unit_of
 
-#: How long after a message its log may come, where there are as many numbers as it takes.
+#: How long after a message its log may come, if there are enough numbers in total.
 _LATE_NS = NS_PER_S
-#: A number tells something if its last digit is at most this share of the largest value.
+#: A number is precise enough if its last digit is at most this share of the largest value.
 _FINE = 0.1
 _Logged = Callable[[Sequence[Output], Sequence[Sought]], frozenset[int]]
 
 
 @dataclass(frozen=True, slots=True)
 class _Received:
-    """One message: its time, the time until which its log is its own, and its number."""
+    """A message: its time, the end of the time for its log, and its number."""
 
     t_ns: int
     stop_ns: int
@@ -61,18 +61,18 @@ class _Received:
 
 @dataclass(frozen=True, slots=True)
 class LogsValues:
-    """A process logs what it receives: for each message all of its converted numbers, in one record or in several.
+    """A process logs what it receives: all converted numbers of each message, in one record or in several.
 
     Numbers count to the precision printed, with their sign; a conversion may use a constant such as 3.14159. A number
-    whose last digit is more than a tenth of the largest value tells nothing, and neither does one that stands among so
-    many others that chance explains it. A log may come up to a second late, if
-    none is left out. Numbers that are printed instead are half of it.
+    is ignored if its last digit is more than a tenth of the largest value, or if it appears among so many others that
+    chance explains it. A log may come up to a second late if none is left out. Numbers that are printed instead of
+    logged give half the points.
 
     Attributes:
         process: File name of the student process.
-        topic: Topic that the messages are published on.
+        topic: Topic of the messages.
         field: Path of the number.
-        unit_factors: What the number is multiplied by; all of the products must be logged.
+        unit_factors: Factors by which the number is multiplied; all of the products must be logged.
         share: Share of the messages that must be logged.
     """
 
@@ -116,7 +116,7 @@ class LogsValues:
             return faulted(fault, lost, evidence)
         if hidden:
             first = unlogged[0]
-            among = crowd(records, self._sought([first], [first.stop_ns])[0])
+            among = surroundings(records, self._sought([first], [first.stop_ns])[0])
             share = f"{len(unlogged)} of {counted(len(received), 'message')}"
             return _hidden(self, share, (first.value, first.t_ns), among, evidence)
         outputs = records if any(numbers_in(r.text) for r in records) else lines
@@ -151,7 +151,7 @@ class LogsValues:
         return [r for k, r in enumerate(received) if not found >= set(range(k * many, (k + 1) * many))]
 
     def _sought(self, received: Sequence[_Received], stops_ns: Sequence[int]) -> list[Sought]:
-        """Return what is to be logged: for each message one value a factor."""
+        """Return the values that must be logged: one per factor for each message."""
         largest = max(abs(r.value) for r in received)
         return [
             Sought(r.t_ns, stop_ns, f * r.value, abs(f) * largest, partial(_shows, f * r.value, abs(f) * largest))
@@ -205,7 +205,7 @@ class LogsValues:
             return "", rule
         if len(silent) > len(received) / 2:
             return f"nothing is logged at {len(silent)} of the messages", rule
-        heard = [Heard(r.value, self._numbers(r, outputs)) for r in received]
+        heard = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         largest = max(abs(r.value) for r in received)
         right = [f for f in self.unit_factors if self._mostly(heard, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
@@ -219,7 +219,7 @@ class LogsValues:
     def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Any, ...]:
         return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
 
-    def _mostly(self, heard: Sequence[Heard], factor: float, coarsest: float) -> bool:
+    def _mostly(self, heard: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
         hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
         return hits > 0.8 * len(heard)
 
@@ -228,21 +228,21 @@ def _shows(value: float, largest: float, printed: Printed) -> bool:
     return shows_about(printed, value, coarsest=_FINE * largest)
 
 
-#: A value that was there for less than this need not have been logged.
+#: A value that lasted less than this need not be logged.
 _SHORTEST_NS = 1_200 * NS_PER_MS
 _PRINT_HINT = "write the received values through the node's logger: self.get_logger().info(...)"
 
 
 @dataclass(frozen=True, slots=True)
 class LogsReceived:
-    """A process logs the numbers that are published to it, each at least once while it lasts or up to a second later.
+    """A process logs the numbers published to it, each at least once while it lasts or up to a second later.
 
-    Numbers count to the precision printed. One that stands among so many others that chance explains it shows nothing:
-    a place in the text must follow the values. Values that are printed instead of logged are half of it.
+    Numbers count to the precision printed. A number among so many others that chance explains it is ignored: a position
+    in the text must follow the values. Values that are printed instead of logged give half the points.
 
     Attributes:
         process: File name of the student process.
-        topic: Topic that the numbers are published on.
+        topic: Topic of the numbers.
     """
 
     process: str
@@ -283,7 +283,7 @@ class LogsReceived:
             return faulted(fault, lost, evidence)
         if absent:
             return self._unlogged(subscriptions, values, absent, evidence)
-        among = crowd(records, sought[values.index(unlogged[0])])
+        among = surroundings(records, sought[values.index(unlogged[0])])
         share = f"{len(unlogged)} of {len(values)} values"
         return _hidden(self, share, (unlogged[0].value, unlogged[0].start_ns), among, evidence)
 
@@ -323,7 +323,7 @@ class LogsReceived:
         return not_met(reason, evidence, hint=hint)
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the numbers given to a node and what it wrote meanwhile, or None if nothing was given."""
+        """Return the numbers published to a node and what it wrote meanwhile, or None without numbers."""
         sent = delivered_numbers(trace, self.topic)
         if not sent:
             return None
@@ -348,7 +348,7 @@ class LogsReceived:
 
 
 def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
-    """Return the values that are not logged, but for one that came so late that it need not be."""
+    """Return the values that are not logged, except for one that came too late."""
     return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
 
 
@@ -359,7 +359,7 @@ def _shows_exactly(value: float, printed: Printed) -> bool:
 def _hidden(
     check: LogsValues | LogsReceived, share: str, first: tuple[float, int], among: str, evidence: dict[str, Any]
 ) -> Finding:
-    """Return no credit for numbers that stand among others; `first` is the first of them and its time."""
+    """Return no credit for numbers that appear among others; `first` is the first of them and its time."""
     value, t_ns = first
     reason = f"{check.process}: {share} of {check.topic} are not told from other numbers, the first is {number(value)} "
     hint = f"log the number that came on {check.topic}, and none that it might have been"
@@ -367,10 +367,10 @@ def _hidden(
 
 
 def _nothing(trace: Trace, process: str, problem: str) -> Finding:
-    """Return no credit for a process that ended before anything came.
+    """Return no credit for a process that ended before any message came.
 
     Raises:
-        HarnessError: It lived: `problem`.
+        HarnessError: The process was running: `problem`.
     """
     found = explain_fault(trace, "nothing was logged after it", process=process)
     if found is None:

@@ -1,4 +1,4 @@
-"""Checks on a student's service server: that it is there, that it answers, and what."""
+"""Checks on a student's service server: that it exists, that it answers, and the content of its answers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
-from grader.judging.values import FieldRule, breach, broken_rules, number_at, text_at, told
+from grader.judging.values import FieldRule, breach, broken_rules, number_at, rules_text, text_at
 from grader.judging.wording import counted, moment, number, numbers, quote, span
 
 _RETURN_HINT = "a service callback takes (self, request, response) and ends with return response"
@@ -38,7 +38,7 @@ class ServiceAvailable:
         return f"the service {self.service} with type {self.type}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for one fitting server or more."""
+        """Return full credit for at least one matching server."""
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
         if not answers and not ends:
@@ -50,14 +50,14 @@ class ServiceAvailable:
 
 @dataclass(frozen=True, slots=True)
 class ServiceAnswersAll:
-    """A student's server answers every request of every client of the grader's, each within a time.
+    """A student's server answers every request of the grader's clients, each within a time.
 
-    Requests whose time is not over when the recording ends are left out.
+    Requests that are not yet due when the recording ends are left out.
 
     Attributes:
         service: Service name as on the wire.
-        within: How long a response may take.
-        at_least: How many requests there must have been to tell.
+        within: Longest time to a response.
+        at_least: Number of requests needed for a judgement.
     """
 
     service: str
@@ -106,14 +106,14 @@ def _due(call: Call, trace: Trace, late_ns: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServiceResponse:
-    """Every response of a student's server holds what is expected in each field named.
+    """Every response of a student's server has the expected value in each named field.
 
-    Whether there is a response to every request is the question of `service_answers_all`.
+    Whether every request has a response is judged by `service_answers_all`.
 
     Attributes:
         service: Service name as on the wire.
         fields: What is expected by field path: a value, or `{equals, tolerance, low, high, pattern, example}`.
-        at_least: How many responses there must be to tell.
+        at_least: Number of responses needed for a judgement.
     """
 
     service: str
@@ -123,7 +123,7 @@ class ServiceResponse:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        return f"in every response of {self.service}: {told(self.fields)}"
+        return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if no response differs; the reason names the first that does."""
@@ -133,7 +133,7 @@ class ServiceResponse:
         wrong = [(k, r) for k, r in enumerate(found, 1) if broken_rules(r.value, self.fields)]
         evidence = {"service": self.service, "responses": len(found), "wrong": len(wrong)}
         if not wrong:
-            return met(f"{self.service}: {told(self.fields)} in {counted(len(found), 'response')}", evidence)
+            return met(f"{self.service}: {rules_text(self.fields)} in {counted(len(found), 'response')}", evidence)
         place, first = wrong[0]
         path = broken_rules(first.value, self.fields)[0]
         reason = f"{moment(first.t_ns)}, {self.service}: {breach(first.value, path, self.fields[path])} in response "
@@ -144,13 +144,13 @@ class ServiceResponse:
 
 
 def _hint(response: Response, path: str) -> str:
-    """Return that a field was left at its default, where it holds that."""
+    """Return a hint if a field was left at its default; empty otherwise."""
     value = response.value.get(path)
     return f"set response.{path} before the response is returned" if value in ("", False) else ""
 
 
 def too_few_responses(trace: Trace, service: str, found: int, wanted: int) -> Finding:
-    """Return no credit and why a server has not answered often enough."""
+    """Return no credit with the reason why a server gave too few responses."""
     if not trace.requests(service, "grader"):
         return never_asked(trace, service)
     reason = f"{service}: {counted(found, 'response')}, expected at least {max(1, wanted)}"
@@ -158,10 +158,10 @@ def too_few_responses(trace: Trace, service: str, found: int, wanted: int) -> Fi
 
 
 def never_asked(trace: Trace, service: str) -> Finding:
-    """Return no credit and why a server could not be asked.
+    """Return no credit with the reason why a server could not be called.
 
     Raises:
-        HarnessError: It was there, and lived.
+        HarnessError: The server existed and was running.
     """
     fault = first_fault(trace)
     if not trace.service_ends("service", service):
@@ -177,7 +177,7 @@ _KEEP_HINT = "keep the number in an attribute of the node, self.name, and change
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """One response with the number read from it and the one expected; `got` is None where none could be read."""
+    """A response with the number read from it and the expected one; `got` is None if no number could be read."""
 
     response: Response
     got: float | None
@@ -186,22 +186,22 @@ class _Answer:
 
 @dataclass(frozen=True, slots=True)
 class ServiceSequence:
-    """A number in the responses of a student's server goes on by one step with each call, whoever calls.
+    """A number in the responses of a student's server changes by one step with each call, whoever calls.
 
     The number is read from a numeric field, or from a text: its first number, or what `pattern` finds. Calls of one
-    instant may be answered in any order, and a server that lags behind may answer in an order of its own. How the text
-    is written otherwise is the question of `service_response`.
+    instant may be answered in any order, and so may those to a server that lags behind. The rest of the text is judged
+    by `service_response`.
 
     Attributes:
         service: Service name as on the wire.
         first: Number in the first response.
-        step: Difference from one response to the next; negative for a number that falls.
-        field: Path of the field that holds the number.
-        floor: Number that is not gone below (for a rising number: above).
-        reset_to: Number that comes instead of the next one beyond `floor`; without it the last one stays.
+        step: Difference from one response to the next; negative for a falling number.
+        field: Path of the field with the number.
+        floor: Smallest number (for a rising number: largest).
+        reset_to: Number that replaces the next one beyond `floor`; if left out, the last number stays.
         pattern: Regular expression whose first group, or whole match, is the number in a text.
         tolerance: Largest difference.
-        at_least: How many responses there must be to tell.
+        at_least: Number of responses needed for a judgement.
     """
 
     service: str
@@ -229,7 +229,7 @@ class ServiceSequence:
         answered = sorted((c for c in calls if c.response is not None), key=answered_ns)
         if len(answered) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(answered), self.at_least)
-        # A server that lags behind may lose requests, or take them in an order of its own.
+        # A server that lags behind may lose requests, or process them in another order.
         orders = (self._answers(calls, asked_ns), self._answers(answered, answered_ns))
         answers = min(orders, key=lambda order: len(self._wrong(order)))
         wrong = self._wrong(answers)
@@ -250,7 +250,7 @@ class ServiceSequence:
         return [k for k, a in enumerate(answers) if a.got is None or not within(a.got, a.wanted, self.tolerance)]
 
     def _answers(self, calls: Sequence[Call], instant: Callable[[Call], int]) -> list[_Answer]:
-        """Return the responses in the order of their calls, those of one instant in the order of their numbers."""
+        """Return the responses in the order of their calls; within one instant, in the order of their numbers."""
         wanted = self._sequence()
         found: list[_Answer] = []
         for _, group in groupby(calls, key=instant):
@@ -262,13 +262,13 @@ class ServiceSequence:
         return found
 
     def _answer(self, response: Response, wanted: list[float]) -> _Answer:
-        """Return the answer with the number that it should hold, which is taken out of those of its instant."""
+        """Return the answer with its expected number, removed from the expected numbers of its instant."""
         got = self._read(response)
         fitting = (k for k, w in enumerate(wanted) if got is not None and within(got, w, self.tolerance))
         return _Answer(response, got, wanted.pop(next(fitting, 0)))
 
     def _sequence(self) -> Iterator[float]:
-        """Yield the numbers expected, rounded so that no error adds up."""
+        """Yield the expected numbers, rounded to prevent accumulating errors."""
         value = self.first
         while True:
             yield value
@@ -305,7 +305,7 @@ class ServiceSequence:
         return f"no field {self.field} with a number" if text is None else f"no number in {quote(text, 60)!r}"
 
     def _instead(self, got: Sequence[float | None], place: int) -> tuple[str, str]:
-        """Return what the numbers do instead, and a hint; both empty if that is not plain."""
+        """Return a clause about what the numbers do instead, and a hint; both empty if unclear."""
         values = [v for v in got if v is not None]
         if len(values) < max(3, len(got)):
             return "", ""
@@ -334,5 +334,5 @@ def asked_ns(call: Call) -> int:
 
 
 def answered_ns(call: Call) -> int:
-    """Return when a call was answered; when it was sent, if it never was."""
+    """Return when a call was answered; without a response, when it was sent."""
     return call.request.t_ns if call.response is None else call.response.t_ns

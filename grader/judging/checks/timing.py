@@ -1,4 +1,4 @@
-"""Checks on when messages come: their gaps, how soon after an input, what follows from one, and not at all."""
+"""Checks on when messages come: gaps, latency, silence, and reactions to inputs."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from grader.judging.values import (
     broken_rules,
     heard_from_ns,
     published,
+    rules_text,
     student_endpoints,
-    told,
     value_at,
 )
 from grader.judging.wording import counted, listed, moment, number, quote, span
@@ -49,8 +49,8 @@ MarkName = Literal[
 class Period:
     """The gaps between the messages on a topic are neither too short nor too long, one by one or on average.
 
-    What `topic_rate` asks on average, with a window and an end, this asks of each gap. On the wall clock a gap may be
-    off by 50 ms.
+    `topic_rate` judges the average, with a window and an end; this check judges each gap. On the wall clock, a gap may
+    be off by 50 ms.
 
     Attributes:
         topic: Topic name as on the wire.
@@ -58,7 +58,7 @@ class Period:
         largest: Longest gap allowed.
         average: Average gap expected.
         tolerance: Largest difference of the average, as a share of it; the edge is inside.
-        at_least: How many messages there must be to tell.
+        at_least: Number of messages needed for a judgement.
     """
 
     topic: str
@@ -113,9 +113,9 @@ class Period:
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """After each input on one topic a message on another follows within a time, whatever it holds.
+    """After each input on one topic, a message on another follows within a time, whatever its content.
 
-    Inputs whose time is not over when the recording ends are left out. On the wall clock 50 ms are let pass.
+    Inputs whose time is not over when the recording ends are left out. On the wall clock, 50 ms more are accepted.
 
     Attributes:
         input: Topic of the inputs.
@@ -173,17 +173,17 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Silence:
-    """Nothing is published on a topic for a while: in a window of the recording, or after or before a moment of it.
+    """Nothing is published on a topic for some time: in a window of the recording, or after or before a moment of it.
 
-    The window begins at the mark `after`, else with the recording, and ends at the mark `before`, else with the
-    recording. A node that crashed by then earns nothing by its silence.
+    The window begins at the moment `after`, or else with the recording, and ends at the moment `before`, or else with
+    the recording. A node that crashed by then earns no points for its silence.
 
     Attributes:
         topic: Topic name as on the wire.
-        after: Moment from which on there is silence, e.g. `stream_stops`.
-        before: Moment up to which there is silence, e.g. `stream_starts`.
-        of: Topic, service or file that the moment belongs to; any if left out.
-        grace: Time from the beginning of the window in which messages are let pass.
+        after: Moment at which the silence begins, e.g. `stream_stops`.
+        before: Moment at which the silence ends, e.g. `stream_starts`.
+        of: Topic, service or file of the moment; any if left out.
+        grace: Time from the beginning of the window in which messages are accepted.
         duration: Length of the window after its grace; up to its end if left out.
     """
 
@@ -202,7 +202,7 @@ class Silence:
         return f"no message on {self.topic} {' and '.join(parts).replace('_', ' ')}{grace}".replace("  ", " ")
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the window holds no message; the reason names the first that it holds."""
+        """Return full credit if the window has no message; the reason names the first one."""
         fault = first_fault(trace)
         start_ns = self._moment(trace, self.after, 0)
         stop_ns = self._moment(trace, self.before, trace.stop_ns)
@@ -246,13 +246,13 @@ def _no_input(trace: Trace, topic: str) -> Finding:
 
 @dataclass(frozen=True, slots=True)
 class ReactionCase:
-    """One kind of input and what is to come of it.
+    """A kind of input and the expected output.
 
     Attributes:
-        when: What the input holds, by field path; the first case that fits is the one that applies.
-        then: What the output has to hold, by field path.
-        copies: Output field path -> input field path that it has to equal.
-        silent: Whether nothing may come at all.
+        when: Content of the input, by field path; the first matching case applies.
+        then: Content of the output, by field path.
+        copies: Output field path -> input field path with the same value.
+        silent: Whether no output may come at all.
     """
 
     when: Mapping[str, str | float | bool | FieldRule]
@@ -261,7 +261,7 @@ class ReactionCase:
     silent: bool = False
 
     def rules(self, given: Mapping[str, Any]) -> dict[str, RuleOrValue]:
-        """Return what the output has to hold after an input."""
+        """Return the rules for the output after an input."""
         return {**self.then, **{path: _copied(given, source) for path, source in self.copies.items()}}
 
 
@@ -279,7 +279,7 @@ def _copied(given: Mapping[str, Any], source: str) -> RuleOrValue:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """One input, the case it belongs to, and the outputs from it up to the next input."""
+    """An input, its case, and the outputs until the next input."""
 
     given: Delivery | Message
     case: ReactionCase
@@ -289,18 +289,18 @@ class _Asked:
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """After each input an output comes that fits it: its fields hold what the case of that input asks for.
+    """After each input comes a matching output: its fields hold what the case of that input requires.
 
-    The fitting output must come within a time, and no other may follow it until the next input. So a node may answer
-    once, or repeat its answer on a timer, or go on with the old one until its next period. Inputs that fit no case are
-    not asked about. Every case must have been tried.
+    The matching output must come within a time, and no other may follow it until the next input. So a node may answer
+    once, repeat its answer on a timer, or continue with the old one until its next period. Inputs without a matching
+    case are ignored. Every case must have been tried.
 
     Attributes:
         input: Topic of the inputs.
         output: Topic of the outputs.
         cases: Each with `when`, and `then`, `copies` or `silent`.
-        within: How long the output may take.
-        tolerance: Largest difference of a number that is given without a tolerance of its own.
+        within: Longest time to the output.
+        tolerance: Largest difference of a number without a tolerance of its own.
     """
 
     input: str
@@ -315,7 +315,7 @@ class Reaction:
         return f"within {span(self.within)} of each {self.input} a message on {self.output} that fits it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input is answered rightly; the reason names the first that is not."""
+        """Return full credit if every input has the right output; the reason names the first that has not."""
         asked = self._asked(trace)
         outputs = published(trace, self.output)
         missing = [case for case in self.cases if not any(a.case is case for a in asked)]
@@ -347,7 +347,7 @@ class Reaction:
         return found
 
     def _wrong(self, trace: Trace, asked: _Asked) -> str:
-        """Return what is wrong with the outputs after an input; empty if nothing is."""
+        """Describe what is wrong with the outputs after an input; empty if nothing is."""
         if asked.case.silent:
             return f"{moment(asked.outputs[0].t_ns)}: a message came, expected none" if asked.outputs else ""
         rules = asked.case.rules(asked.given.value)
@@ -365,7 +365,7 @@ class Reaction:
             took = seconds(late.t_ns - asked.given.t_ns)
             return f"the right message came after {took:.3f} s, expected within {span(self.within)}"
         if not asked.outputs:
-            return f"no message within {span(self.within)}, expected {told(rules)}"
+            return f"no message within {span(self.within)}, expected {rules_text(rules)}"
         return self._difference(asked.outputs[-1], rules)
 
     def _difference(self, output: Message, rules: Mapping[str, RuleOrValue]) -> str:
@@ -392,7 +392,7 @@ class Reaction:
 
     def _untried(self, trace: Trace, missing: Sequence[ReactionCase]) -> Finding:
         fault = first_fault(trace)
-        case = told(missing[0].when)
+        case = rules_text(missing[0].when)
         if fault is not None:
             return faulted(fault, f"{self.input} with {case} did not come before")
         if not trace.deliveries(self.input):

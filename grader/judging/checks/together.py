@@ -1,4 +1,4 @@
-"""The check on a sensor and a controller that run at once: every number is answered, and rightly."""
+"""The check on a sensor and a controller that run together: every number gets the right answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from grader.core.chart import Chart, Look, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
-from grader.judging.charts.drawing import (
+from grader.judging.charts import (
     answer_panel,
     happenings,
     input_panel,
@@ -37,37 +37,37 @@ from grader.judging.values import (
 )
 from grader.judging.wording import counted, moment, number, quote, span, unit_of
 
-#: An answer may belong to any input that was current so long before it.
+#: An answer may belong to any input that was current within this time before it.
 _CURRENT_NS = 250 * NS_PER_MS
-#: A controller must speak within this time where its last answer does not fit the input: one period of 1 s and slack.
+#: A controller must publish within this time if its last answer does not fit the input: one period of 1 s and slack.
 _SPEAK_NS = 1_250 * NS_PER_MS
-#: Share of the answers that must fit the input of one and the same delay, where there are enough of them.
+#: Minimum share of the answers that must fit the inputs with one common delay, if there are enough answers.
 _AGREEING_SHARE = 0.75
-#: The same where time is exact and about every input is answered.
+#: The same if time is exact and nearly every input is answered.
 _AGREEING_SHARE_PROMPT = 0.97
 _FEWEST_FOR_SHARE = 10
-#: Gaps that differ by this at most, and the share of them from which on they are those of a timer.
+#: Gaps that differ by at most this, and their minimum share, for answers to come from a timer.
 _EVEN_NS, _EVEN_SHARE = 20 * NS_PER_MS, 0.9
-#: Share of the inputs on one side up to which an answer to them may be missing where answers are few.
+#: Maximum share of the inputs on one side whose answers may be missing if answers are rare.
 _RARE = 0.3
-#: Fewest steps that show in which range a sensor draws, and how many usual steps that range holds at most. Independent
-#: draws span 3 to 5 of their steps, a random walk of so many steps spans 10 and more.
+#: Fewest steps that reveal the sensor's range, and the largest ratio of range to usual step. Independent draws span 3
+#: to 5 of their steps, a random walk with this many steps spans 10 and more.
 _FEWEST_TO_STAY = 40
 _STEPS_IN_RANGE = 6.0
 
 
 @dataclass(frozen=True, slots=True)
 class AnswersTogether:
-    """A sensor and a controller talk to each other: each answer fits an input of the moment, and the answers go on.
+    """A sensor and a controller work together: each answer fits a current input, and the answers continue.
 
-    Where the sensor subscribes to the answers, types and QoS must let it hear them.
+    If the sensor subscribes to the answers, types and QoS must be compatible.
 
-    The controller may answer each input, publish on change only, or publish on a timer of up to a second. Where inputs
-    lie on both sides of the threshold, both answers must occur. An input that never changes, or that is drawn again and
-    again from one side only, shows nothing; one that wanders too slowly to reach the other side is let pass.
+    The controller may answer each input, publish only on change, or publish on a timer of up to a second. If inputs are
+    on both sides of the threshold, both answers must occur. Inputs that never change, or that are drawn again and again
+    from one side only, prove nothing; inputs that change too slowly to reach the other side are accepted.
 
-    Where answers are few, as from a timer of a second, a limit that is a little off may hide between the inputs:
-    `threshold_response` asks for the limit itself.
+    If answers are rare, as from a timer of a second, a slightly wrong limit may go unnoticed: `threshold_response`
+    judges the limit itself.
 
     Attributes:
         input: Topic of the sensor.
@@ -91,7 +91,7 @@ class AnswersTogether:
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of that holds; the reason names the first moment at which it does not."""
+        """Return full credit if all of this holds; the reason names the first violation."""
         sent, answered = published(trace, self.input), published(trace, self.output)
         for topic, messages in ((self.input, sent), (self.output, answered)):
             if not messages:
@@ -129,7 +129,7 @@ class AnswersTogether:
         }
 
     def _silent(self, trace: Trace, topic: str) -> Finding:
-        """Return why one of the two says nothing; types or policies that keep them apart come first."""
+        """Return why one of the two nodes publishes nothing; incompatible types or QoS come first."""
         apart = _kept_apart(trace, self.input) if topic == self.output else None
         if apart is not None and first_fault(trace) is None:
             return apart
@@ -139,11 +139,11 @@ class AnswersTogether:
         return replace(found, problem=Problem(ProblemKind.NO_MESSAGE, (topic,)))
 
     def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
-        """Return that different answers come at one instant where no input of the moment explains both."""
+        """Return a finding if different answers of one instant fit no current input."""
         times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
         for one, following in pairwise(published_numbers(trace, self.output)):
             recent = _recent(inputs, times, one.t_ns, jitter_ns)
-            # at the instant of the very first input a timer may still have spoken before it
+            # at the instant of the first input, a timer may have fired before it
             if one.t_ns != following.t_ns or one.value == following.value or not recent or one.t_ns == times[0]:
                 continue
             if any(within(one.value, self._expected(r.value), EXACT) for r in recent):
@@ -162,7 +162,7 @@ class AnswersTogether:
         times, jitter_ns, timed = [r.t_ns for r in inputs], JITTER_NS[trace.clock], _on_a_timer(answers)
         for answer in answers:
             recent = _recent(inputs, times, answer.t_ns, jitter_ns)
-            # what a timer told of before the first input, nobody knows: until then either answer may be right
+            # until the first input arrives, a timer may publish either answer
             first = timed and answer.t_ns <= times[0] + jitter_ns
             if first and any(within(answer.value, either, EXACT) for either in (self.above, self.otherwise)):
                 continue
@@ -177,7 +177,7 @@ class AnswersTogether:
     def _behind(
         self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding:
-        """Return that an answer is wrong, and how far behind the answers are if that explains them all."""
+        """Return that an answer is wrong, and by how much the answers lag if that explains all of them."""
         behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
         if not behind:
             return not_met(reason, evidence, problem=self._wrong)
@@ -188,7 +188,7 @@ class AnswersTogether:
     def _inconsistent(
         self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
     ) -> Finding | None:
-        """Return that answers fit now this input and now that one, but at no delay most; None if they do at one."""
+        """Return a finding if no common delay explains most answers; None if one does."""
         times = [r.t_ns for r in inputs]
         later = [a for a in answers if a.t_ns - _CURRENT_NS > times[0]]
         if len(later) < _FEWEST_FOR_SHARE:
@@ -196,7 +196,7 @@ class AnswersTogether:
         prompt = trace.clock is ClockKind.VIRTUAL and len(inputs) <= 2 * len(answers) <= 2 * len(inputs)
         enough = _AGREEING_SHARE_PROMPT if prompt else _AGREEING_SHARE
         shares = []
-        # a timer of its own makes a controller late by one period at most
+        # a controller with its own timer is late by at most one period
         latest_ns = min(_CURRENT_NS, _usual_gap(answers) - 1) if prompt else _CURRENT_NS
         for delay_ns in (-JITTER_NS[trace.clock], *range(0, latest_ns + 1, _CURRENT_NS // 5)):
             for side in (bisect_left, bisect_right):
@@ -227,7 +227,7 @@ class AnswersTogether:
             if later < len(answers) and times[later] <= asked.t_ns + _SPEAK_NS:
                 continue
             before = answers[:later]
-            # before its first answer nobody knows what a controller that publishes on change believes
+            # before its first answer, the state of a controller that publishes only on change is unknown
             if before and not within(before[-1].value, self._expected(asked.value), EXACT):
                 return self._stopped(trace, self.output, before[-1].t_ns, evidence)
         return None
@@ -253,7 +253,7 @@ class AnswersTogether:
             low, high = min(r.value for r in inputs), max(r.value for r in inputs)
             reason = f"{self.output}: never changes, because {self.input} stays between {number(low)} and "
             return not_met(f"{reason}{number(high)}{unit_of(self.input)}", evidence, problem=fixed)
-        # a timer of 1 s may miss what is rare; a controller that answers every other input may not
+        # a timer of 1 s may miss rare inputs; a controller that answers every other input may not
         often = 0 if 2 * len(answers) >= len(inputs) else _RARE * len(inputs)
         asked = {w for w, count in Counter(expected).items() if count > often}
         given = {a.value for a in answers}
@@ -270,7 +270,7 @@ class AnswersTogether:
         return met(f"{reason}all right; the answer changed {counted(evidence['answer_changes'], 'time')}", evidence)
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return what the student's two nodes said to each other, or None if the first was silent."""
+        """Return the messages between the student's two nodes, or None if the first was silent."""
         inputs = published_numbers(trace, self.input)
         answers = published_numbers(trace, self.output)
         if not inputs:
@@ -292,7 +292,7 @@ def _usual_gap(answers: Sequence[Reading]) -> int:
 
 
 def _on_a_timer(answers: Sequence[Reading]) -> bool:
-    """Return whether answers may come from a timer: nearly all of them at one pace."""
+    """Return whether answers may come from a timer: nearly all have the same gap."""
     if len(answers) < _FEWEST_FOR_SHARE:
         return True
     usual = _usual_gap(answers)
@@ -301,7 +301,7 @@ def _on_a_timer(answers: Sequence[Reading]) -> bool:
 
 
 def _stays(inputs: Sequence[Reading]) -> bool:
-    """Return whether the inputs jump about in all of their range, and do not wander slowly towards the rest of it."""
+    """Return whether the inputs jump within all of their range, instead of drifting slowly beyond it."""
     steps = [abs(b.value - a.value) for a, b in pairwise(inputs)]
     values = [r.value for r in inputs]
     return len(steps) >= _FEWEST_TO_STAY and max(values) - min(values) <= _STEPS_IN_RANGE * statistics.median(steps)
@@ -310,7 +310,7 @@ def _stays(inputs: Sequence[Reading]) -> bool:
 def _recent(inputs: Sequence[Reading], times: Sequence[int], t_ns: int, jitter_ns: int) -> Sequence[Reading]:
     """Return the inputs that were current at some moment of the quarter second up to and including `t_ns`.
 
-    On the wall clock an input may reach the controller, and its answer the observer, before the input does.
+    On the wall clock, an input and the answer to it may reach the observer in the wrong order.
     """
     stop = bisect_right(times, t_ns + jitter_ns)
     start = bisect_right(times, t_ns - _CURRENT_NS, hi=stop)
@@ -318,7 +318,7 @@ def _recent(inputs: Sequence[Reading], times: Sequence[int], t_ns: int, jitter_n
 
 
 def _kept_apart(trace: Trace, topic: str) -> Finding | None:
-    """Return why the two ends of a topic cannot talk, their types or their QoS; None if they can."""
+    """Return why the two ends of a topic cannot communicate, by type or QoS; None if they can."""
     publishers = student_endpoints(trace, "publisher", topic)
     subscriptions = student_endpoints(trace, "subscription", topic)
     pairs = [(p, s) for p in publishers for s in subscriptions if p.participant != s.participant]
@@ -340,7 +340,7 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
 
 
 def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
-    """Return what is offered and what is asked for where these do not fit; None if they do."""
+    """Return the offered and the requested policy if they are incompatible; None otherwise."""
     if (publisher.reliability, subscription.reliability) == ("best_effort", "reliable"):
         return "best_effort reliability", "reliable"
     if (publisher.durability, subscription.durability) == ("volatile", "transient_local"):
@@ -349,7 +349,7 @@ def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str
 
 
 def _speakers(trace: Trace, here: Endpoint, there: Endpoint) -> tuple[str, str]:
-    """Return the files of two nodes where the logs or the names tell both, else the nodes."""
+    """Return the files of two nodes if logs or names identify both, else the nodes."""
     files = _file_of(trace, here), _file_of(trace, there)
     return (files[0], files[1]) if files[0] and files[1] else (quote(here.node), quote(there.node))
 

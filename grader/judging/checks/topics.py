@@ -1,4 +1,4 @@
-"""Checks on what a topic carries: its type, its fields, who listens, and transforms between frames."""
+"""Checks on the content of topics: types, fields, subscriptions, and transforms between frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding
 from grader.core.quantities import SLACK, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
-from grader.judging.charts.drawing import happenings, series, time_chart
+from grader.judging.charts import happenings, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
 from grader.judging.values import field, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote
@@ -35,7 +35,7 @@ class Publishes:
         return f"at least one {self.type} message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for one message or more."""
+        """Return full credit for at least one message."""
         messages = [m for m in published(trace, self.topic) if m.type == self.type]
         if not messages:
             return explain_no_message(trace, self.topic, self.type)
@@ -63,7 +63,7 @@ class Subscribes:
         return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher reaches"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for one fitting subscription or more."""
+        """Return full credit for at least one matching subscription."""
         mine = [e for e in student_endpoints(trace, "subscription") if (e.topic, e.type) == (self.topic, self.type)]
         if not mine:
             return explain_no_subscription(trace, self.topic, self.type)
@@ -85,7 +85,7 @@ class Subscribes:
 
 
 def _demand(subscription: Endpoint) -> str:
-    """Return what a subscription asks for that an ordinary publisher does not offer; empty if nothing."""
+    """Return the policy that a subscription requests and an ordinary publisher does not offer; empty if none."""
     if subscription.durability == "transient_local":
         return "transient_local durability, which a volatile publisher does not offer"
     if subscription.deadline_ns:
@@ -99,7 +99,7 @@ def _demand(subscription: Endpoint) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FieldValues:
-    """Every message on a topic holds the same given numbers.
+    """Every message on a topic holds the given numbers.
 
     Attributes:
         topic: Topic name as on the wire.
@@ -130,7 +130,7 @@ class FieldValues:
         return met(reason, {"topic": self.topic, "values": dict(self.values), "messages": len(messages), "wrong": 0})
 
     def _differing(self, messages: Sequence[Message]) -> list[Message]:
-        """Return the messages with a wrong field; one that equals a right one before it is right."""
+        """Return the messages with a wrong field; a message equal to a known right one is right."""
         wrong = []
         right: tuple[str, Mapping[str, Any]] | None = None
         for message in messages:
@@ -169,7 +169,7 @@ class FieldValues:
         return not_met(reason, evidence, hint=self._hint(first))
 
     def _hint(self, message: Message) -> str:
-        """Return what is very likely the slip in a message: place, sign or unit; empty if nothing is."""
+        """Return the very likely slip in a message: field, sign or unit; empty if there is none."""
         got = {p: g for p, g in self._wrong_fields(message).items() if g is not None}
         for path, value in got.items():
             want = self.values[path]
@@ -189,7 +189,7 @@ class FieldValues:
         return ""
 
     def chart(self, trace: Trace) -> Chart | None:
-        """Return the picture of the fields that a self names, or None without messages."""
+        """Return the chart of the fields that the check names, or None without messages."""
         messages = published(trace, self.topic)
         if not messages:
             return None
@@ -198,14 +198,14 @@ class FieldValues:
         return time_chart(
             f"fields {self.topic}",
             f"{title} on {self.topic}",
-            _told_fields(self, messages),
+            _describe_fields(self, messages),
             (_field_panel(self, messages, group),),
             happenings(trace),
         )
 
 
 def _sign_or_unit(path: str, got: float, want: float) -> str:
-    """Return a hint for a value that is right but for its sign or its unit."""
+    """Return a hint for a value that has the wrong sign or unit; empty otherwise."""
     if got == 0.0 or not math.isfinite(got):
         return ""
     ratio = got / want
@@ -241,7 +241,7 @@ def _field_panel(check: FieldValues, messages: tuple[Message, ...], group: str) 
     return Panel(group if same else "value", _UNITS.get(group, "") if same else "", tuple(lines), levels=levels)
 
 
-def _told_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
+def _describe_fields(check: FieldValues, messages: tuple[Message, ...]) -> str:
     parts = []
     for path, want in check.values.items():
         got = [g for g in (field(m.value, path) for m in messages) if g is not None]
@@ -274,18 +274,18 @@ class _Found:
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """The transform from a parent frame to a child frame is published, with the translation and rotation named.
+    """The transform from a parent frame to a child frame is published, with the given translation and rotation.
 
-    Every one that is published has to be right. A quaternion and its negative are the same rotation.
+    Every published one must be right. A quaternion and its negative are the same rotation.
 
     Attributes:
-        parent: Frame that the transform is given in, e.g. `odom`.
-        child: Frame whose place it tells, e.g. `base_link`.
+        parent: Parent frame of the transform, e.g. `odom`.
+        child: Child frame of the transform, e.g. `base_link`.
         static: Whether it must be on `/tf_static`, or on `/tf`; either if left out.
-        translation: Metres along `x`, `y` and `z` expected; those left out are free.
-        rotation: Quaternion expected, `x`, `y`, `z` and `w`; those left out are 0. Free if there is none.
+        translation: Expected metres along `x`, `y` and `z`; those left out are free.
+        rotation: Expected quaternion `x`, `y`, `z` and `w`; those left out are 0. Free if left out entirely.
         tolerance: Largest difference of each number.
-        rate: Rate expected; free if left out.
+        rate: Expected rate; free if left out.
         rate_tolerance: Largest difference of the rate.
     """
 
@@ -309,7 +309,7 @@ class Transform:
         return {True: ("/tf_static",), False: ("/tf",), None: ("/tf", "/tf_static")}[self.static]
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it is there and always right; the reason names the first that is not."""
+        """Return full credit if it exists and is always right; the reason names the first that is not."""
         found = [_Found(m.t_ns, t) for topic in self._topics for m in published(trace, topic) for t in _transforms(m)]
         wanted = (self.parent.lstrip("/"), self.child.lstrip("/"))
         mine = sorted((f for f in found if f.frames == wanted), key=lambda f: f.t_ns)

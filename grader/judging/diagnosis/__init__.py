@@ -1,4 +1,4 @@
-"""Goes through the verdicts that lost points and adds what very likely caused them; outcomes and points stay."""
+"""Adds the very likely cause to verdicts that lost points; outcomes and points stay."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from grader.judging.diagnosis.rules import Case, Clue, Rule
 from grader.judging.findings import FAULT_KEY
 from grader.judging.source import Source, first_line, last_name, read, text_of
 
-#: The modules of rules, in the order in which they are asked; within each the order is that of the text.
+#: Modules of rules, in the order of evaluation; the rules of each follow the order of the text.
 _MODULES = (loading, callbacks, crashes, silence, rates, values, logs, positions, fan)
-#: Every rule there is; the first that applies is named.
+#: All rules; the first that applies wins.
 RULES: tuple[Rule, ...] = tuple(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _LOG = logging.getLogger(__name__)
-#: Evidence key that holds the id of the cause.
+#: Evidence key for the id of the cause.
 CAUSE_KEY = "diagnosis"
 
 
@@ -40,10 +40,10 @@ def diagnose(
     """Return the verdicts with a place and one hint wherever a cause is very likely.
 
     Args:
-        verdicts: In rubric order; outcomes, points and reasons are returned as they are.
-        exercise: What was asked.
-        traces: Scenario id -> what was recorded.
-        submission: Says under which path each wanted file was found.
+        verdicts: In rubric order; outcomes, points and reasons stay unchanged.
+        exercise: The exercise.
+        traces: Scenario id -> trace.
+        submission: Gives the path at which each wanted file was found.
         sources: Wanted file name -> its text.
     """
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
@@ -52,14 +52,14 @@ def diagnose(
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    said = _Said(exercise)
+    said = _Reporter(exercise)
     return tuple(said.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
 
 
 def clue_for(case: Case) -> tuple[str, Clue] | None:
-    """Return the id and the clue of the first rule that applies to a case; None if nothing is very likely.
+    """Return id and clue of the first rule that applies to a case; None if no cause is very likely.
 
-    A rule that raises is logged and passed over: a mistake of ours must not keep a student from a report.
+    A rule that raises is logged and skipped: our own bugs must not prevent a report.
     """
     for rule in RULES:
         try:
@@ -73,8 +73,8 @@ def clue_for(case: Case) -> tuple[str, Clue] | None:
 
 
 @dataclass(slots=True)
-class _Said:
-    """Remembers which cause was named with which criterion, so that none is named twice."""
+class _Reporter:
+    """Remembers the criterion with which each cause was reported, so that none is reported twice."""
 
     exercise: Exercise
     owner: dict[str, str] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class _Said:
     def on(
         self, verdict: Verdict, criterion: Criterion, traces: Mapping[str, Trace], sources: Mapping[str, Source]
     ) -> Verdict:
-        """Return the verdict with what is known about its cause."""
+        """Return the verdict with its cause, if known."""
         trace = traces.get(criterion.scenario)
         if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
             return verdict
@@ -107,7 +107,7 @@ class _Said:
         return Case(criterion, verdict, trace, own, _fault_of(verdict, trace), siblings)
 
     def _follows(self, check: Check, verdict: Verdict) -> str:
-        """Return the criterion whose loss explains that two nodes do not work together; empty if none surely does."""
+        """Return the criterion whose failure explains why two nodes do not work together; empty if unclear."""
         problem = verdict.problem
         if not isinstance(check, AnswersTogether) or problem is None:
             return ""
@@ -139,7 +139,7 @@ def _fault_of(verdict: Verdict, trace: Trace) -> Fault | None:
 
 
 def placed(notes: tuple[str, ...], submission: Submission, sources: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the notes; one that says that nothing calls main() names the line of the guard or of main itself."""
+    """Return the notes; a note that nothing calls main() gets the line of the guard or of main."""
     files = {submission.files[name].found or name: text for name, text in sources.items()}
     uncalled = {main_not_called(file): file for file in files}
     return tuple(_placed(uncalled[note], files[uncalled[note]]) if note in uncalled else note for note in notes)
@@ -158,7 +158,7 @@ def _placed(file: str, text: str) -> str:
 
 
 def _wrong_guard(source: Source) -> ast.If | None:
-    """Return the condition at the top of the file that was meant for the usual one."""
+    """Return the top-level condition that was probably meant to be the `__main__` guard."""
     for node in source.all(ast.If):
         test = node.test
         if source.function_of(node) is not None or not isinstance(test, ast.Compare):

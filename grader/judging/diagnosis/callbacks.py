@@ -1,4 +1,4 @@
-"""Causes behind exceptions while a node is built, and around its callbacks: what is passed, taken, or not there yet."""
+"""Causes of exceptions while a node is constructed, and around its callbacks: wrong arguments, or missing values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _QUOTES = "\"'"
 
 @crash_rule("", *FaultKind)
 def _callback_called(crash: Crash) -> Clue | None:
-    """`create_timer(0.05, self.tick())`: the function runs once, and its result is what is called back."""
+    """`create_timer(0.05, self.tick())`: the function runs once, and its result is used as the callback."""
     source = crash.source
     result = crash.said(r"not callable|callable object|callback should be either")
     for item in (*made(source, "timer"), *made(source, "subscription")):
@@ -38,7 +38,7 @@ def _returns_nothing(source: Source, call: ast.Call) -> bool:
 
 @crash_rule()
 def _callback_signature(crash: Crash) -> Clue | None:
-    """A callback that does not take what it is called with."""
+    """A callback does not accept the arguments that it is called with."""
     return (
         _lacks_self(crash, crash.source)
         or _timed_with_message(crash, crash.source)
@@ -112,7 +112,7 @@ def _service_signature(crash: Crash) -> Clue | None:
 
 @crash_rule("NoneType|has no attribute")
 def _no_data_yet(crash: Crash) -> Clue | None:
-    """What a callback is to store is read before the first message has come."""
+    """A value that a callback stores is read before the first message."""
     source = crash.source
     function = source.function_at(crash.line)
     callbacks = {last_name(m.callback) for m in made(source, "subscription")}
@@ -173,7 +173,7 @@ def _missing_qos(crash: Crash) -> Clue | None:
 
 
 def _call_at_fault(crash: Crash, *names: str) -> ast.Call | None:
-    """Return the call of one of these names in the line of the fault."""
+    """Return the call of one of these functions on the line of the fault."""
     return next((c for c in crash.source.calls(*names) if covers(c, crash.line)), None)
 
 
@@ -187,7 +187,7 @@ def _read_only_property(crash: Crash) -> Clue | None:
 
 @crash_rule()
 def _super_init(crash: Crash) -> Clue | None:
-    """The constructor of Node was not called, was called too late or was misspelt."""
+    """The constructor of Node was not called, called too late, or misspelt."""
     if crash.said(r"descriptor '__init__' requires a 'super' object"):
         return Clue("super needs parentheses: super().__init__('node_name')")
     misspelt = crash.said(r"'super' object has no attribute '(\w+)'")
@@ -259,7 +259,7 @@ def _init_order(crash: Crash) -> Clue | None:
 
 
 def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | None:
-    """Return that ROS was started after line `used`, or ended before it, in the same function."""
+    """Return a clue if ROS was initialised after line `used`, or shut down before it, in the same function."""
     here = source.function_at(used)
     late = [c for c in inits if first_line(c) > used and source.function_of(c) is here]
     if late and len(late) == len(inits):
@@ -273,7 +273,7 @@ def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | 
 
 @crash_rule()
 def _endpoint_arguments(crash: Crash) -> Clue | None:
-    """Arguments of create_publisher, create_subscription or create_timer in the wrong order or of the wrong kind."""
+    """Arguments of create_publisher, create_subscription or create_timer have the wrong order or type."""
     source = crash.source
     items = (m for kind in ("publisher", "subscription", "timer") for m in made(source, kind))
     item = next((m for m in items if covers(m.call, crash.line) and m.call.args), None)

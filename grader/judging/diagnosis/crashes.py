@@ -1,4 +1,4 @@
-"""Causes behind exceptions from values and names, and behind nodes that end by themselves or never come back."""
+"""Causes of exceptions from values and names, and of nodes that end early or hang."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
 
 
 def _given(crash: Crash, field: str) -> tuple[ast.expr | None, str]:
-    """Return the value that a field is given at the fault, and what stands before it, such as `msg.x = `."""
+    """Return the value assigned to a field at the fault, and the code before it, such as `msg.x = `."""
     source = crash.source
     for statement in source.on_line(crash.line, ast.Assign):
         for target in statement.targets:
@@ -108,7 +108,7 @@ def _rclpy_name(name: str) -> Clue | None:
 
 
 def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
-    """A misspelt attribute of the student's own node, or one that was made a local variable."""
+    """A misspelt attribute of the student's node, or one that was made a local variable."""
     source = crash.source
     if not any(c.name == owner for c in source.all(ast.ClassDef)):
         return None
@@ -135,7 +135,7 @@ def _name_of(source: Source, node: ast.AST) -> str:
 
 @crash_rule("does not support the context manager|__enter__")
 def _with_init(crash: Crash) -> Clue | None:
-    """`with rclpy.init():`, which later releases of rclpy know."""
+    """`with rclpy.init():`, which only later releases of rclpy support."""
     for block in crash.source.on_line(crash.line, ast.With):
         first = block.items[0].context_expr
         if isinstance(first, ast.Call) and chain(first.func) == "rclpy.init":
@@ -158,7 +158,7 @@ def _logger_arguments(crash: Crash) -> Clue | None:
 
 @crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False)
 def _unattended(crash: Crash) -> Clue | None:
-    """The program waits for somebody at the keyboard, or for arguments on the command line."""
+    """The program waits for keyboard input, or for command line arguments."""
     if crash.found[0] != "IndexError":
         what = "input()" if crash.found[0] == "EOFError" else "the keyboard"
         return Clue(f"nobody sits at the keyboard while the node runs: write the values down, without {what}")
@@ -179,7 +179,7 @@ def _endless_recursion(crash: Crash) -> Clue | None:
 
 @crash_rule()
 def _own_raise(crash: Crash) -> Clue | None:
-    """The student's own raise ends the node."""
+    """The student's own `raise` ends the node."""
     source = crash.source
     raised = next(source.on_line(crash.line, ast.Raise), None)
     if raised is None or source.function_at(crash.line) is None:
@@ -260,7 +260,7 @@ def _left_by_exit(crash: Crash) -> Clue | None:
 
 
 def _argument_test(source: Source, node: ast.AST) -> str:
-    """Return the condition on the command line under which a node stands; empty if there is none."""
+    """Return the condition on the command line around a node; empty if there is none."""
     tests = (source.code(n.test, 40) for n in source.around(node) if isinstance(n, ast.If))
     return next((t for t in tests if "argv" in t), "")
 
@@ -278,7 +278,7 @@ def _exit_code(node: ast.AST) -> str:
 
 
 def _at_the_end(source: Source, node: ast.AST) -> bool:
-    """Return whether an exit is the way out after main(), or the answer to Ctrl-C."""
+    """Return whether an exit comes after main(), or handles Ctrl-C."""
     if any(isinstance(n, ast.ExceptHandler) for n in source.around(node)):
         return True
     return source.function_of(node) is None and not _argument_test(source, node)
@@ -298,7 +298,7 @@ def _shut_down_in_callback(crash: Crash) -> Clue | None:
 
 @crash_rule("", FaultKind.EXITED)
 def _no_spin(crash: Crash) -> Clue | None:
-    """The node is made, and the program ends."""
+    """The node is created, and the program ends."""
     source = crash.source
     node = node_made(source)
     if node is None or spins(source) or crash.fault.exit_code != 0:
@@ -340,7 +340,7 @@ def _spins_once(crash: Crash) -> Clue | None:
 
 @crash_rule("", FaultKind.EXITED)
 def _gave_up(crash: Crash) -> Clue | None:
-    """A return that leaves main before the node is spun."""
+    """A `return` leaves main before the node spins."""
     source = crash.source
     last = list(source.calls("spin"))[-1:]
     if not last or crash.fault.exit_code != 0:

@@ -1,4 +1,4 @@
-"""Causes behind a controller that answers wrongly or late: the comparison, the numbers, or no answer."""
+"""Causes of wrong, late or missing answers of a controller: the comparison, the numbers, or no answer."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from grader.judging.source import Source, chain, first_line, last_name, subtree,
 from grader.judging.values import EXACT, published, published_numbers
 from grader.judging.wording import number
 
-#: Answers put off by no more than this are prompt enough.
+#: Answers delayed by at most this count as prompt.
 _PROMPT_S = 0.3
 _MEANS = ("mean", "fmean", "average", "median", "nanmean")
 _ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)
 
 
 @dataclass(frozen=True, slots=True)
-class _Hearer:
-    """A file that hears a controller's input and answers, and the code that its subscription leads to."""
+class _Subscriber:
+    """A file that subscribes to a controller's input and answers, and the code of its callback."""
 
     source: Source
     reached: list[ast.AST]
@@ -49,35 +49,35 @@ class _Hearer:
 
 @dataclass(frozen=True, slots=True)
 class _Controller:
-    """A controller that answers, and the check that asks it."""
+    """A controller that answers, and the check that judges it."""
 
     case: Case
     source: Source
     check: ThresholdResponse | AnswersTogether
 
 
-def _hearers(case: Case) -> Iterator[_Hearer]:
-    """Yield the files that hear the input and answer."""
+def _subscribers(case: Case) -> Iterator[_Subscriber]:
+    """Yield the files that subscribe to the input and answer."""
     for source in case.sources.values():
         item = made_for(source, "subscription", case.check.input)
         if item is not None and made_for(source, "publisher", case.check.output) is not None:
-            yield _Hearer(source, list(reached(source, roots(source, item.callback))))
+            yield _Subscriber(source, list(reached(source, roots(source, item.callback))))
 
 
-def _late(case: Case) -> _Hearer | None:
+def _late(case: Case) -> _Subscriber | None:
     """Return the controller, if its answers are late."""
     late = case.evidence("lag_s") is not None or case.evidence("behind") is not None
-    return next(_hearers(case), None) if late else None
+    return next(_subscribers(case), None) if late else None
 
 
 def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
-    """Yield the comparisons of two sides that the controller's subscription leads to."""
-    yield from ((h.source, n) for h in _hearers(case) for n in h.comparisons() if len(n.ops) == 1)
+    """Yield the two-sided comparisons in the code of the controller's callback."""
+    yield from ((h.source, n) for h in _subscribers(case) for n in h.comparisons() if len(n.ops) == 1)
 
 
 @dataclass(frozen=True, slots=True)
 class _Switch:
-    """One comparison with a number, turned so that the number stands on the right."""
+    """A comparison with a number, turned so that the number is on the right."""
 
     node: ast.Compare
     op: ast.cmpop
@@ -86,7 +86,7 @@ class _Switch:
 
 
 def _controller(case: Case) -> _Controller | None:
-    """Return the controller, if it answers at all."""
+    """Return the controller, if it answers."""
     check: ThresholdResponse | AnswersTogether = case.check
     if silent_topic(case) or case.is_about(ProblemKind.NEVER_CHANGES):
         return None
@@ -95,7 +95,7 @@ def _controller(case: Case) -> _Controller | None:
 
 
 def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
-    """Return the comparisons with one number, with that limit if one is given."""
+    """Return the comparisons with one number, with that limit if given."""
     found = []
     for node in source.all(ast.Compare):
         if len(node.ops) != 1:
@@ -114,7 +114,7 @@ def _turned(op: ast.cmpop) -> ast.cmpop:
 
 
 def _rows(case: Case) -> list[tuple[float, float | None, float]]:
-    """Return (input, answer, expected) of each input that was held."""
+    """Return (input, answer, expected) of each held input."""
     rows = case.evidence("rows")
     good = [r for r in rows if isinstance(r, (list, tuple)) and len(r) == 4] if isinstance(rows, (list, tuple)) else []
     return [(float(r[1]), None if r[2] is None else float(r[2]), float(r[3])) for r in good]
@@ -125,8 +125,8 @@ def _wrong_inputs(case: Case) -> list[float]:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _stored_late(late: _Hearer) -> Clue | None:
-    """An attribute is compared first, and given the new value only afterwards."""
+def _stored_late(late: _Subscriber) -> Clue | None:
+    """An attribute is compared before it gets the new value."""
     source = late.source
     for test in late.comparisons():
         for node in subtree(test):
@@ -140,8 +140,8 @@ def _stored_late(late: _Hearer) -> Clue | None:
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _oldest_compared(late: _Hearer) -> Clue | None:
-    """The oldest of the values that are kept is compared."""
+def _oldest_compared(late: _Subscriber) -> Clue | None:
+    """The oldest of several stored values is compared."""
     source = late.source
     for test in late.comparisons():
         for node in subtree(test):
@@ -152,14 +152,14 @@ def _oldest_compared(late: _Hearer) -> Clue | None:
 
 
 def _grows(source: Source, values: ast.expr) -> bool:
-    """Return whether new values are put at the end of a list or the like."""
+    """Return whether new values are added at the end of a list or deque."""
     calls = (c for c in source.calls("append") if isinstance(c.func, ast.Attribute))
     return chain(values) != "" and any(chain(c.func) == f"{chain(values)}.append" for c in calls)
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_late)
-def _put_off(late: _Hearer) -> Clue | None:
-    """The answer is handed to a timer, or the callback sleeps before it answers."""
+def _put_off(late: _Subscriber) -> Clue | None:
+    """The answer is left to a timer, or the callback sleeps before it answers."""
     source = late.source
     for node in late.reached:
         name = last_name(node.func) if isinstance(node, ast.Call) else ""
@@ -173,7 +173,7 @@ def _put_off(late: _Hearer) -> Clue | None:
 
 @rule(ThresholdResponse, AnswersTogether)
 def _compared_as_text(case: Case) -> Clue | None:
-    """`str(msg.data) > '25'` asks which text comes first in the alphabet."""
+    """`str(msg.data) > '25'` compares alphabetically."""
     for source, test in _compared(case):
         sides = [text(source, side) for side in (test.left, test.comparators[0])]
         said = next((side for side in sides if side is not None), None)
@@ -192,7 +192,7 @@ def _is_number(said: str) -> bool:
 
 @rule(ThresholdResponse, AnswersTogether)
 def _compared_mean(case: Case) -> Clue | None:
-    """A mean of the last values follows late, and stands still near the threshold."""
+    """A mean of the last values lags behind, and stays near the threshold."""
     for source, test in _compared(case):
         for node in subtree(test):
             counted = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and _sum_by_count(node)
@@ -210,7 +210,7 @@ def _sum_by_count(node: ast.BinOp) -> bool:
 
 @rule(ThresholdResponse, AnswersTogether, problem=ProblemKind.NO_NUMBER, given=_controller)
 def _answer_without_number(controller: _Controller) -> Clue | None:
-    """Answers in a type that carries no number."""
+    """Answers have a type without a number."""
     source, check = controller.source, controller.check
     item = made_for(source, "publisher", check.output)
     if item is None:
@@ -221,7 +221,7 @@ def _answer_without_number(controller: _Controller) -> Clue | None:
 
 @rule(ThresholdResponse, given=_controller)
 def _at_the_threshold(controller: _Controller) -> Clue | None:
-    """Only the threshold itself is answered wrongly."""
+    """Only inputs exactly at the threshold are answered wrongly."""
     source, check = controller.source, controller.check
     wrong = _wrong_inputs(controller.case)
     if not wrong or any(not within(v, check.threshold, EXACT) for v in wrong):
@@ -239,7 +239,7 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
 
 @rule(ThresholdResponse, given=_controller)
 def _inverted(controller: _Controller) -> Clue | None:
-    """The answers are the wrong way round."""
+    """The answers are exchanged."""
     source, check = controller.source, controller.check
     away = [
         (v, got) for v, got, _ in _rows(controller.case) if not within(v, check.threshold, EXACT) and got is not None
@@ -258,7 +258,7 @@ def _inverted(controller: _Controller) -> Clue | None:
 
 
 def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | AnswersTogether) -> bool:
-    """Return whether the text, too, gives the answer of one side on the other."""
+    """Return whether the text, too, gives each side the answer of the other."""
     choice = next((n for n in source.around(switch.node) if isinstance(n, (ast.If, ast.IfExp))), None)
     if choice is None:
         return False
@@ -272,7 +272,7 @@ def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | A
 
 @rule(ThresholdResponse, given=_controller)
 def _rounded(controller: _Controller) -> Clue | None:
-    """The input is cut or rounded before it is compared."""
+    """The input is truncated or rounded before the comparison."""
     source, check = controller.source, controller.check
     wrong = _wrong_inputs(controller.case)
     if not wrong or any(not 0 < abs(v - check.threshold) < 1 for v in wrong):
@@ -309,7 +309,7 @@ def _other_threshold(controller: _Controller) -> Clue | None:
 
 @rule(ThresholdResponse, AnswersTogether, given=_controller)
 def _wrong_answer(controller: _Controller) -> Clue | None:
-    """A number is sent that the exercise does not know."""
+    """The controller sends a number that is not in the exercise."""
     source, check = controller.source, controller.check
     strange = {r.value for r in published_numbers(controller.case.trace, check.output)}
     strange -= {check.above, check.otherwise}
@@ -329,7 +329,7 @@ def _wrong_answer(controller: _Controller) -> Clue | None:
 
 
 def _answers(source: Source) -> list[ast.AST]:
-    """Return the places at which an answer is chosen: assignments, arguments and the arms of conditionals."""
+    """Return the places that choose an answer: assignments, arguments and branches of conditional expressions."""
     places: list[ast.AST] = list(given_leaf(source, "data"))
     places += [a for a in source.all(ast.Assign) if a not in places and len(a.targets) == 1]
     places += [arm for e in source.all(ast.IfExp) for arm in (e.body, e.orelse)]
@@ -340,14 +340,14 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
     expression = node.value if isinstance(node, (ast.Assign, ast.keyword)) else node
     if not isinstance(expression, ast.expr):
         return False
-    # the number itself, not another name for it: else one mistake is seen at two places
+    # only the number itself, not a name for it: otherwise one mistake would be found at two places
     worth = constant(source, expression) if not isinstance(expression, (ast.Name, ast.Attribute)) else None
     return worth is not None and within(worth.value, value, EXACT)
 
 
 @rule(ThresholdResponse, AnswersTogether, given=_controller)
 def _one_branch(controller: _Controller) -> Clue | None:
-    """An answer is sent on one side of the threshold only."""
+    """An answer is sent only on one side of the threshold."""
     source, check = controller.source, controller.check
     given = {r.value for r in published_numbers(controller.case.trace, check.output)}
     item = made_for(source, "publisher", check.output)
@@ -397,7 +397,7 @@ def _asks_none(test: ast.expr, name: str) -> bool:
 
 @rule(ThresholdResponse, AnswersTogether, given=_controller)
 def _latched(controller: _Controller) -> Clue | None:
-    """Something is set on one side of the threshold, and nothing ever takes it back."""
+    """A variable is set on one side of the threshold, and never reset."""
     source, check = controller.source, controller.check
     item = made_for(source, "subscription", check.input)
     inside: Iterable[ast.AST] = list(reached(source, roots(source, item.callback))) if item is not None else []
@@ -418,7 +418,7 @@ def _latched(controller: _Controller) -> Clue | None:
 
 @rule(ThresholdResponse, AnswersTogether, given=_controller)
 def _slow_timer(controller: _Controller) -> Clue | None:
-    """A timer answers too seldom."""
+    """A timer answers too rarely."""
     source, check = controller.source, controller.check
     calls = publish_calls(source, made_for(source, "publisher", check.output))
     for item in made(source, "timer"):

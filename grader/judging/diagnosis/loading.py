@@ -1,4 +1,4 @@
-"""Causes behind files that Python cannot read, and behind names and modules that are not there."""
+"""Causes of files that Python cannot read, and of missing names and modules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from grader.judging.wording import quote
 
 _PRINT = re.compile(r"^\s*print\s+(?P<what>[^(].*)$")
 _OPERATORS = ((r"\belse\s+if\b", "elif"), (r"&&", "and"), (r"\|\|", "or"), (r"\+\+\s*$", "+= 1"))
-#: What Python says, and what to do; the first that fits counts.
+#: Message of Python -> what to do; the first match wins.
 _SAYINGS: Sequence[tuple[str, str]] = (
     (r"^TabError", "indent every line with spaces only, four a level: this one mixes tabs and spaces with others"),
     (r"expected ':'", "a colon is missing at the end of: {code}"),
@@ -95,7 +95,7 @@ def _null_bytes(_: Crash) -> Clue | None:
 
 @crash_rule("^(?:ImportError|ModuleNotFoundError|AttributeError): .*", in_file=False)
 def _hidden_module(crash: Crash) -> Clue | None:
-    """A file of the submission is imported in place of the module that the error names."""
+    """A file of the submission hides the module that the error names."""
     case = crash.case
     hidden = [name for start in case.trace.starts if start.process == case.process for name in start.hidden]
     words = re.findall(r"'([\w.]+)'", crash.found[0])

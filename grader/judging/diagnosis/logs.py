@@ -1,4 +1,4 @@
-"""Causes behind logs that are printed, hidden, missing, wrong, too many, or written into a file."""
+"""Causes of logs that are printed, hidden, missing, wrong, too frequent, or written to a file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from grader.judging.wording import number
 _HANDLERS = ("FileHandler", "RotatingFileHandler", "TimedRotatingFileHandler", "WatchedFileHandler")
 _OPENS = ("open", "io.open", "codecs.open")
 _COMMENTED_LOG = re.compile(r"^\s*#.*get_logger\(\)\.(info|warn|warning|error)\s*\(")
-#: Methods of the loggers of Python's own logging module that log.
+#: Logging methods of Python's own loggers.
 _PYTHON_LOGS = ("debug", "info", "warning", "warn", "error", "critical", "exception")
 
 
@@ -42,7 +42,7 @@ def _prints(source: Source) -> list[ast.Call]:
 
 @rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.NOT_MET)
 def _into_file(case: Case) -> Clue | None:
-    """Nothing that was asked for is logged or printed, and the program writes into a file."""
+    """No expected text is logged or printed, but the program writes to a file."""
     source = case.source
     writing = _opened(source)
     if writing is None or not _unseen(case):
@@ -62,7 +62,7 @@ def _unseen(case: Case) -> bool:
 
 
 def _opened(source: Source) -> ast.Call | None:
-    """Return the call that opens a file for what is logged, if there is one."""
+    """Return the call that opens a file for the output, if any."""
     return next((call for call in source.all(ast.Call) if _writes(call)), None)
 
 
@@ -79,7 +79,7 @@ def _writes(call: ast.Call) -> bool:
 
 @rule(UsesLogger, LogsPosition, LogsReceived, outcome=Outcome.PARTLY, fault=None)
 def _printed(case: Case) -> Clue | None:
-    """Lines are printed that should be logged."""
+    """Lines are printed instead of logged."""
     check, source = case.check, case.source
     prints = [c for c in _prints(source) if c.args]
     if isinstance(check, LogsReceived):
@@ -96,7 +96,7 @@ def _printed(case: Case) -> Clue | None:
 
 
 def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
-    """Return the print calls with those first whose fixed text is in the lines that were printed most."""
+    """Return the print calls, those whose fixed text matches most of the printed lines first."""
     lines = [o.text for o in printed_lines(case.trace, case.process)][:400]
 
     def seen(call: ast.Call) -> int:
@@ -108,7 +108,7 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
 
 @rule(UsesLogger)
 def _python_logging(case: Case) -> Clue | None:
-    """Python's own logging module instead of the node's logger."""
+    """Python's logging module is used instead of the node's logger."""
     return _by_python(case)
 
 
@@ -177,7 +177,7 @@ def _logged_once(case: Case) -> Clue | None:
 
 
 def _set_inside(test: ast.If) -> bool:
-    """Return whether a condition is changed by what stands under it."""
+    """Return whether code under a condition changes it."""
     if not is_flag(test.test):
         return False
     asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
@@ -187,7 +187,7 @@ def _set_inside(test: ast.If) -> bool:
 
 @rule(LogPeriod)
 def _log_period(case: Case) -> Clue | None:
-    """The timer, the throttle or the callback that sets the pace of the logs."""
+    """The timer, the throttle or the callback sets the wrong pace."""
     average, call = case.evidence("average_period_s"), position_log(case)
     if call is None or not isinstance(average, float):
         return None
@@ -203,7 +203,7 @@ def _log_period(case: Case) -> Clue | None:
 
 
 def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -> Clue | None:
-    """The log is written in the callback of the subscription, each time or every so many times."""
+    """The log is written in the callback of the subscription, each time or every n-th time."""
     heard = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
     if not heard or argument(call, 99, "throttle_duration_sec") is not None:
         return None
@@ -219,7 +219,7 @@ def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -
 
 
 def _counts(source: Source, test: ast.expr) -> bool:
-    """Return whether a condition is `n % 20 == 0`, or compares with a number what is counted up by one."""
+    """Return whether a condition is `n % 20 == 0`, or compares a counter with a number."""
     if any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod) for n in ast.walk(test)):
         return True
     counters = {chain(a.target) for a in source.all(ast.AugAssign) if number_at(source, a.value) == 1}
@@ -237,7 +237,7 @@ def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: 
 
 @rule(LogsReceived)
 def _received_not_logged(case: Case) -> Clue | None:
-    """The callback of the subscription logs nothing, or not what it received."""
+    """The callback of the subscription does not log, or does not log what it received."""
     source, check = case.source, case.check
     item = made_for(source, "subscription", check.topic)
     start = roots(source, item.callback) if item is not None else []
@@ -255,7 +255,7 @@ def _received_not_logged(case: Case) -> Clue | None:
 
 
 def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | None:
-    """Return that a log shows no value, or only attributes that have nothing to do with the message."""
+    """Return a clue if a log shows no value, or only attributes unrelated to the message."""
     names = [n for a in log.args for n in _inner(a) if isinstance(n, (ast.Name, ast.Attribute))]
     if not names:
         return Clue("this log holds no value: log what was received, msg.data", source.place(log))
@@ -267,7 +267,7 @@ def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | N
 
 
 def _inner(node: ast.AST) -> list[ast.AST]:
-    """Return the nodes that may give a text its value; the test of a conditional gives none."""
+    """Return the nodes that may determine the value of a text; the test of a conditional does not."""
     if isinstance(node, ast.IfExp):
         return [*ast.walk(node.body), *ast.walk(node.orelse)]
     return list(ast.walk(node))

@@ -1,11 +1,11 @@
-"""Names that students need and misspell: what is imported from where, and what Node and messages have."""
+"""Names that students need and misspell: import locations, and attributes of Node and of messages."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
 
-#: Message and service packages that exist where submissions run.
+#: Message and service packages that are installed where submissions run.
 PACKAGES = (
     "std_msgs",
     "geometry_msgs",
@@ -26,7 +26,7 @@ PACKAGES = (
     "unique_identifier_msgs",
     "visualization_msgs",
 )
-#: What exists under ROS 1 only, and what takes its place.
+#: Names that exist only in ROS 1, with their replacement.
 ROS_1 = {
     "rospy": "rclpy",
     "roslib": "rclpy",
@@ -100,7 +100,7 @@ RCLPY = (
     "get_global_executor",
 )
 PUBLISHER = ("publish", "get_subscription_count", "wait_for_all_acked", "destroy", "assert_liveliness")
-#: Functions that call callbacks.
+#: Functions that run callbacks.
 SPINS = ("spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete")
 #: Methods of a logger that log.
 LOG_METHODS = ("debug", "info", "warn", "warning", "error", "fatal")
@@ -115,7 +115,7 @@ _SENSOR = "BatteryState CameraInfo CompressedImage FluidPressure Illuminance Ima
 _SENSOR += "MagneticField NavSatFix PointCloud2 Range RelativeHumidity Temperature"
 _QOS = "QoSProfile ReliabilityPolicy DurabilityPolicy HistoryPolicy LivelinessPolicy QoSReliabilityPolicy "
 _QOS += "QoSDurabilityPolicy QoSHistoryPolicy qos_profile_sensor_data qos_profile_system_default"
-#: Names by the module that has them.
+#: Module -> names that it provides.
 MODULES = {
     "std_msgs.msg": tuple(_STD.split()),
     "geometry_msgs.msg": tuple(_GEOMETRY.split()),
@@ -142,7 +142,7 @@ PLAIN_MODULES = ("rclpy", "time", "math", "random", "sys", "os", "threading", "d
 _ALIASES = {"np": "import numpy as np", "numpy": "import numpy", "sleep": "from time import sleep"}
 _ALIASES |= {"uniform": "from random import uniform", "randint": "from random import randint"}
 
-#: How to come to a field that people look for in the wrong message.
+#: Path to a field that people look for in the wrong message.
 FIELDS = {
     ("PoseWithCovariance", "position"): "msg.pose.pose.position",
     ("PoseWithCovariance", "orientation"): "msg.pose.pose.orientation",
@@ -181,7 +181,7 @@ MESSAGE_FIELDS = {
 
 
 def import_of(name: str) -> str:
-    """Return the line that imports a name; empty if several or none do."""
+    """Return the import statement for a name; empty if several modules or none have it."""
     if name in _ALIASES:
         return _ALIASES[name]
     if name in PLAIN_MODULES:
@@ -193,7 +193,7 @@ def import_of(name: str) -> str:
 
 
 def closest(name: str, candidates: Iterable[str], cutoff: float = 0.75) -> str:
-    """Return the candidate that a name is very likely a slip for; empty if none is."""
+    """Return the candidate that a name is very likely a misspelling of; empty if there is none."""
     name = name[:80]
     plain = {c.lower().replace("_", ""): c for c in sorted(set(candidates) - {name}) if len(c) <= 80}
     found = difflib.get_close_matches(name.lower().replace("_", ""), plain, n=1, cutoff=cutoff)

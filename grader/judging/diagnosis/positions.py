@@ -1,4 +1,4 @@
-"""Causes behind wrong position logs: the attribute that is read instead, or the assignment that mixes things up."""
+"""Causes of wrong position logs: another attribute, or an assignment that mixes up values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from grader.judging.diagnosis.wiring import is_flag, made, number_at, reached, r
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
-#: What the check found, and the parts of the message that may have been read instead of the position.
+#: Cause found by the check -> parts of the message that may have been read instead of the position.
 _PARTS = {
     "twist": ("twist",),
     "orientation": ("orientation",),
@@ -23,7 +23,7 @@ _MEANING = {"twist": "velocity"}
 
 
 def _position_rule(*causes: str) -> Maker[Case]:
-    """Make a rule about position logs in which the check found one of these things."""
+    """Make a rule for position logs in which the check found one of these causes."""
 
     def found(case: Case) -> Case | None:
         return case if case.evidence("cause") in causes else None
@@ -32,7 +32,7 @@ def _position_rule(*causes: str) -> Maker[Case]:
 
 
 def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
-    """Return the outermost reads of attributes whose dotted name has a part."""
+    """Return the outermost attribute reads whose dotted name contains a part."""
     found = []
     for node in source.all(ast.Attribute):
         whole = not isinstance(source.parents.get(node), ast.Attribute)
@@ -44,7 +44,7 @@ def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
 
 @_position_rule(*_PARTS)
 def _other_part(case: Case) -> Clue | None:
-    """The velocity or the orientation is read instead of the position."""
+    """The velocity or the orientation is logged instead of the position."""
     source, cause = case.source, str(case.evidence("cause"))
     reads = _reads(source, *_PARTS[cause])
     if not reads or (cause in ("constant", "no_pair") and _reads(source, "position")):
@@ -93,7 +93,7 @@ def _swapped_pair(source: Source, statement: ast.Assign) -> Clue | None:
 
 
 def _order_in(call: ast.Call) -> list[str]:
-    """Return in which order a log names things that end in x or y."""
+    """Return the order in which a log uses names that end in x or y."""
     reads = [n for a in call.args for n in ast.walk(a) if isinstance(n, (ast.Attribute, ast.Name)) and _axis(chain(n))]
     whole = [n for n in reads if not isinstance(n, ast.Name) or n.id in ("x", "y")]
     places = sorted(whole, key=lambda n: (first_line(n), n.col_offset))
@@ -102,7 +102,7 @@ def _order_in(call: ast.Call) -> list[str]:
 
 @_position_rule("wrong", "sign", "no_sign", "abs")
 def _no_sign(case: Case) -> Clue | None:
-    """`abs()` takes the sign away."""
+    """`abs()` removes the sign."""
     source, call = case.source, position_log(case)
     if call is None:
         return None
@@ -116,7 +116,7 @@ def _no_sign(case: Case) -> Clue | None:
 
 @_position_rule("no_y", "no_x", "only_x", "only_y")
 def _wrong_axis(case: Case) -> Clue | None:
-    """Z in the place of y, or one number only."""
+    """Z instead of y, or only one number."""
     source, cause = case.source, case.evidence("cause")
     missing = "y" if cause in ("no_y", "only_x") else "x"
     if cause in ("no_y", "no_x"):
@@ -131,7 +131,7 @@ def _wrong_axis(case: Case) -> Clue | None:
 
 @_position_rule("first_value")
 def _kept_first(case: Case) -> Clue | None:
-    """The callback stores a position only while there is none."""
+    """The callback stores a position only once."""
     source = case.source
     for item in made(source, "subscription"):
         for node in reached(source, roots(source, item.callback)):
@@ -155,7 +155,7 @@ def _rounded_away(case: Case) -> Clue | None:
 
 @_position_rule("constant")
 def _never_stored(case: Case) -> Clue | None:
-    """The callback assigns local variables, and others are logged."""
+    """The callback assigns local variables, but others are logged."""
     source = case.source
     for item in made(source, "subscription"):
         for function in roots(source, item.callback):
@@ -184,7 +184,7 @@ def _scaled_position(case: Case) -> Clue | None:
 
 @_position_rule("stale")
 def _old_messages(case: Case) -> Clue | None:
-    """A callback that sleeps works through old messages."""
+    """A callback that sleeps lags behind the messages."""
     source = case.source
     oldest = _oldest_taken(source)
     if oldest is not None:
@@ -198,7 +198,7 @@ def _old_messages(case: Case) -> Clue | None:
 
 
 def _oldest_taken(source: Source) -> Clue | None:
-    """Messages are stored at one end and taken from the other, slower than they come."""
+    """Messages are added at one end and taken from the other, slower than they arrive."""
     for call in source.calls("pop", "popleft"):
         first = last_name(call.func) == "popleft" or (len(call.args) == 1 and number_at(source, call.args[0]) == 0)
         if first and isinstance(call.func, ast.Attribute) and any(source.calls("append")):
@@ -209,13 +209,13 @@ def _oldest_taken(source: Source) -> Clue | None:
 
 @_position_rule("wrong", "no_pair", "constant", "few", "stale", "sign")
 def _log_line(case: Case) -> Clue | None:
-    """Nothing better is known than the line that logs."""
+    """Only the line that logs is known."""
     call = position_log(case)
     return Clue(case.verdict.hint, case.source.place(call)) if call is not None and case.verdict.hint else None
 
 
 def _stores(source: Source, node: ast.If) -> bool:
-    """Return whether what is asked for is stored from the message, and nothing is done otherwise."""
+    """Return whether a condition without `else` guards storing what it tests from the message."""
     function = source.function_of(node)
     message = set(parameters(function)) - {"self"} if function is not None else set()
     asked = {chain(n) for n in ast.walk(node.test) if isinstance(n, (ast.Attribute, ast.Name))} - {"self", ""}

@@ -1,4 +1,4 @@
-"""Causes behind a wrong rate: a period in the wrong unit, a callback that is held up, a loop without a pace."""
+"""Causes of a wrong rate: a period in the wrong unit, a delayed callback, a loop without a pause."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from grader.judging.diagnosis.wiring import (
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.judging.wording import number
 
-#: How far the rate that the text gives may lie from the measured one.
+#: Largest relative difference between the rate in the text and the measured one.
 _SAME = 0.03
 
 
 @dataclass(frozen=True, slots=True)
 class _Paced:
-    """A rate that was asked for and another that was found, with the calls that publish."""
+    """The requested and the measured rate, with the calls that publish."""
 
     case: Case
     source: Source
@@ -74,7 +74,7 @@ def _same(one: float, other: float) -> bool:
 
 @rule(TopicRate, given=_paced)
 def _period(paced: _Paced) -> Clue | None:
-    """The period of the timer is what makes the rate."""
+    """The period of the timer explains the rate."""
     timers = paced.timers()
     if len(timers) != 1:
         return None
@@ -126,7 +126,7 @@ def _name(source: Source, node: ast.AST) -> str:
 
 
 def _sleeps(source: Source, nodes: Iterable[ast.AST]) -> list[Constant]:
-    """Return the sleeps of known length, the call as origin."""
+    """Return the sleeps of known length, with the call as origin."""
     found = []
     for node in nodes:
         if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
@@ -142,7 +142,7 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
 
 @rule(TopicRate, problem=ProblemKind.BURSTS, given=_paced)
 def _published_several_times(paced: _Paced) -> Clue | None:
-    """Each round publishes more than once, or several timers publish."""
+    """Each iteration publishes more than once, or several timers publish."""
     timers = paced.timers()
     if not timers or math.isnan(paced.found_hz):
         return None
@@ -184,7 +184,7 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
 
 @rule(TopicRate, given=_paced)
 def _too_slow(paced: _Paced) -> Clue | None:
-    """The period is right, and still the rate is too low."""
+    """The period is right, but the rate is too low."""
     timers = paced.timers()
     worth = constant(paced.source, timers[0].period) if len(timers) == 1 else None
     if worth is None or not _same(worth.value, paced.period_s):
@@ -198,7 +198,7 @@ def _too_slow(paced: _Paced) -> Clue | None:
 
 @rule(TopicRate, given=_paced)
 def _loop_pace(paced: _Paced) -> Clue | None:
-    """A loop publishes, and what it waits for is not the period asked for."""
+    """A loop publishes, but its pause is not the requested period."""
     if paced.timers() or math.isnan(paced.found_hz):
         return None
     source = paced.source
@@ -242,7 +242,7 @@ def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
 
 @rule(TopicRate, given=_paced)
 def _published_once(paced: _Paced) -> Clue | None:
-    """No timer and no loop leads to publish."""
+    """Neither a timer nor a loop publishes."""
     if paced.count != 1 or paced.timers() or not paced.calls:
         return None
     source = paced.source

@@ -1,4 +1,4 @@
-"""What a rule of diagnosis is: which cases it may explain, as data, and how it finds hint and place."""
+"""The rules of diagnosis: which cases a rule may explain, as data, and a function that finds hint and place."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from grader.judging.source import Source, first_line
 from grader.judging.values import published, student_endpoints
 
 _FRAME = re.compile(r"(?P<file>.*):(?P<line>\d+) in (?P<name>\S+)$")
-#: What stands for a file that is not there: nothing is found in it.
+#: Stands for a missing file; nothing is found in it.
 NO_SOURCE = Source("")
 _ANYTHING = re.compile("")
 Given = TypeVar("Given")
@@ -30,12 +30,12 @@ Given = TypeVar("Given")
 
 @dataclass(frozen=True, slots=True)
 class Clue:
-    """What is very likely the cause.
+    """The very likely cause.
 
     Attributes:
-        hint: One thing to do, in terms of the student's own code.
-        location: The line to look at; None leaves the one that the check gave.
-        key: What makes it the same cause as another clue; by default the rule and the location.
+        hint: One thing to do, referring to the student's code.
+        location: The line to look at; None keeps the one from the check.
+        key: Clues with equal keys have the same cause; by default the rule and the location.
     """
 
     hint: str
@@ -45,14 +45,14 @@ class Clue:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One verdict that lost points, with all that may explain it.
+    """A verdict that lost points, with everything that may explain it.
 
     Attributes:
-        criterion: What was asked.
-        verdict: What it came to.
-        trace: What was recorded.
-        sources: Wanted file name -> source, for the files of the scenario that were handed in.
-        fault: The fault that the verdict rests on, if it rests on one.
+        criterion: The criterion.
+        verdict: Its verdict.
+        trace: The trace.
+        sources: Wanted file name -> source, for the submitted files of the scenario.
+        fault: The fault that the verdict rests on, if any.
         siblings: The checks of the exercise's other criteria.
     """
 
@@ -65,12 +65,12 @@ class Case:
 
     @property
     def check(self) -> Any:
-        """The check that was not met: one of those that the rule names."""
+        """The check that was not met: one of those that the rule lists."""
         return self.criterion.check
 
     @property
     def process(self) -> str:
-        """The one file that the question is about; empty if it is about several."""
+        """The one file that the criterion is about; empty if there are several."""
         named = str(getattr(self.check, "process", ""))
         if self.fault is not None:
             return self.fault.process
@@ -78,32 +78,32 @@ class Case:
 
     @property
     def source(self) -> Source:
-        """The source of the one file that the question is about; an empty one if there is none."""
+        """The source of the one file that the criterion is about; an empty one if there is none."""
         return self.sources.get(self.process, NO_SOURCE)
 
     def is_about(self, kind: ProblemKind) -> bool:
-        """Return whether the check found a problem of a kind."""
+        """Return whether the check found a kind of problem."""
         return self.verdict.problem is not None and self.verdict.problem.kind is kind
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """The topics that the problem is about."""
+        """The topics of the problem."""
         return self.verdict.problem.topics if self.verdict.problem is not None else ()
 
     def evidence(self, key: str) -> object:
-        """Return a piece of the verdict's evidence, None if there is none of that name."""
+        """Return a value from the verdict's evidence, None if the key does not exist."""
         return self.verdict.evidence.get(key)
 
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """A fault that a verdict rests on, as a rule asked for it.
+    """A fault that a verdict rests on, prepared for a rule.
 
     Attributes:
         case: The verdict.
         fault: The fault.
-        source: The file that it arose in; an empty one if that was not handed in.
-        found: How its text matches the rule's pattern.
+        source: The file in which it arose; an empty one if it was not submitted.
+        found: The match of the rule's pattern in its text.
     """
 
     case: Case
@@ -113,11 +113,11 @@ class Crash:
 
     @property
     def line(self) -> int:
-        """The line that it arose in."""
+        """The line at which it arose."""
         return self.fault.line
 
     def said(self, pattern: str) -> re.Match[str] | None:
-        """Return how an exception's text matches a pattern."""
+        """Return the match of a pattern in an exception's text."""
         return self.fault.said(pattern) if self.fault.kind is FaultKind.EXCEPTION else None
 
     def frames(self) -> list[tuple[int, str]]:
@@ -128,11 +128,11 @@ class Crash:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A mistake that people make.
+    """A common mistake.
 
     Attributes:
-        id: Unique, for evidence and tests: the name of its function.
-        find: Returns the clue if this is very likely what happened, else None; asked only if all of the rest applies.
+        id: Unique id for evidence and tests: the name of its function.
+        find: Returns the clue if this mistake is very likely, else None; called only if all other conditions hold.
         checks: Checks that it explains; any if empty.
         problem: Problem that the check must have found; any or none if None.
         outcome: Outcome that it explains; any if None.
@@ -147,7 +147,7 @@ class Rule:
     fault: bool | None = False
 
     def clue(self, case: Case) -> Clue | None:
-        """Return what the rule has to say about a case; None if it does not apply."""
+        """Return the rule's clue for a case; None if it does not apply."""
         applies = (
             (not self.checks or isinstance(case.check, self.checks))
             and self.fault in (None, case.fault is not None)
@@ -171,14 +171,14 @@ def rule(
     fault: bool | None = False,
     given: Callable[[Case], Given | None] = _case,  # type: ignore[assignment]
 ) -> Maker[Given]:
-    """Make a rule of a function; the arguments are those of `Rule`.
+    """Turn a function into a rule; the arguments are those of `Rule`.
 
     Args:
         checks: Checks that it explains; any if there are none.
         problem: Problem that the check must have found.
         outcome: Outcome that it explains.
         fault: Whether the verdict must rest on a fault, or on none; None for either.
-        given: What the function is given: the case, or what this makes of it. The rule does not apply if that is None.
+        given: Computes the argument of the function from the case. If it returns None, the rule does not apply.
     """
 
     def make(find: Callable[[Given], Clue | None]) -> Rule:
@@ -192,12 +192,12 @@ def rule(
 
 
 def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
-    """Make a rule of a function that explains a fault.
+    """Turn a function into a rule that explains a fault.
 
     Args:
-        text: Pattern that is found in what the fault says.
-        kinds: Kinds of faults that are meant; exceptions if there are none.
-        in_file: Whether it must have arisen in a file that was handed in.
+        text: Pattern to search in the text of the fault.
+        kinds: Kinds of faults; exceptions if there are none.
+        in_file: Whether it must have arisen in a submitted file.
     """
     return rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
 
@@ -221,7 +221,7 @@ def lines_of(node: ast.AST, *others: ast.AST) -> str:
 
 
 def silent_topic(case: Case) -> str:
-    """Return the topic on which messages were asked for and none came; empty if that is not the matter."""
+    """Return the topic on which expected messages are missing; empty if that is not the problem."""
     check = case.check
     if isinstance(check, (Publishes, TopicRate)):
         asked = [check.topic]
@@ -235,7 +235,7 @@ def silent_topic(case: Case) -> str:
 
 
 def unheard_topic(case: Case) -> str:
-    """Return the topic to which nothing fitting subscribes; empty if that is not the matter."""
+    """Return the topic without a matching subscription; empty if that is not the problem."""
     check = case.check
     if isinstance(check, ThresholdResponse):
         topic = check.input if silent_topic(case) else ""
@@ -249,7 +249,7 @@ def unheard_topic(case: Case) -> str:
 
 
 def file_for(case: Case, kind: str, topic: str) -> Source:
-    """Return the file that is to make an endpoint: the only one, or the only one without the topic's other end."""
+    """Return the file that should create an endpoint: the only file, or the only one without the topic's other end."""
     if case.process in case.sources:
         return case.source
     other = "subscription" if kind == "publisher" else "publisher"

@@ -1,4 +1,4 @@
-"""Causes behind silent topics and services and deaf nodes: wrong names, types and policies, and dead code."""
+"""Causes of silent topics and services, and of missing input: wrong names, types and policies, and dead code."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ from grader.judging.wording import quote
 
 _THREADS = {"Thread", "MultiThreadedExecutor", "start_new_thread", "ThreadPoolExecutor"}
 _COMMENTED_TIMER = re.compile(r"^\s*#.*\bcreate_timer\s*\(")
-#: A sleep longer than this before the node spins looks like the reason for its silence.
+#: A sleep longer than this before the node spins probably explains its silence.
 _LONG_SLEEP_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Unseen:
-    """The calls that should have run and left no trace: they publish, or they log."""
+    """Calls that should have run and left no trace: they publish, or they log."""
 
     case: Case
     source: Source
@@ -70,7 +70,7 @@ def _unseen(case: Case) -> _Unseen | None:
 
 
 def _unseen_or_once(case: Case) -> _Unseen | None:
-    """Return what left no trace, or nothing but one message."""
+    """Return the calls that left no trace, or only one message."""
     once = isinstance(case.check, TopicRate) and case.evidence("window") == 1
     return _unseen(case) or (_Unseen(case, case.source, []) if once else None)
 
@@ -125,7 +125,7 @@ def _wrong_type(case: Case) -> Clue | None:
 
 @rule()
 def _latched_subscription(case: Case) -> Clue | None:
-    """A subscription that asks for transient_local durability hears only publishers that offer it."""
+    """A subscription with transient_local durability receives only from publishers that offer it."""
     check = case.check
     topic = check.topic if isinstance(check, (Subscribes, LogsReceived)) else getattr(check, "input", "")
     listening = student_endpoints(case.trace, "subscription", topic)
@@ -143,7 +143,7 @@ def _latched_subscription(case: Case) -> Clue | None:
 
 @rule(AnswersTogether, BidirectionalGraph)
 def _kept_apart(case: Case) -> Clue | None:
-    """Two files that each are right, and cannot talk to each other."""
+    """Two files are correct by themselves, but cannot communicate."""
     check: AnswersTogether | BidirectionalGraph = case.check
     ends_of = (check.input, check.output) if isinstance(check, AnswersTogether) else (check.forward, check.back)
     for topic in ends_of:
@@ -175,7 +175,7 @@ def _file_with(case: Case, kind: str, topic: str) -> tuple[Source, Made] | None:
 
 @rule(BidirectionalGraph)
 def _graph_topic(case: Case) -> Clue | None:
-    """A direction is missing from the graph because its topic has another name in one file."""
+    """A direction is missing from the graph because one file uses another name for its topic."""
     check: BidirectionalGraph = case.check
     for topic in (t for t in (check.forward, check.back) if t in case.topics):
         for kind in ("publisher", "subscription"):
@@ -195,7 +195,7 @@ def _same_made(one: Made | None, other: Made) -> bool:
 
 @rule()
 def _no_subscription(case: Case) -> Clue | None:
-    """One direction of two is not written at all."""
+    """One of two directions is not implemented."""
     check = case.check
     topic = unheard_topic(case)
     if isinstance(check, BidirectionalGraph):
@@ -236,7 +236,7 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
 
 @rule(LogsReceived)
 def _no_number_heard(case: Case) -> Clue | None:
-    """A subscription whose type carries no number."""
+    """A subscription has a type without a number."""
     check: LogsReceived = case.check
     types = {e.type for e in student_endpoints(case.trace, "subscription", check.topic)}
     item = made_for(case.source, "subscription", check.topic)
@@ -248,7 +248,7 @@ def _no_number_heard(case: Case) -> Clue | None:
 
 @rule(given=_unseen_or_once)
 def _nested_spin(unseen: _Unseen) -> Clue | None:
-    """The node is spun where it can never come back: in its constructor, or inside a callback."""
+    """The node spins in its constructor, or inside a callback, and never returns."""
     source = unseen.source
     for call in source.calls("spin", "spin_until_future_complete"):
         function = source.function_of(call)
@@ -267,7 +267,7 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
 
 @rule(LogsPosition)
 def _stopped_listening(case: Case) -> Clue | None:
-    """The subscription asks for a deadline that nobody promises, or is destroyed before the data come."""
+    """The subscription requests a deadline that no publisher offers, or is destroyed before the data arrives."""
     if case.evidence("right") != 0:
         return None
     source = case.source
@@ -293,7 +293,7 @@ def _waits_for_service(unseen: _Unseen) -> Clue | None:
 
 @rule(given=_unseen_or_once)
 def _unwoken_rate(unseen: _Unseen) -> Clue | None:
-    """`rate.sleep()` returns only when another thread spins the node."""
+    """`rate.sleep()` returns only if another thread spins the node."""
     source = unseen.source
     rate = next(source.calls("create_rate"), None)
     names = {last_name(n) for n in source.names()}
@@ -306,7 +306,7 @@ def _unwoken_rate(unseen: _Unseen) -> Clue | None:
 
 @rule(given=_unseen)
 def _held_up(unseen: _Unseen) -> Clue | None:
-    """A long sleep, or a loop that waits, before the node spins."""
+    """A long sleep, or a waiting loop, comes before the node spins."""
     source = unseen.source
     for call in source.calls("sleep"):
         worth = constant(source, argument(call, 0, "secs"))
@@ -318,7 +318,7 @@ def _held_up(unseen: _Unseen) -> Clue | None:
 
 
 def _waits_in_constructor(source: Source) -> Clue | None:
-    """Return the loop in a constructor that waits for what only a callback of the node can bring."""
+    """Return the loop in a constructor that waits for a value that only a callback can set."""
     callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
     brought = {chain(n) for n in reached(source, callbacks) if isinstance(n, ast.Attribute) and last_name(n)}
     for loop in source.all(ast.While):
@@ -334,7 +334,7 @@ def _waits_in_constructor(source: Source) -> Clue | None:
 
 @rule(given=_unseen)
 def _never_called(unseen: _Unseen) -> Clue | None:
-    """What publishes or logs stands in a method that nothing calls."""
+    """The code that publishes or logs is in a method that nothing calls."""
     source = unseen.source
     functions = list(dict.fromkeys(source.function_of(c) for c in unseen.calls))[:MOST_MADE]
     dead = [f for f in functions if f is not None and not used(source, f) and _may_be_unused(source, f)]
@@ -352,7 +352,7 @@ def _never_called(unseen: _Unseen) -> Clue | None:
 
 
 def _may_be_unused(source: Source, function: Function) -> bool:
-    """Return whether a function is none that Python, ROS or a base class calls by its name."""
+    """Return whether a function may be unused, and is not called by name by Python, ROS or a base class."""
     owner = source.class_of(function)
     plain = owner is None or all(last_name(b) in ("Node", "object") for b in owner.bases)
     return plain and not function.name.startswith("__") and function.name != "main" and not function.decorator_list
@@ -360,7 +360,7 @@ def _may_be_unused(source: Source, function: Function) -> bool:
 
 @rule(given=_unseen)
 def _late_timer(unseen: _Unseen) -> Clue | None:
-    """The timer's period is longer than anybody waits."""
+    """The timer's period is longer than the observation."""
     source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
     for item in made(source, "timer"):
         worth = constant(source, item.period)
@@ -373,7 +373,7 @@ def _late_timer(unseen: _Unseen) -> Clue | None:
 
 @rule(outcome=Outcome.NOT_MET, given=_unseen)
 def _only_when_told(unseen: _Unseen) -> Clue | None:
-    """Everything is published from the callback of a topic that nobody publishes."""
+    """Everything is published in the callback of a topic without a publisher."""
     source, calls = unseen.source, unseen.calls
     for item in made(source, "subscription"):
         inside = set(reached(source, roots(source, item.callback)))
@@ -388,7 +388,7 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
 
 @rule()
 def _waits_to_hear(case: Case) -> Clue | None:
-    """Whatever publishes depends on an attribute that only a subscription sets, to a topic without messages."""
+    """Publishing depends on an attribute that only the callback of a silent topic sets."""
     topic = silent_topic(case)
     source = file_for(case, "publisher", topic) if topic else NO_SOURCE
     calls = publish_calls(source, made_for(source, "publisher", topic))
@@ -408,7 +408,7 @@ def _heard(case: Case, written: str) -> bool:
 
 
 def _held_back(source: Source, call: ast.Call, item: Made) -> ast.If | None:
-    """Return the condition on which a call waits for what the callback of a subscription stores."""
+    """Return the condition by which a call waits for a value from the callback of a subscription."""
     brought = {
         chain(n)
         for n in reached(source, roots(source, item.callback))
@@ -429,7 +429,7 @@ def _from(source: Source, store: ast.AST, item: Made) -> bool:
 
 @rule(CallsOfClient, ReactsToResponses)
 def _shared_callback_group(case: Case) -> Clue | None:
-    """A callback awaits the answer of a client that is of the same group, whose callbacks run one at a time."""
+    """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
     source = case.source
     grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
     clients, waits = list(source.calls("create_client")), _waits(source)
@@ -441,7 +441,7 @@ def _shared_callback_group(case: Case) -> Clue | None:
 
 
 def _waits(source: Source) -> list[ast.AST]:
-    """Return the places where a function awaits an answer of a service."""
+    """Return the places where a function awaits a service response."""
     return [
         n for n in source.all(ast.Await) if isinstance(n.value, ast.Call) and last_name(n.value.func) == "call_async"
     ]

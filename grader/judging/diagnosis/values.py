@@ -1,4 +1,4 @@
-"""Causes behind wrong numbers in messages: fields, formulas and what is drawn at random."""
+"""Causes of wrong numbers in messages: fields, formulas and random values."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from grader.judging.wording import moment, number
 _DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
 _DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
 _DRAWS += ("urandom", "getrandom", "randbytes", "token_bytes", "getrandbits", "randbits", "standard_normal")
-#: How deep an expression around a draw is followed.
+#: How many levels of an expression around a random draw are followed.
 _DEEPEST = 12
 
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """One place that gives a field a value: the whole of it, the value, and the number where the text tells it."""
+    """A statement that sets a field: the statement, the value, and the number if the text shows it."""
 
     node: ast.AST
     value: ast.expr
@@ -36,7 +36,7 @@ class _Given:
 
 @dataclass(frozen=True, slots=True)
 class _Wrong:
-    """The first message that differs, and its wrong fields with what is in them."""
+    """The first wrong message, with its wrong fields and their contents."""
 
     case: Case
     source: Source
@@ -60,7 +60,7 @@ def _is(got: float, want: float) -> bool:
 
 
 def _given_values(source: Source, path: str) -> list[_Given]:
-    """Return the places that give a field such as `linear.x` a value, assignments and keyword arguments."""
+    """Return the statements that set a field such as `linear.x`, by assignment or keyword argument."""
     group, _, leaf = path.partition(".")
     pairs = (p for s in source.all(ast.Assign) for p in _assigned(s))
     found = [_Given(s, v, constant(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
@@ -74,7 +74,7 @@ def _given_values(source: Source, path: str) -> list[_Given]:
 
 
 def _assigned(statement: ast.Assign) -> Iterator[tuple[ast.Assign, ast.expr, ast.expr]]:
-    """Yield statement, target and value of an assignment; those of `a, b = 1, 2` one by one."""
+    """Yield statement, target and value of an assignment; those of `a, b = 1, 2` separately."""
     for target in statement.targets:
         value = statement.value
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
@@ -84,7 +84,7 @@ def _assigned(statement: ast.Assign) -> Iterator[tuple[ast.Assign, ast.expr, ast
 
 
 def _place_of(got: _Given) -> ast.AST:
-    """Return the node to point at: where the number is written down, if it has a name of its own."""
+    """Return the node to point at: the definition of the number, if it has a name."""
     named = got.worth is not None and isinstance(got.value, (ast.Name, ast.Attribute))
     return got.worth.origin if named and got.worth is not None else got.node
 
@@ -95,13 +95,13 @@ def _first_values(case: Case) -> list[object]:
 
 
 def draws(source: Source) -> list[ast.Call]:
-    """Return the calls that draw a number."""
+    """Return the calls that draw a random number."""
     return list(source.calls(*_DRAWS))
 
 
 @rule(FieldValues, given=_wrong)
 def _misplaced_field(wrong: _Wrong) -> Clue | None:
-    """The right numbers stand in the wrong fields."""
+    """The right numbers are in the wrong fields."""
     numbers = leaves(wrong.message.value)
     for path, value in wrong.found.items():
         want = wrong.wanted[path]
@@ -112,7 +112,7 @@ def _misplaced_field(wrong: _Wrong) -> Clue | None:
             continue
         places = [g for g in _given_values(wrong.source, there[0]) if g.worth is None or _is(g.worth.value, want)]
         mine = [g for g in _given_values(wrong.source, path) if g.worth is None or _is(g.worth.value, value)]
-        # a number that is both here and elsewhere was exchanged; else it went astray
+        # a number in both places was exchanged; otherwise it was misplaced
         chosen = mine if mine and not _is(value, 0.0) else places
         if len(chosen) != 1:
             continue
@@ -127,7 +127,7 @@ def _misplaced_field(wrong: _Wrong) -> Clue | None:
 
 
 def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
-    """Return whether the value found in one field is the one that the exercise wants in the other."""
+    """Return whether the value in one field is the one expected in the other."""
     return any(
         other in check.values and _is(check.values[other], value)
         for check in case.siblings
@@ -137,7 +137,7 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
 
 @rule(FieldValues, given=_wrong)
 def _strayed_value(wrong: _Wrong) -> Clue | None:
-    """A field that must be zero holds what the exercise wants in another."""
+    """A field that must be zero holds the value expected in another field."""
     numbers = leaves(wrong.message.value)
     others = {p: v for check in wrong.case.siblings if isinstance(check, FieldValues) for p, v in check.values.items()}
     for path, value in wrong.found.items():
@@ -151,7 +151,7 @@ def _strayed_value(wrong: _Wrong) -> Clue | None:
 
 @rule(FieldValues, given=_wrong)
 def _not_every_message(wrong: _Wrong) -> Clue | None:
-    """The field gets the right number, but not for every message."""
+    """The field gets the right number, but not in every message."""
     source = wrong.source
     for path, want in wrong.wanted.items():
         places = _given_values(source, path)
@@ -179,7 +179,7 @@ def _not_every_message(wrong: _Wrong) -> Clue | None:
 
 @rule(FieldValues, given=_wrong)
 def _field_never_set(wrong: _Wrong) -> Clue | None:
-    """A field that the exercise asks for is not set at all."""
+    """A required field is never set."""
     for path, value in wrong.found.items():
         want = wrong.wanted[path]
         if _is(want, 0.0) or value != 0.0 or _given_values(wrong.source, path) or _touched(wrong.source, path):
@@ -194,7 +194,7 @@ def _field_never_set(wrong: _Wrong) -> Clue | None:
 
 
 def _touched(source: Source, path: str) -> bool:
-    """Return whether the text may set a field in a way that is not followed here."""
+    """Return whether the text may set a field in a way that is not analysed here."""
     group, _, leaf = path.partition(".")
     wholes = any(isinstance(n.ctx, ast.Store) and n.attr == group for n in source.all(ast.Attribute))
     aliases = any(last_name(s.value) == group for s in source.all(ast.Assign))
@@ -210,8 +210,8 @@ def _message_name(source: Source, call: ast.Call) -> str:
 
 @rule(FieldValues, given=_wrong)
 def _wrong_number(wrong: _Wrong) -> Clue | None:
-    """The one assignment of the field gives another number."""
-    # the field that should hold something first, then the ones that should be zero
+    """The only assignment of the field gives another number."""
+    # first the field that should hold a value, then those that should be zero
     for path in sorted(wrong.found, key=lambda p: _is(wrong.wanted[p], 0.0)):
         places = _given_values(wrong.source, path)
         value, want = wrong.found[path], wrong.wanted[path]
@@ -242,7 +242,7 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
 
 @rule(FieldFunction)
 def _set_after_publishing(case: Case) -> Clue | None:
-    """The field is place its value after the message has been published."""
+    """The field is set after the message was published."""
     source, values = case.source, _first_values(case)
     if len(values) < 2 or any(value != 0 for value in values):
         return None
@@ -267,7 +267,7 @@ def _publishes(call: ast.Call, name: str) -> bool:
 
 @rule(FieldFunction)
 def _counter_never_changes(case: Case) -> Clue | None:
-    """What is counted never changes."""
+    """The counter never changes."""
     values = _first_values(case)
     if len(values) < 2 or len(set(map(repr, values))) > 1:
         return None
@@ -280,7 +280,7 @@ def _counter_never_changes(case: Case) -> Clue | None:
 
 @rule(FieldFunction, problem=ProblemKind.COUNT_START)
 def _count_starts_elsewhere(case: Case) -> Clue | None:
-    """The count starts at another number than 0, or is raised before it is used."""
+    """The count starts at another number than 0, or is incremented before its use."""
     source, problem = case.source, case.verdict.problem
     start = str(problem.start if problem is not None else None)
     for counter in _counters(case):
@@ -304,7 +304,7 @@ def _used_later(source: Source, statement: ast.AST, counter: str) -> bool:
 
 
 def _counters(case: Case) -> Iterator[str]:
-    """Yield the attributes of the node that a field's value is computed from, also by way of one local name."""
+    """Yield the attributes of the node that a field's value depends on, also through one local variable."""
     source = case.source
     for place in given_leaf(source, case.check.field.rpartition(".")[2]):
         value = getattr(place, "value", None)
@@ -330,7 +330,7 @@ def _name_of(function: object) -> str:
 
 @rule(RandomInRange)
 def _draw_limits(case: Case) -> Clue | None:
-    """The limits of what is drawn are not those asked for."""
+    """The limits of the random draw are wrong."""
     source, check = case.source, case.check
     calls = draws(source)
     if case.evidence("outside") is None or len(calls) != 1:
@@ -351,7 +351,7 @@ def _draw_limits(case: Case) -> Clue | None:
 
 
 def _scaled_draw(source: Source, check: RandomInRange, call: ast.Call) -> Clue | None:
-    """`random.random() * 10`: a draw from 0 to 1 that is stretched to other limits."""
+    """`random.random() * 10`: a draw from 0 to 1, scaled to other limits."""
     whole: ast.AST = call
     while isinstance(source.parents.get(whole), ast.BinOp):
         whole = source.parents[whole]
@@ -366,7 +366,7 @@ def _scaled_draw(source: Source, check: RandomInRange, call: ast.Call) -> Clue |
 
 
 def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
-    """Return what an expression is worth if a call gives this number."""
+    """Return the value of an expression if a call returns this number."""
     if node is call:
         return drawn
     if not isinstance(node, ast.BinOp) or depth > _DEEPEST:
@@ -384,7 +384,7 @@ def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: in
 
 @rule(RandomInRange, problem=ProblemKind.CONSTANT)
 def _drawn_once(case: Case) -> Clue | None:
-    """The value is drawn when the node starts and never again, or the seed is set each time."""
+    """The value is drawn only once at the start, or the seed is set each time."""
     source = case.source
     for timer in made(source, "timer"):
         inside = list(reached(source, roots(source, timer.callback)))
@@ -408,7 +408,7 @@ def _at_start(source: Source, call: ast.AST) -> bool:
 
 @rule(RandomInRange)
 def _not_drawn(case: Case) -> Clue | None:
-    """Nothing in the file draws anything."""
+    """The file draws no random numbers."""
     source, check = case.source, case.check
     if case.evidence("pattern") is None or draws(source):
         return None
@@ -423,7 +423,7 @@ def _not_drawn(case: Case) -> Clue | None:
 
 @rule(AnswersTogether, problem=ProblemKind.NEVER_CHANGES)
 def _never_crosses(case: Case) -> Clue | None:
-    """What is drawn lies on one side of the controller's threshold."""
+    """All drawn values are on one side of the controller's threshold."""
     check: AnswersTogether = case.check
     owners = [s for s in case.sources.values() if made_for(s, "publisher", check.input) is not None]
     calls = draws(owners[0]) if len(owners) == 1 else []

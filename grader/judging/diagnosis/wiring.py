@@ -1,4 +1,4 @@
-"""What a file makes of ROS: its endpoints and timers, the code they lead to, and what expressions are worth."""
+"""Reads how a file uses ROS: endpoints, timers, the code that they run, and the values of expressions."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ _NAMED = {"math.pi": math.pi, "np.pi": math.pi, "numpy.pi": math.pi}
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number, and the place in the text at which it is written down.
+    """A number, and the expression in the text that determines it.
 
     Attributes:
         value: The number.
-        origin: The expression that a reader has to change for another number.
+        origin: The expression to change for another number.
     """
 
     value: float
@@ -58,7 +58,7 @@ class Constant:
 
 
 def constant(source: Source, node: ast.AST | None, depth: int = 0) -> Constant | None:
-    """Return what an expression is worth, or None if the text alone does not tell."""
+    """Return the value of an expression, or None if it cannot be read from the text."""
     if node is None or depth > _DEEPEST:
         return None
     if isinstance(node, ast.Constant):
@@ -113,7 +113,7 @@ def _arithmetic(source: Source, node: ast.UnaryOp | ast.BinOp, depth: int) -> Co
         value = apply(left.value, right.value)
     except (ArithmeticError, ValueError):
         return None
-    # one number that was given a name is the one to change: in 1 / RATE that is RATE
+    # the only named number is the one to change: RATE in 1 / RATE
     named = [c.origin for c, at in ((left, node.left), (right, node.right)) if c.origin is not at]
     return Constant(value, named[0] if len(named) == 1 else node)
 
@@ -131,7 +131,7 @@ def _called(source: Source, call: ast.Call, depth: int) -> Constant | None:
 
 
 def _parameter(source: Source, call: ast.AST, depth: int) -> Constant | None:
-    """Return the default of a ROS parameter that is read or declared by this call."""
+    """Return the default of a ROS parameter that a call reads or declares."""
     if isinstance(call, ast.Call) and last_name(call.func) == "get_parameter_value":
         call = call.func.value if isinstance(call.func, ast.Attribute) else call
     if not isinstance(call, ast.Call):
@@ -146,7 +146,7 @@ def _parameter(source: Source, call: ast.AST, depth: int) -> Constant | None:
 
 
 def _only_assignment(source: Source, name: ast.Name | ast.Attribute) -> ast.expr | None:
-    """Return the value of a name that is given one at one place only."""
+    """Return the value of a name that is assigned exactly once."""
     if isinstance(name, ast.Attribute):
         return _only_attribute(source, name)
     function = source.function_of(name)
@@ -173,7 +173,7 @@ def _only_attribute(source: Source, name: ast.Attribute) -> ast.expr | None:
 
 
 def bindings(source: Source, name: str) -> list[ast.AST]:
-    """Return the statements that give a plain name a value, in the order of the text."""
+    """Return the statements that assign a plain name, in the order of the text."""
     return [source.parents[n] for n in source.stored.get(name, ()) if n in source.parents]
 
 
@@ -184,7 +184,7 @@ def _value(statement: ast.AST | None) -> ast.expr | None:
 
 
 def _only_default(source: Source, function: ast.FunctionDef | ast.AsyncFunctionDef, name: str) -> ast.expr | None:
-    """Return the default of a parameter, if no call in the file passes anything to the function."""
+    """Return the default of a parameter, if no call in the file passes arguments to the function."""
     names = parameters(function)
     owner = source.class_of(function)
     known_as = [function.name, owner.name] if owner is not None and function.name == "__init__" else [function.name]
@@ -194,7 +194,7 @@ def _only_default(source: Source, function: ast.FunctionDef | ast.AsyncFunctionD
 
 
 def given_leaf(source: Source, leaf: str) -> list[ast.AST]:
-    """Return the assignments and keyword arguments that give a plain field such as `data` a value."""
+    """Return the assignments and keyword arguments that set a field such as `data`."""
     found: list[ast.AST] = []
     for statement in source.all(ast.Assign):
         attributes = [t for t in statement.targets if isinstance(t, ast.Attribute) and t.attr == leaf]
@@ -204,22 +204,22 @@ def given_leaf(source: Source, leaf: str) -> list[ast.AST]:
     return found + [k for k in keywords if k.arg == leaf]
 
 
-#: More publishers, subscriptions or timers than this are not looked at, of each kind.
+#: Maximum number of publishers, subscriptions or timers examined, of each kind.
 MOST_MADE = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """One publisher, subscription or timer as the text makes it.
+    """A publisher, subscription or timer that the text creates.
 
     Attributes:
         kind: `publisher`, `subscription` or `timer`.
-        call: The call that makes it.
+        call: The call that creates it.
         type: Last part of the message type's name; empty if unknown.
-        topic: Topic as it is written; None if the text does not tell.
-        callback: What is called back.
-        period: Period of a timer.
-        qos: Depth or profile.
+        topic: Topic as written; None if it cannot be read from the text.
+        callback: The callback argument.
+        period: The period argument of a timer.
+        qos: The depth or profile argument.
     """
 
     kind: str
@@ -247,7 +247,7 @@ def made(source: Source, kind: str) -> list[Made]:
 
 
 def text(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
-    """Return the text of a literal, or of a name that is assigned one literal."""
+    """Return the text of a literal, or of a name that is assigned a literal."""
     literal = text_of(node)
     if literal is not None or node is None or depth > 3:
         return literal
@@ -262,7 +262,7 @@ def text(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
 
 
 def goes_to(written: str | None, topic: str) -> bool:
-    """Return whether a topic as written may be this one on the wire; namespaces may stand before it."""
+    """Return whether a topic as written may be this one on the wire; a namespace may be prepended."""
     if not written:
         return False
     bare = written.removeprefix("~").strip("/")
@@ -270,7 +270,7 @@ def goes_to(written: str | None, topic: str) -> bool:
 
 
 def made_for(source: Source, kind: str, topic: str, type_: str = "") -> Made | None:
-    """Return what makes the publisher or subscription of a topic; the only one of its type if no topic is written."""
+    """Return the publisher or subscription of a topic; the only one of its type if no topic can be read."""
     everything = made(source, kind)
     on_topic = [m for m in everything if goes_to(m.topic, topic)]
     if len(on_topic) > 1 and type_:
@@ -282,7 +282,7 @@ def made_for(source: Source, kind: str, topic: str, type_: str = "") -> Made | N
 
 
 def target_of(source: Source, call: ast.AST) -> str:
-    """Return the dotted name that a value is assigned to at once; empty if it is to none."""
+    """Return the dotted name that a value is directly assigned to; empty if there is none."""
     statement = source.parents.get(call)
     if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
         return chain(statement.targets[0])
@@ -290,7 +290,7 @@ def target_of(source: Source, call: ast.AST) -> str:
 
 
 def roots(source: Source, callback: ast.expr | None) -> Sequence[ast.AST]:
-    """Return the functions or lambdas that a callback argument stands for; empty if the text does not tell."""
+    """Return the functions or lambdas that a callback argument refers to; empty if unknown."""
     if isinstance(callback, ast.Lambda):
         return [callback]
     if isinstance(callback, ast.Call) and last_name(callback.func) == "partial" and callback.args:
@@ -305,7 +305,7 @@ def _of_same_class(source: Source, callback: ast.expr | None, found: Sequence[Fu
 
 
 def reached(source: Source, start: Sequence[ast.AST]) -> Iterator[ast.AST]:
-    """Yield every node that may run when these functions run, through calls to functions of the file."""
+    """Yield every node that may run when these functions run, including calls to functions of the file."""
     seen: set[ast.AST] = set()
     waiting = list(start)
     while waiting:
@@ -320,7 +320,7 @@ def reached(source: Source, start: Sequence[ast.AST]) -> Iterator[ast.AST]:
 
 
 def is_log(source: Source, node: ast.AST) -> bool:
-    """Return whether a node is a call that logs through an rclpy logger, as far as the text tells."""
+    """Return whether a node is a call of an rclpy logger, as far as the text shows."""
     if not isinstance(node, ast.Call) or last_name(node.func) not in LOG_METHODS:
         return False
     base = chain(node.func).rpartition(".")[0]
@@ -329,13 +329,13 @@ def is_log(source: Source, node: ast.AST) -> bool:
 
 
 def python_loggers(source: Source) -> set[str]:
-    """Return the names that stand for loggers of Python's own logging module."""
+    """Return the names of loggers of Python's logging module."""
     found = (target_of(source, c) for c in islice(source.calls("getLogger"), MOST_MADE))
     return {"logging", *found} - {""}
 
 
 def publish_calls(source: Source, publisher: Made | None = None) -> list[ast.Call]:
-    """Return the calls that publish, through one publisher if it has a name of its own, or all."""
+    """Return the calls that publish, through one publisher if it has a name, or all."""
     calls = [c for c in source.calls("publish") if isinstance(c.func, ast.Attribute)]
     if publisher is None or len(made(source, "publisher")) < 2:
         return calls
@@ -344,7 +344,7 @@ def publish_calls(source: Source, publisher: Made | None = None) -> list[ast.Cal
 
 
 def used(source: Source, function: Function) -> bool:
-    """Return whether anything outside a function names it."""
+    """Return whether a function's name is used outside of it."""
     inside = set(subtree(function))
     names = (n for n in source.names() if last_name(n) == function.name and n not in inside)
     listed = any(text_of(n) == function.name for n in source.all(ast.Constant))
@@ -352,7 +352,7 @@ def used(source: Source, function: Function) -> bool:
 
 
 def conditions(source: Source, call: ast.AST) -> list[ast.If]:
-    """Return what a call depends on: the conditions around it, and those before it that return early."""
+    """Return the conditions of a call: those around it, and earlier ones that return."""
     function = source.function_of(call)
     around = [n for n in source.around(call) if isinstance(n, ast.If)]
     returns = (r for r in source.all(ast.Return) if source.function_of(r) is function)
@@ -361,14 +361,14 @@ def conditions(source: Source, call: ast.AST) -> list[ast.If]:
 
 
 def changes(source: Source, test: ast.expr) -> bool:
-    """Return whether a condition asks for something that the running node changes: an attribute, or a global name."""
+    """Return whether a condition uses a name that functions other than `__init__` and `main` assign."""
     names = {chain(n) for n in ast.walk(test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
     stores = (s for name in names for s in source.stored.get(name, ()))
     return any((f := source.function_of(s)) is not None and f.name not in ("__init__", "main") for s in stores)
 
 
 def is_flag(test: ast.expr) -> bool:
-    """Return whether a condition asks for one name only: `x`, `not x`, `x is None` or `x == False`."""
+    """Return whether a condition tests only one name: `x`, `not x`, `x is None` or `x == False`."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         test = test.operand
     if isinstance(test, ast.Compare) and len(test.comparators) == 1:
@@ -379,7 +379,7 @@ def is_flag(test: ast.expr) -> bool:
 
 
 def called_only(source: Source, function: Function) -> bool:
-    """Return whether a function is called by its name only, and never handed on for somebody else to call."""
+    """Return whether a function is only called by name, and never passed on."""
     names = [n for n in source.names() if last_name(n) == function.name and isinstance(n.ctx, ast.Load)]
     return all(isinstance(c := source.parents.get(n), ast.Call) and c.func is n for n in names)
 
@@ -392,26 +392,26 @@ def head_of(source: Source, loop: Loop) -> str:
 
 
 def spins(source: Source) -> list[ast.AST]:
-    """Return the places that name a function that spins, called or handed to a thread."""
+    """Return the places that name a spinning function, called or passed to a thread."""
     return [n for n in source.names() if last_name(n) in SPINS]
 
 
 def node_made(source: Source) -> ast.Call | None:
-    """Return the call that makes the node."""
+    """Return the call that creates the node."""
     classes = {c.name for c in source.all(ast.ClassDef) if any(last_name(b) == "Node" for b in c.bases)}
     calls = [c for c in source.all(ast.Call) if last_name(c.func) in {*classes, "create_node", "Node"}]
     return next((c for c in calls if not isinstance(source.parents.get(c), ast.ClassDef)), None)
 
 
 def variable_of(source: Source, call: ast.AST) -> str:
-    """Return the name that a new node is given; `node` if it is given none."""
+    """Return the variable that a new node is assigned to; `node` if there is none."""
     statement = source.parents.get(call)
     named = isinstance(statement, ast.Assign) and len(statement.targets) == 1
     return chain(statement.targets[0]) or "node" if named and isinstance(statement, ast.Assign) else "node"
 
 
 def timer_code(source: Source, item: Made) -> str:
-    """Return how a timer is made, in short."""
+    """Return the code that creates a timer, in short."""
     period = source.code(item.period, 40) if item.period is not None else "?"
     callback = source.code(item.callback, 40) if item.callback is not None else "?"
     return f"create_timer({period}, {callback})"

@@ -1,1 +1,1 @@
-"""The page of a class: how everybody stands, what was lost where, and why; rendered from plain values."""
+"""The page of a class: every student's standing, where points were lost, and why; rendered from plain values."""

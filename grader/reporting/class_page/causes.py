@@ -1,4 +1,4 @@
-"""The commonest causes of lost points: verdicts of a class put together by criterion and kind of cause."""
+"""Finds the commonest causes of lost points: verdicts of a class, grouped by criterion and kind of cause."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from grader.core.exercise import Outcome
 from grader.reporting.class_page.contents import LOST, ReportData
 
 _VARYING = "#"
-# Longest text that is looked at; the kind of what is longer is in its beginning.
+# Longest text examined; the kind of a longer text is recognisable from its beginning.
 _MOST = 600
-# In this order: what is quoted may hold anything, a place holds a number, a call holds names.
+# The order matters: a quotation may contain anything, a place contains a number, and a call contains names.
 _PATTERNS = (
     (re.compile(r"(?<!\w)'[^'\n]*'|\"[^\"\n]*\"|`[^`\n]*`"), "'…'"),
     (re.compile(r"(?<![\w.])[\w./-]+\.pyi?\b(?::\d+){0,2}"), "FILE"),
@@ -29,7 +29,7 @@ _PATTERNS = (
     (re.compile(rf"{_VARYING}(?:(?:, | and | to | or ){_VARYING})+"), _VARYING),
     (re.compile(r"\s+"), " "),
 )
-#: Exceptions whose words come from Python and say what happened.
+#: Exceptions whose messages come from Python and describe what happened.
 _OWN_WORDS = frozenset({"AttributeError", "ImportError", "IndexError", "ModuleNotFoundError", "NameError", "TypeError"})
 _EXCEPTION = re.compile(r"(?P<type>[A-Za-z_][\w.]{0,80})(?::\s*(?P<text>.*))?", re.DOTALL)
 
@@ -39,8 +39,8 @@ class CauseKind:
     """The kind of a cause.
 
     Attributes:
-        source: What told it: `diagnosis`, `missing`, `fault` or `reason`.
-        key: The same for the same kind.
+        source: Where it is known from: `diagnosis`, `missing`, `fault` or `reason`.
+        key: Equal for causes of the same kind.
     """
 
     source: str
@@ -48,7 +48,7 @@ class CauseKind:
 
     @property
     def label(self) -> str:
-        """The kind in a few words."""
+        """A short description of the kind."""
         if self.source == "diagnosis":
             return self.key.replace("_", " ")
         return {"missing": "file missing", "fault": "fault"}.get(self.source, "as measured")
@@ -57,10 +57,10 @@ class CauseKind:
 def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
     """Return the kind of cause for which a criterion lost points.
 
-    What the diagnosis named is surest; then a missing file, a fault, and at last the words of the reason.
+    A diagnosis is the most reliable source; then a missing file, a fault, and finally the text of the reason.
 
     Args:
-        criterion: A criterion of a report, as JSON values.
+        criterion: A criterion of a JSON report.
     """
     evidence = criterion.get("evidence")
     evidence = evidence if isinstance(evidence, Mapping) else {}
@@ -75,10 +75,10 @@ def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
 
 
 def skeleton(text: str) -> str:
-    """Return a sentence without what differs from student to student.
+    """Return a sentence without the parts that differ between students.
 
-    Numbers, lists of numbers, quotations, file names with lines, calls, attributes and names of topics become signs for
-    them: `10.00 Hz` and `9.98 Hz` are the same, and so are `self.timer` and `self.clock_timer`.
+    Placeholders replace numbers, lists of numbers, quotations, file names with lines, calls, attributes and topic
+    names: `10.00 Hz` and `9.98 Hz` become equal, and so do `self.timer` and `self.clock_timer`.
     """
     found = text[:_MOST]
     for pattern, sign in _PATTERNS:
@@ -87,7 +87,7 @@ def skeleton(text: str) -> str:
 
 
 def _exception(text: str) -> str:
-    """Return the type of an exception, with the words of Python's own ones: those of a student are no kind."""
+    """Return the type of an exception, with the message if Python wrote it: messages of students are too different."""
     match = _EXCEPTION.fullmatch(text[:_MOST].strip())
     if match is None:
         return skeleton(text.split("\n", 1)[0])
@@ -95,22 +95,22 @@ def _exception(text: str) -> str:
     return f"{match['type']}: {skeleton(match['text'].split(chr(10), 1)[0])}" if own else match["type"]
 
 
-#: More forms of one cause than this are not told apart.
+#: More forms of one cause than this are merged.
 MOST_FORMS = 3
-# The words of reports that have no `blocked_by` and no `same_cause_as`.
+# Sentences in older reports, which have no `blocked_by` and no `same_cause_as`.
 _SAME = re.compile(r"this has the same cause as (?P<id>\S{1,200}): mend that first")
 _NEEDS = re.compile(r"not judged: needs (?P<what>.{1,400}?)(?: \(.{1,40}\)|, which is missing)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One way in which a cause shows.
+    """One form in which a cause appears.
 
     Attributes:
-        student: Index of a student whose report says so.
-        reason: What was found there.
-        hint: What to do there; may be empty.
-        count: For how many students the hint reads like this but for numbers and names.
+        student: Index of a student whose report has this form.
+        reason: The reason in that report.
+        hint: The hint in that report; may be empty.
+        count: Number of students with the same hint, apart from numbers and names.
     """
 
     student: int
@@ -121,16 +121,16 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class CommonCause:
-    """One cause for which students of a class lost points.
+    """A cause for which students of a class lost points.
 
     Attributes:
         exercise: Id of the exercise.
         criterion: Id of the criterion that names it.
         title: Title of that criterion.
-        kind: The kind of cause.
-        students: Indices of the students, in order, each once.
-        points: What they lost for it in all, with what it blocked.
-        forms: Ways in which it shows, the commonest first.
+        kind: Kind of the cause.
+        students: Indices of the students, in order and without duplicates.
+        points: Points lost to it in total, including those of blocked criteria.
+        forms: Forms in which it appears, the commonest first.
     """
 
     exercise: str
@@ -150,12 +150,12 @@ class _Cluster:
 
 
 def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[CommonCause, ...]:
-    """Return all causes, those of most students first, then those that cost most.
+    """Return all causes, by number of students and then by points lost.
 
     A criterion that is blocked, or has the same cause as another, is counted with the one that names the cause.
 
     Args:
-        reports: Index of a student and the report, in the order of the students.
+        reports: Student index and report, in the order of the students.
     """
     clusters: dict[tuple[str, str, CauseKind], _Cluster] = {}
     for student, report in reports:
@@ -182,19 +182,19 @@ def _roots(by_id: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[Mapping[str
         while (before := _before(root, by_id)) is not None and before["id"] not in seen:
             root = before
             seen.add(root["id"])
-        # What waits for something undecided was not lost.
+        # Points that depend on an undecided criterion are not lost.
         if root["outcome"] != Outcome.UNDECIDED.value:
             yield criterion, root
 
 
 def _before(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the criterion that must be mended before another one; None if there is none."""
+    """Return the criterion that must be fixed before another one; None if there is none."""
     known = criterion.get("blocked_by") or criterion.get("same_cause_as")
     return by_id.get(known) if known else _before_by_text(criterion, by_id)
 
 
 def _before_by_text(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the criterion that a report names in its sentences only, as those of earlier versions do."""
+    """Return the criterion that an older report names only in its sentences."""
     if criterion["outcome"] == Outcome.BLOCKED.value:
         match = _NEEDS.fullmatch(str(criterion["reason"]))
         what = match["what"] if match else ""
@@ -209,7 +209,7 @@ def _lost(criterion: Mapping[str, Any]) -> Fraction:
 
 
 def _forms(students: Mapping[int, Mapping[str, Any]]) -> tuple[Form, ...]:
-    """Return the commonest ways in which a cause shows, each with the first student of whom it is true."""
+    """Return the commonest forms of a cause, each with the first student who has it."""
     shapes = {student: skeleton(str(root["hint"] or root["reason"])) for student, root in students.items()}
     forms = []
     for shape, count in Counter(shapes.values()).most_common(MOST_FORMS):

@@ -1,4 +1,4 @@
-"""The page of a class as HTML, rendered from a template that escapes everything it is given."""
+"""Renders the page of a class as HTML, from a template that escapes everything."""
 
 from __future__ import annotations
 
@@ -17,44 +17,52 @@ from markupsafe import Markup
 from grader.core.exercise import Outcome, exercise_name
 from grader.reporting import wording
 from grader.reporting.class_page.causes import CommonCause, causes
-from grader.reporting.class_page.contents import ClassPage, PageLink, ReportData, StudentRow
-from grader.reporting.class_page.counts import Distribution, ExerciseCount, distribution, exercise_counts
+from grader.reporting.class_page.contents import (
+    ClassPage,
+    Distribution,
+    ExerciseCount,
+    PageLink,
+    ReportData,
+    StudentRow,
+    distribution,
+    exercise_counts,
+)
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
 
 
 @cache
 def own_script() -> str:
-    """Return the page's own script, which needs that of the reports before it."""
+    """Return the page's own script, which runs after that of the reports."""
     return _read("assets/class.js")
 
 
 @cache
 def own_style() -> str:
-    """Return the page's own style sheet, which stands on that of the reports."""
+    """Return the page's own style sheet, which extends that of the reports."""
     return _read("assets/class.css")
 
 
 def class_assets() -> dict[str, bytes]:
-    """Return file name -> content of what a page rendered with `assets=...` loads from there."""
+    """Return file name -> content of the files that a page rendered with `assets=...` loads."""
     return {**shared_assets(), own_name("js"): own_script().encode(), own_name("css"): own_style().encode()}
 
 
 def own_name(ending: str) -> str:
-    """Return the file name of the page's own script or style sheet; another version has another name."""
+    """Return the file name of the page's own script or style sheet; it changes with the content."""
     text = own_script() if ending == "js" else own_style()
     return f"class-{hashlib.sha256(text.encode()).hexdigest()[:12]}.{ending}"
 
 
 def scripts_policy(*, standalone: bool) -> str:
-    """Return which scripts the page may run, as a Content-Security-Policy writes it."""
+    """Return the scripts that the page may run, as a Content-Security-Policy writes them."""
     if not standalone:
         return "'self' file:"
     return f"'{common().script_digest}' '{policy_digest(own_script())}'"
 
 
 def common() -> Bundle:
-    """Return what the page has in common with reports."""
+    """Return the assets that the page shares with reports."""
     return bundle()
 
 
@@ -62,7 +70,7 @@ def _read(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-#: One sign for each outcome, and one for a criterion that a report does not have.
+#: One letter for each outcome, and one for a criterion that a report lacks.
 LETTERS = {Outcome.MET: "m", Outcome.PARTLY: "p", Outcome.NOT_MET: "n", Outcome.BLOCKED: "b", Outcome.UNDECIDED: "u"}
 NOT_ASKED = "-"
 _NAME_LIMIT = 100
@@ -74,10 +82,10 @@ def payload(
     """Return the data of the page.
 
     Args:
-        page: The page.
+        page: The class.
         exercises: Its exercises and criteria.
         found: Its causes, in the order shown.
-        spread: How its scores are distributed.
+        spread: Distribution of its scores.
     """
     criteria = [(e.id, c.id) for e in exercises for c in e.criteria]
     return {
@@ -93,7 +101,7 @@ def payload(
 def _student(
     student: StudentRow, exercises: Sequence[ExerciseCount], criteria: Sequence[tuple[str, str]]
 ) -> dict[str, Any]:
-    """Return what a row is sorted by, column by column, and the outcome of each criterion in one letter."""
+    """Return the sort keys of a row, column by column, and the outcome of each criterion as one letter."""
     by_id = {} if student.report is None else {e["id"]: e for e in student.report["exercises"]}
     outcomes = {(e, c["id"]): LETTERS[Outcome(c["outcome"])] for e, x in by_id.items() for c in x["criteria"]}
     change = None if student.final is None or student.raw is None else student.final - student.raw
@@ -116,10 +124,10 @@ HANDED_BACK_PAGE = "feedback.html"
 
 
 def render_class(page: ClassPage, *, assets: str | None = None) -> str:
-    """Return the page of a class, which loads nothing from anywhere else.
+    """Return the page of a class; it makes no network requests.
 
     Args:
-        page: What is shown; all its text is taken for hostile.
+        page: The class; all its text is treated as hostile.
         assets: Where the page finds the files of `class_assets`, relative to itself, e.g. `assets`; None puts them into
             the page.
     """
@@ -142,19 +150,19 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
 
 
 def result_link(folder: str, file: str, anchor: str = "") -> str:
-    """Return the link to a file of a student's results, percent-encoded; empty if it would lead anywhere else.
+    """Return the link to a file of a student's results, percent-encoded; empty if it would leave the folder.
 
     Args:
-        folder: Name of the folder below `students/`.
-        file: Name of the file in it.
-        anchor: Id of an element in it.
+        folder: Folder name below `students/`.
+        file: File name in it.
+        anchor: Id of an element in the file.
     """
     path = page_link(PageLink("", f"students/{folder}/{file}")) if "/" not in folder and folder else ""
     return f"{path}#{quote(anchor, safe='', errors='replace')}" if path and anchor else path
 
 
 def page_link(link: PageLink) -> str:
-    """Return the address of another page in the folder for results; empty if it would lead out of it."""
+    """Return the link to another page in the results folder; empty if it would leave the folder."""
     parts = link.path.split("/")
     wrong = any(part in ("", ".", "..") or "\\" in part or "\0" in part for part in parts)
     return "" if wrong else "/".join(quote(part, safe="", errors="replace") for part in parts)
@@ -184,13 +192,13 @@ def _template() -> Template:
 
 
 def exercise_points(report: ReportData | None, id_: str) -> Fraction | None:
-    """Return the points that a report has for an exercise; None if it is not in it."""
+    """Return the points of an exercise in a report; None if the report lacks it."""
     exercises = () if report is None else report["exercises"]
     return next((Fraction(str(e["score"])) for e in exercises if e["id"] == id_), None)
 
 
 def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
-    """Return the figures that are looked at first, with what they are."""
+    """Return the key figures with their labels."""
     standing = Counter(student.status for student in page.students)
     found = spread.final or spread.raw
     scores = [("mean", _percent(found[0])), ("median", _percent(found[1]))] if found else []
@@ -211,7 +219,7 @@ def _percent(value: float) -> str:
 
 
 def _segments(outcomes: dict[str, int]) -> list[tuple[str, int, int]]:
-    """Return outcome, where its part of a bar begins and how long it is, without the empty ones."""
+    """Return outcome, start and length of each part of a bar, without empty parts."""
     parts, start = [], 0
     for outcome in Outcome:
         count = outcomes[outcome.value]

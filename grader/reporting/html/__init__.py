@@ -1,1 +1,1 @@
-"""The report as one HTML page that works offline: text, lines of the source, and charts to zoom into."""
+"""The report as one HTML page that works offline: text, source lines, and charts to zoom into."""

@@ -15,7 +15,7 @@ from grader.reporting.escape import shown
 
 
 def page_environment(package: str) -> Environment:
-    """Return what renders the templates of a package, with the filter `shown` for what students wrote."""
+    """Return an environment for the templates of a package, with the filter `shown` for student text."""
     templates = Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -28,36 +28,36 @@ def page_environment(package: str) -> Environment:
 
 
 _LIBRARIES = "vendor/echarts/dist/echarts.common.min.js", "vendor/@dagrejs/dagre/dist/dagre.min.js"
-#: Libraries whose file does not hold its licence; it goes wherever they go.
+#: Licences of libraries whose file does not contain them; they ship together with the library.
 _LICENCES = "vendor/echarts/licenses/LICENSE-d3", "vendor/@dagrejs/dagre/LICENSE"
 _OWN = ("assets/charts.js", "assets/graphs.js", "assets/page.js")
 
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """All that the page needs besides its content."""
+    """Everything a page needs besides its content."""
 
     script: str
     style: str
 
     @property
     def script_digest(self) -> str:
-        """The script's digest as a Content-Security-Policy writes it."""
+        """Digest of the script, as a Content-Security-Policy writes it."""
         return policy_digest(self.script)
 
     @property
     def style_digest(self) -> str:
-        """The style sheet's digest as a Content-Security-Policy writes it."""
+        """Digest of the style sheet, as a Content-Security-Policy writes it."""
         return policy_digest(self.style)
 
     @property
     def script_name(self) -> str:
-        """File name of the script where reports share it; another version has another name."""
+        """File name of the script when reports share it; it changes with the content."""
         return f"report-{_short(self.script)}.js"
 
     @property
     def style_name(self) -> str:
-        """File name of the style sheet where reports share it."""
+        """File name of the style sheet when reports share it; it changes with the content."""
         return f"report-{_short(self.style)}.css"
 
 
@@ -70,7 +70,7 @@ def bundle() -> Bundle:
 
 
 def shared_assets() -> dict[str, bytes]:
-    """Return file name -> content of what reports rendered with `assets=...` load from there."""
+    """Return file name -> content of the files that reports rendered with `assets=...` load."""
     made = bundle()
     return {made.script_name: made.script.encode(), made.style_name: made.style.encode()}
 
@@ -84,7 +84,7 @@ def _read(name: str) -> str:
 
 
 def policy_digest(text: str) -> str:
-    """Return the digest of an inline script or style sheet as a Content-Security-Policy writes it."""
+    """Return the digest of an inline script or style sheet, as a Content-Security-Policy writes it."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 

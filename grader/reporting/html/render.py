@@ -1,4 +1,4 @@
-"""The report as one HTML page, rendered from a template that escapes everything it is given."""
+"""Renders the report as one HTML page, from a template that escapes everything."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from grader.reporting.html.assets import bundle, page_environment
 
 _TEXT_LIMIT = 200
 _NAME_LIMIT = 60
-#: More nodes and topics than this are no drawing any more.
+#: Graphs with more nodes and topics than this are not drawn.
 _MOST_BOXES = 60
 
 
 def figure_values(figure: Figure) -> dict[str, Any]:
-    """Return a figure as JSON values; numbers that JSON cannot say are None."""
+    """Return a figure as JSON values; numbers that JSON cannot represent become None."""
     return _graph(figure) if isinstance(figure, GraphFigure) else _chart(figure)
 
 
@@ -107,7 +107,7 @@ def _edge(endpoint: Endpoint, node: str, topic: str) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | int | None:
-    """Return a number with as many digits as a picture shows."""
+    """Return a number with as many digits as a chart shows."""
     if not math.isfinite(value):
         return None
     short = float(f"{value:.7g}")
@@ -119,11 +119,11 @@ _LINE_LIMIT = 160
 
 
 def render_html(report: Report, *, assets: str | None = None) -> str:
-    """Return a report as an HTML page that loads nothing from anywhere.
+    """Return a report as an HTML page that makes no network requests.
 
     Args:
-        report: What is shown; all its text is taken for hostile.
-        assets: Where the page finds the files of `shared_assets`, relative to itself, e.g. `../assets`; None puts them
+        report: The report; all its text is treated as hostile.
+        assets: Where the page finds the files of `shared_assets`, relative to itself, e.g. `../assets`. None puts them
             into the page, which then stands alone.
     """
     page = _templates().get_template("report.html")
@@ -162,7 +162,7 @@ def _outcome_word(outcome: Outcome) -> str:
 
 
 def _open_at_first(verdict: Verdict) -> bool:
-    """Return whether a criterion is shown unfolded: what cost points is what people look for."""
+    """Return whether a criterion starts unfolded: readers look for what cost points."""
     return verdict.outcome in (Outcome.NOT_MET, Outcome.PARTLY, Outcome.UNDECIDED)
 
 
@@ -193,7 +193,7 @@ def _code_line(line: str) -> str:
 
 
 def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:
-    """Return where each criterion begins on a strip as long as all their points, how long it is, and its outcome."""
+    """Return start, length and outcome of each criterion on a bar as long as all their points."""
     parts, start = [], Fraction(0)
     for verdict in verdicts:
         parts.append((float(start), float(verdict.max_score), verdict.outcome.value))

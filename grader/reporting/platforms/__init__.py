@@ -1,1 +1,1 @@
-"""The report in the formats of platforms that grade or show it."""
+"""The report in the formats of grading platforms."""

@@ -1,7 +1,7 @@
-"""The report as the result that the retired GitHub Classroom's reporter reads: base64 over JSON, on one line.
+"""The report for the reporter of the retired GitHub Classroom: base64 of JSON, on one line.
 
-That reporter knows two totals: the share of its rows that passed times the maximum, and the sum of the rows' scores. So
-a row is one unit of points, the largest that every score is a multiple of; then both totals are the score.
+That reporter shows two totals: the share of its rows that passed times the maximum, and the sum of the rows' scores. So
+a row is one unit of points, the largest one that divides every score; then both totals equal the score.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, log_lines, shown
-from grader.reporting.rounding import whole_points
+from grader.reporting.wording import whole_points
 
-#: More rows than this make nobody wiser; scores are then rounded to whole points.
+#: With more rows than this, scores are rounded to whole points.
 MOST_ROWS = 500
 
 _Row = tuple[ExerciseReport, Verdict, int, int]
 
 
 def render_classroom(report: Report) -> str:
-    """Return the reporter's result, ended by a line break."""
+    """Return the reporter's result, with a line break at the end."""
     text = json.dumps(result(report), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return base64.b64encode(text.encode()).decode() + "\n"
 
@@ -34,7 +34,7 @@ def render_classroom(report: Report) -> str:
 def result(report: Report) -> dict[str, Any]:
     """Return the result before its encoding.
 
-    A report without points has no rows to add up; its two totals are 0.
+    A report without points has no rows; its two totals are 0.
     """
     unit, rows = _units(report)
     tests = [test for row in rows for test in _tests(*row, unit)]
@@ -44,7 +44,7 @@ def result(report: Report) -> dict[str, Any]:
         "status": status if report.final else "error",
         "max_score": json_value(unit * len(tests)),
         "tests": tests,
-        # The reporter takes no notice of further keys.
+        # The reporter ignores further keys.
         "exact_score": json_value(report.score),
         "exact_max_score": json_value(report.max_score),
         "isolation": report.environment.isolation,
@@ -54,7 +54,7 @@ def result(report: Report) -> dict[str, Any]:
 
 
 def _units(report: Report) -> tuple[Fraction, list[_Row]]:
-    """Return the points of one row of the result, and for each verdict how many rows it earned of how many."""
+    """Return the points of one row, and for each verdict the number of rows earned and in total."""
     found = [(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts]
     scores, tops = [v.score for _, v in found], [v.max_score for _, v in found]
     unit = _greatest_unit([*scores, *tops])
@@ -80,7 +80,7 @@ def _tests(
             "status": "pass" if got else ("error" if verdict.outcome is Outcome.UNDECIDED else "fail"),
             "score": json_value(unit if got else Fraction(0)),
             "message": "" if got else log_lines(shown(verdict.reason)),
-            # The reporter prints this as it is, so no line of it may be a command to the runner. Once is enough.
+            # The reporter prints this unchanged, so no line of it may be a workflow command. The first row is enough.
             "test_code": "\n".join(map(log_lines, wording.explanation(verdict))) if row == earned else "",
             "filename": "",
             "line_no": 0,

@@ -1,4 +1,4 @@
-"""The report as Classroom 50's result.json: whole points, and the exact ones beside them."""
+"""The report as Classroom 50's result.json: whole points, with the exact ones beside them."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
-from grader.reporting.rounding import whole_points
+from grader.reporting.wording import whole_points
 
 SCHEMA = "classroom50/result/v1"
 
 
 @dataclass(frozen=True, slots=True)
 class HandedIn:
-    """What the classroom knows of a submission, and no report does; all of it is required.
+    """Metadata of a submission that only the classroom knows; all fields are required.
 
     Attributes:
         classroom: Its name.
         assignment: Its name.
         assignment_type: `individual` or `group`.
         owner: Owner of the repository.
-        username: Who handed it in.
-        submission: Tag, beginning with `submit/`.
-        commit: Address of the commit.
-        release: Address of the release.
-        review: Address of the review.
-        datetime: When it was committed, UTC, as `2026-01-31T23:59:59Z`.
+        username: Who submitted it.
+        submission: Tag that starts with `submit/`.
+        commit: URL of the commit.
+        release: URL of the release.
+        review: URL of the review.
+        datetime: Commit time in UTC, as `2026-01-31T23:59:59Z`.
     """
 
     classroom: str
@@ -47,7 +47,7 @@ class HandedIn:
 def render_classroom50(report: Report, handed_in: HandedIn) -> str:
     """Return the result.json of a report.
 
-    The last row has no points: it says whether the result is final, and what gives it again.
+    The last row has no points: it states whether the result is final, and how to reproduce it.
     """
     rows = [(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts]
     rounded = whole_points([v.score for _, v in rows], [v.max_score for _, v in rows])

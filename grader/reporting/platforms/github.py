@@ -1,4 +1,4 @@
-"""The report as workflow commands of GitHub Actions: annotations beside the lines that they are about."""
+"""The report as GitHub Actions workflow commands: annotations beside the lines they refer to."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import log_lines, shown, workflow_message, workflow_property
 
-#: GitHub shows no more annotations of one kind than this of one step, and drops the rest without a word.
+#: GitHub shows at most this many annotations of one kind per step, and silently drops the rest.
 MOST_OF_A_KIND = 10
 _KINDS = {Outcome.NOT_MET: "error", Outcome.PARTLY: "warning", Outcome.UNDECIDED: "warning"}
 
@@ -24,15 +24,16 @@ class _Annotation:
 
 
 def render_github(report: Report, *, folder: str | None) -> str:
-    """Return the lines to be printed in a step.
+    """Return the lines to print in a step.
 
-    An error for each criterion that is not met, a warning for each that is partly met or undecided, and one notice with
-    the score. What is blocked has its cause among them. Lines without a command repeat the report's end in the log.
+    Each unmet criterion is an error, each partly met or undecided one a warning, and the score is one notice. Blocked
+    criteria are left out, because their cause is among the others. Lines without a command repeat the end of the report
+    in the log.
 
     Args:
-        report: What is annotated.
-        folder: Where the submission lies in the repository, POSIX form, empty for its root; None if it does not, and
-            then no annotation names a file.
+        report: The report.
+        folder: The submission's folder in the repository, POSIX form, empty for the root. None if it is elsewhere: then
+            no annotation names a file.
     """
     annotations = [_notice(report), *_warnings(report)]
     annotations += [_annotation(e, v) for e in report.exercises for v in e.verdicts if v.outcome in _KINDS]
@@ -52,7 +53,7 @@ def _notice(report: Report) -> _Annotation:
 
 def _warnings(report: Report) -> list[_Annotation]:
     said = [_Annotation("warning", "The score is not final", warning) for warning in wording.warnings(report)]
-    if wording.without_walls(report):
+    if wording.ran_without_sandbox(report):
         said.append(_Annotation("warning", "No isolation", f"isolation: {wording.isolation(report)}"))
     return said
 
@@ -70,7 +71,7 @@ def _annotation(exercise: ExerciseReport, verdict: Verdict) -> _Annotation:
 
 
 def _within_limit(annotations: list[_Annotation], kind: str) -> list[_Annotation]:
-    """Return the annotations of a kind; if they are too many, the last one says how many are missing."""
+    """Return the annotations of a kind; if there are too many, the last one counts the missing ones."""
     found = [annotation for annotation in annotations if annotation.kind == kind]
     if len(found) <= MOST_OF_A_KIND:
         return found

@@ -11,21 +11,21 @@ from grader.reporting.audience import for_student
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
 
-#: What a criterion waits for -> when the platform shows its test.
+#: `until` of a criterion -> when the platform shows its test.
 _VISIBILITIES = {DUE_DATE: "after_due_date", PUBLISHED: "after_published"}
 _HIDDEN, _VISIBLE = "hidden", "visible"
 _FOR_STAFF = "What was found is in the standard output, which only staff see."
 
 
 def render_gradescope(report: Report, *, day: str | None = None) -> str:
-    """Return the results.json of a report; its texts are plain, so that nothing in them is markup to the platform.
+    """Return the results.json of a report; its texts are plain, so the platform finds no markup in them.
 
-    What is undecided earns nothing yet, and the output says so before anything else. The score counts every criterion,
-    also those whose tests the platform hides.
+    Undecided criteria earn nothing yet, and the output starts with that. The score counts every criterion, including
+    those whose tests the platform hides.
 
     Args:
-        report: The whole of it.
-        day: The day by which dates in the rubric are over or not; None to show everything to everybody.
+        report: The whole report.
+        day: The day on which dates in the rubric are compared; None shows everything to everybody.
     """
     seen = report if day is None else for_student(report, day)
     return json_text(
@@ -57,7 +57,7 @@ def _output(report: Report) -> list[str]:
 
 
 def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:
-    """Return a test for every criterion, as far as students see it; the rest in it is only for the platform."""
+    """Return one test per criterion, as students see it; the platform keeps the rest hidden."""
     visible = {(exercise.id, verdict.id): verdict for exercise in seen.exercises for verdict in exercise.verdicts}
     found = []
     for exercise in report.exercises:
@@ -68,7 +68,7 @@ def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:
 
 
 def _unshown(exercise: ExerciseReport, number: int, verdict: Verdict) -> dict[str, Any]:
-    """Return a test that the platform hides, whole where it shows the test later, else with its points alone."""
+    """Return a test that the platform hides: complete if it shows the test later, else only its points."""
     visibility = _VISIBILITIES.get(exercise.feedback.get(verdict.id, OPEN).until, _HIDDEN)
     kept = {"output": _FOR_STAFF} if visibility == _HIDDEN else {}
     return {**_test(exercise, number, verdict), **kept, "visibility": visibility}

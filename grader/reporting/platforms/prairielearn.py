@@ -10,15 +10,15 @@ from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
 
-#: PrairieLearn refuses a longer file.
+#: PrairieLearn refuses a longer file; bytes.
 MOST_BYTES = 1_000_000
 
 
 def render_prairielearn(report: Report, *, limit: int = MOST_BYTES) -> str:
     """Return the results.json of a report, at most `limit` bytes.
 
-    A report that is not final is no grade: it is not gradable, so that the attempt does not count, and its message says
-    why. Where the limit is near, explanations give way, then what else the output says, then the tests.
+    A report that is not final is marked as not gradable, so that the attempt does not count, and its message explains
+    why. Near the limit, explanations are dropped first, then the rest of the output, then the tests.
     """
     whole = _results(report)
     text = json_text(whole)
@@ -70,5 +70,5 @@ def _output(whole: dict[str, Any]) -> None:
 
 
 def _tests(whole: dict[str, Any]) -> None:
-    # One row without points would hide those of all others, so all of them go.
+    # A zero-point row would hide all other rows, so all of them are dropped.
     whole["tests"] = []

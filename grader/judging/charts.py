@@ -1,22 +1,41 @@
-"""The charts of an exercise: those of its checks, the graph, a timeline of each scenario, and lines of the source."""
+"""Makes the figures of an exercise: charts of its checks, the graph, timelines, and lines of the source."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Look, Moment, Panel, Series, Stage, Tone
+from grader.core.chart import (
+    Chart,
+    Excerpt,
+    Figure,
+    GraphFigure,
+    Level,
+    Look,
+    Moment,
+    Panel,
+    Point,
+    Series,
+    Stage,
+    Tone,
+)
 from grader.core.exercise import Check, Criterion, Exercise, Location
 from grader.core.quantities import seconds
 from grader.core.report import ExerciseReport
 from grader.core.scenario import Scenario
 from grader.core.submission import Submission
-from grader.core.trace import GraphSnapshot, Request, Response, Trace
-from grader.judging.charts.drawing import series, time_chart, written_in_lane
+from grader.core.trace import GraphSnapshot, LogRecord, OutputLine, Request, Response, Trace
 from grader.judging.findings import fault_sentence
 from grader.judging.output import printed_lines
-from grader.judging.values import on_student_topic
-from grader.judging.wording import counted, quote
+from grader.judging.texts import clean
+from grader.judging.values import Reading, on_student_topic
+from grader.judging.wording import counted, number, quote, unit_of
+
+#: Maximum number of points of a series: a screen shows no more, and a flood must not enlarge the report.
+MOST_POINTS = 1200
+#: Maximum number of points with a text.
+MOST_TEXTS = 400
+_TEXT_LENGTH = 160
 
 
 def illustrated(
@@ -26,13 +45,13 @@ def illustrated(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> ExerciseReport:
-    """Return the report with what a reader wants to look at: figures, lines of the source, and what was expected.
+    """Return the report with figures, lines of the source, and the expected results.
 
     Args:
-        report: What judging came to.
-        exercise: What was asked.
-        traces: Scenario id -> what was recorded.
-        submission: Says which files were found.
+        report: The judged report.
+        exercise: The exercise.
+        traces: Scenario id -> trace.
+        submission: Tells which files were found.
         sources: Wanted file name -> its text.
     """
     return replace(
@@ -44,13 +63,13 @@ def illustrated(
 
 
 def expectation(check: Check) -> str:
-    """Return what a check expects, without a full stop; empty if it does not say."""
+    """Return the phrase for a check's expectation, without a full stop; empty if it has none."""
     own = getattr(check, "expected", "")
     return own if isinstance(own, str) else ""
 
 
 def figures_of(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[Figure, ...]:
-    """Return the pictures of an exercise in rubric order, then the graph, then a timeline of each scenario."""
+    """Return the charts of an exercise in rubric order, then the graph, then a timeline of each scenario."""
     drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
@@ -65,14 +84,14 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace]) -> Iterable[Chart]
     maker, trace = getattr(criterion.check, "chart", None), traces.get(criterion.scenario)
     try:
         chart = maker(trace) if callable(maker) and trace else None
-    except Exception:  # a picture that cannot be drawn must not cost the report that it would be in
+    except Exception:  # a failing chart must not cost the report
         chart = None
     if isinstance(chart, Chart):
         yield replace(chart, id=f"{criterion.scenario} {chart.id}", criteria=(criterion.id,))
 
 
 def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:
-    """Join charts of one id: two questions about the same thing make one picture."""
+    """Merge charts with one id: two criteria about the same data share one chart."""
     joined: dict[str, Chart] = {}
     for chart in charts:
         other = joined.get(chart.id)
@@ -99,15 +118,15 @@ def _timelines(exercise: Exercise, traces: Mapping[str, Trace]) -> Sequence[Char
     return charts
 
 
-#: Lines shown before and after the one that is meant.
+#: Lines shown before and after the referenced one.
 AROUND = 3
-#: A line of a source may be a megabyte long.
+#: Longest line shown, in characters; a source line may be a megabyte long.
 _LONGEST_LINE = 400
 _TAB = 4
 
 
 def excerpts_for(report: ExerciseReport, submission: Submission, sources: Mapping[str, str]) -> tuple[Excerpt, ...]:
-    """Return the source around each place that a verdict or a fault names, each once; unknown places have none."""
+    """Return the source around each place that a verdict or a fault names, without duplicates."""
     places = [v.location for v in report.verdicts if v.location is not None]
     places += [Location(f.file, f.line) for f in report.faults if f.file and f.line > 0]
     texts = {file.found: sources[wanted] for wanted, file in submission.files.items() if wanted in sources}
@@ -125,7 +144,7 @@ def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
 
 
 def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure | None:
-    """Return the graph in every situation that tells something new, or None if no node ever appeared."""
+    """Return the graph in every situation with new information, or None if no node ever appeared."""
     stages = [stage for s in exercise.scenarios if s.id in traces for stage in _stages(s, exercise, traces[s.id])]
     told: dict[tuple[object, ...], Stage] = {}
     for stage in stages:
@@ -133,7 +152,7 @@ def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure
     distinct = [stage for stage in told.values() if stage.graph.nodes]
     if not distinct:
         return None
-    return GraphFigure("graph", "The live ROS graph", _told_graphs(distinct), (), tuple(distinct))
+    return GraphFigure("graph", "The live ROS graph", _describe_graphs(distinct), (), tuple(distinct))
 
 
 def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]:
@@ -148,7 +167,7 @@ def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]
 
 
 def _own(graph: GraphSnapshot) -> GraphSnapshot:
-    """Return the graph with what the student's nodes made themselves, at no particular time."""
+    """Return the graph of the student's own endpoints, without a time."""
     return replace(graph, t_ns=0, endpoints=tuple(e for e in graph.endpoints if on_student_topic(e)))
 
 
@@ -156,7 +175,7 @@ def _size(graph: GraphSnapshot) -> int:
     return len(graph.endpoints) + len(graph.services)
 
 
-def _told_graphs(stages: list[Stage]) -> str:
+def _describe_graphs(stages: list[Stage]) -> str:
     return " ".join(f"{s.title.capitalize()}: {_said(s.graph)}." for s in stages)
 
 
@@ -175,13 +194,13 @@ def _said(graph: GraphSnapshot) -> str:
     return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
 
 
-#: Lanes for services; a node's parameters and an action are several.
+#: Number of lanes for services; a node's parameters and an action need several.
 MOST_SERVICES = 6
 _TONES = {"DEBUG": Tone.FAINT, "INFO": Tone.MAIN, "WARN": Tone.WARNING, "ERROR": Tone.BAD, "FATAL": Tone.BAD}
 
 
 def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
-    """Return the picture of a scenario; there is always one, a silent node included."""
+    """Return the timeline of a scenario; it exists even for a silent node."""
     lanes: list[str] = []
     rows: list[Series] = []
     for process in processes:
@@ -222,7 +241,7 @@ def _prints(trace: Trace, process: str, lanes: list[str], rows: list[Series]) ->
 
 
 def _exchanges(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
-    """Add a lane for each service that was called: its requests and responses, with what they say."""
+    """Add a lane for each called service, with its requests and responses."""
     sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
     exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
     for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:
@@ -256,3 +275,87 @@ def _about(trace: Trace, processes: Sequence[str]) -> str:
     faults = [quote(fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
     parts.append(f"faults: {'; '.join(faults[:3])}" if faults else "no fault")
     return f"{'; '.join(parts)}; observed for {seconds(trace.stop_ns):.1f} s."
+
+
+def series(  # noqa: PLR0913  what a series consists of
+    name: str,
+    points: Sequence[Point],
+    *,
+    look: Look = Look.LINE,
+    tone: Tone = Tone.MAIN,
+    texts: Sequence[str] = (),
+    most: int = MOST_POINTS,
+) -> Series:
+    """Return a series reduced to a visible number of points; the extremes of each stretch stay."""
+    most = min(most, MOST_TEXTS) if texts else most
+    kept = kept_indices([y for _, y in points], most)
+    said = tuple(quote(texts[k], _TEXT_LENGTH) for k in kept) if texts else ()
+    return Series(name, tuple(points[k] for k in kept), look, tone, said)
+
+
+def kept_indices(values: Sequence[float], most: int) -> list[int]:
+    """Return about `most` indices of values, including the first, the last and the extremes of each stretch."""
+    if len(values) <= most:
+        return list(range(len(values)))
+    stretch = -(-2 * len(values) // most)
+    kept = {0, len(values) - 1}
+    for start in range(0, len(values), stretch):
+        part = range(start, min(start + stretch, len(values)))
+        kept |= {min(part, key=values.__getitem__), max(part, key=values.__getitem__)}
+    return sorted(kept)
+
+
+def written_in_lane(name: str, items: Sequence[LogRecord | OutputLine], lane: int, tone: Tone) -> Series:
+    """Return output as dots in a lane of its own, each with its text."""
+    points = [(seconds(o.t_ns), float(lane)) for o in items]
+    return series(name, points, look=Look.DOTS, tone=tone, texts=[clean(o.text) for o in items])
+
+
+def happenings(trace: Trace) -> tuple[Moment, ...]:
+    """Return the faults of a trace and the ends of its streams as moments."""
+    found = [Moment(seconds(m.t_ns), f"{m.detail} begins") for m in trace.marks("stream_starts")]
+    found += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("stream_stops")]
+    faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    found += [Moment(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
+    return tuple(found)
+
+
+_MOST_FAULTS = 5
+
+
+def plain_topic(topic: str) -> str:
+    """Return a topic's name as a title: `/fan_speed` becomes `fan speed`."""
+    return quote(topic.strip("/").replace("/", " ").replace("_", " "), 40) or topic
+
+
+def time_chart(id_: str, title: str, about: str, panels: tuple[Panel, ...], moments: tuple[Moment, ...]) -> Chart:
+    """Return a chart over time."""
+    return Chart(id_, title, about, (), "time", "s", panels, moments)
+
+
+def input_panel(topic: str, values: Sequence[Reading], threshold: float, look: Look) -> Panel:
+    """Return a panel with the inputs of a controller and its threshold."""
+    level = Level(threshold, f"{number(threshold)}{unit_of(topic)}")
+    name = plain_topic(topic)
+    return Panel(name, unit_of(topic).strip(), (series(name, points_of(values), look=look),), levels=(level,))
+
+
+def answer_panel(topic: str, answers: Sequence[Reading], expected: Series) -> Panel:
+    """Return a panel with a controller's answers and the expected ones."""
+    name = plain_topic(topic)
+    dots = series(name, points_of(answers), look=Look.STEP, tone=Tone.SECOND)
+    return Panel(name, unit_of(topic).strip(), (expected, dots))
+
+
+def which_answers(answers: Sequence[Reading]) -> str:
+    """Return which answers occur, for text."""
+    values = sorted({r.value for r in answers})
+    if not values:
+        return ""
+    said = ", ".join(number(v) for v in values[:5]) + (" and others" if len(values) > 5 else "")
+    return f", all of them {said}" if len(values) == 1 else f" ({said})"
+
+
+def points_of(values: Sequence[Reading]) -> list[Point]:
+    """Return numbers as points over time, in seconds."""
+    return [(seconds(r.t_ns), r.value) for r in values]

@@ -1,4 +1,4 @@
-"""Logged positions held against the odometry that was played."""
+"""Compares logged positions with the odometry that was played."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from grader.judging.texts import (
 from grader.judging.values import JITTER_NS, Same, delivered
 from grader.judging.values import field as number_in
 
-#: How long a pose stays acceptable after the next one arrived: a slow loop reads a queue.
+#: How long a pose stays acceptable after the next one arrived: a slow loop may read from a queue.
 STALE_NS = 500 * NS_PER_MS
 X = "pose.pose.position.x"
 Y = "pose.pose.position.y"
@@ -42,19 +42,19 @@ class Pose:
 
     @classmethod
     def of(cls, delivery: Delivery) -> Pose:
-        """Return the pose that a message carries."""
+        """Return the pose in a message."""
         fields = delivery.value
         try:
             position = fields["pose"]["pose"]["position"]
             x, y = position["x"], position["y"]
         except (KeyError, TypeError):
             x = y = None
-        if type(x) is float and type(y) is float:  # nearly always, and there are many
+        if type(x) is float and type(y) is float:  # the common case, and there are many
             return cls(delivery.t_ns, x, y, fields)
         return cls(delivery.t_ns, _number(fields, X), _number(fields, Y), fields)
 
     def at(self, path: str) -> float:
-        """Return a number of the message; NaN, which matches nothing, if it has none there."""
+        """Return a number of the message; NaN, which matches nothing, if the path does not exist."""
         if path == X:
             return self.x
         return self.y if path == Y else _number(self.fields, path)
@@ -62,7 +62,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The odometry played on a topic, in order, and when the stream began and ended."""
+    """The odometry played on a topic, in order, and the start and end of the stream."""
 
     deliveries: tuple[Delivery, ...]
     times_ns: tuple[int, ...]
@@ -79,7 +79,7 @@ class Track:
         return range(max(0, min(start, stop - 1)), stop)
 
     def pose(self, index: int) -> Pose:
-        """Return one of the poses; each is made when first asked for, because half of them never are."""
+        """Return a pose; poses are created on first use, because half of them are never needed."""
         pose = self._made.get(index)
         if pose is None:
             pose = self._made[index] = Pose.of(self.deliveries[index])
@@ -97,7 +97,7 @@ class Track:
 
     @property
     def spans(self) -> tuple[float, float]:
-        """How far the poses reach in x and in y, metres, at least a centimetre each for the sake of divisions."""
+        """Extent of the poses in x and y, metres; at least a centimetre each, to avoid division by zero."""
         if not self._spans:
             xs, ys = [p.x for p in self.poses], [p.y for p in self.poses]
             self._spans.append((max(max(xs) - min(xs), 0.01), max(max(ys) - min(ys), 0.01)))
@@ -105,7 +105,7 @@ class Track:
 
 
 def track_of(trace: Trace, topic: str) -> Track | None:
-    """Return the odometry that was played on a topic, or None if none was."""
+    """Return the odometry played on a topic, or None if there was none."""
     return trace.once((track_of, topic), lambda: _track_of(trace, topic))
 
 
@@ -125,7 +125,7 @@ def _number(fields: Mapping[str, Any], path: str) -> float:
     return _NAN if found is None else found
 
 
-#: Output written within this time is one block; in virtual time one instant is exact.
+#: Output written within this time is one block; in virtual time, output of exactly one instant.
 _BLOCK_NS = {ClockKind.VIRTUAL: 0, ClockKind.WALL: 10 * NS_PER_MS}
 Wanted = Callable[[Pose], tuple[float, float]]
 
@@ -140,7 +140,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One text of a group, read; `right` if its pair shows a current pose."""
+    """One parsed text of a group; `right` if its pair shows a current pose."""
 
     t_ns: int
     text: str
@@ -152,7 +152,7 @@ class Entry:
 class Group:
     """All texts of one template, and the index pair that shows a current pose most often.
 
-    `pair` is None where the texts hold fewer than two numbers.
+    `pair` is None if the texts hold fewer than two numbers.
     """
 
     template: str
@@ -162,7 +162,7 @@ class Group:
 
     @property
     def right(self) -> int:
-        """How many texts show a current pose."""
+        """Number of texts that show a current pose."""
         return sum(e.right for e in self.entries)
 
     @property
@@ -172,17 +172,17 @@ class Group:
 
 
 def position(pose: Pose) -> tuple[float, float]:
-    """Return what is wanted: x and y."""
+    """Return the expected numbers: x and y."""
     return pose.x, pose.y
 
 
 def single_texts(outputs: Iterable[LogRecord | OutputLine]) -> list[Text]:
-    """Return each record or line as a text of its own."""
+    """Return each record or line as a separate text."""
     return [Text(o.t_ns, clean(o.text)) for o in outputs]
 
 
 def blocks(outputs: Iterable[LogRecord | OutputLine], clock: ClockKind) -> list[Text]:
-    """Return what was written at one instant as one text: three lines a message count as one."""
+    """Return the output of each instant as one text: three lines per message count as one."""
     joined: list[tuple[int, list[str]]] = []
     for output in outputs:
         if joined and output.t_ns - joined[-1][0] <= _BLOCK_NS[clock]:
@@ -209,7 +209,7 @@ def grouped(texts: Iterable[Text], *, decimal_comma: bool = False) -> list[Group
 
 
 def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
-    """Return the group with its best pair chosen and every text judged by it."""
+    """Return the group with its best pair chosen and every text judged by that pair."""
     if not group.pairs:
         return group
     hits = [_hits(entry, group.pairs, track, wanted) for entry in group.entries]
@@ -220,10 +220,10 @@ def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
 
 
 def _hits(entry: Entry, pairs: Sequence[Pair], track: Track, wanted: Wanted) -> set[Pair]:
-    """Return the pairs that show a current pose: both numbers of one and the same."""
+    """Return the pairs that show a current pose; both numbers must belong to the same pose."""
     current = track.current(entry.t_ns)
     newest = _among(entry, pairs, [wanted(track.pose(current[-1]))])
-    # nearly every log shows the newest pose, and to look for a dozen older ones takes long
+    # nearly every log shows the newest pose, and comparing with a dozen older ones takes long
     return newest if len(newest) == len(pairs) else _among(entry, pairs, [wanted(track.pose(k)) for k in current])
 
 
@@ -235,7 +235,7 @@ def _among(entry: Entry, pairs: Sequence[Pair], targets: Sequence[tuple[float, f
 
 
 def _shown_by(number: Printed, values: Sequence[float]) -> int:
-    """Return as a bit set which of the values the number shows."""
+    """Return a bit set of the values that the number shows."""
     far = number.step + SLACK_M
     if number.value < min(values) - far or number.value > max(values) + far:
         return 0
@@ -246,16 +246,16 @@ def _shown_by(number: Printed, values: Sequence[float]) -> int:
     return bits
 
 
-#: Share of right texts from which on a template is taken for a position log.
+#: Minimum share of right texts for a template to count as a position log.
 _POSITION_SHARE = 0.5
-#: Streams longer than this must be logged more than once or twice.
+#: Streams longer than this need more than one or two logs.
 _LONG_STREAM_NS = 5 * NS_PER_S
 _FEWEST_IN_LONG_STREAM = 3
-#: A printed number shows positions over so many units of its last digit, with a margin.
+#: A printed number may show positions within this many units of its last digit, with a margin.
 _UNITS_SHOWN = 2
-#: Up to so many wordings are those of a program that words its logs in one way or another, and not anew each time.
+#: Up to this many templates are normal for a program with several wordings; more suggest that it varies its text.
 _FEW_WORDINGS = 3
-#: Share of the right templates that chance may be expected to make right.
+#: Maximum share of right templates that chance may explain.
 _LUCK = 0.3
 
 
@@ -267,8 +267,8 @@ class Analysis:
         groups: Every template with a number, matched.
         right: Texts that show a pose that was current, in order.
         wrong: Texts of the same templates that show none, in order.
-        needed: How many instants with a right text it takes.
-        by_chance: Whether positions stand in the texts only because so many numbers do; none of them is right then.
+        needed: Number of instants that need a right text.
+        by_chance: Whether positions appear only because the texts hold so many numbers; then none counts as right.
     """
 
     groups: tuple[Group, ...] = ()
@@ -279,7 +279,7 @@ class Analysis:
 
     @property
     def times_ns(self) -> tuple[int, ...]:
-        """The instants at which a position was logged, right or wrong, each once."""
+        """The instants at which a position was logged, right or wrong, without duplicates."""
         return tuple(sorted({e.t_ns for e in (*self.right, *self.wrong)}))
 
     @property
@@ -300,7 +300,7 @@ def printed_positions(trace: Trace, process: str, track: Track) -> Analysis:
 
 
 def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: ClockKind) -> Analysis:
-    """Return the best reading: text by text or block by block, with decimal points or decimal commas."""
+    """Return the best interpretation: text by text or block by block, with decimal points or decimal commas."""
     during = [o for o in outputs if o.t_ns >= track.times_ns[0]]
     best = Analysis(needed=_needed(track))
     singly, together = single_texts(during), blocks(during, clock)
@@ -329,13 +329,13 @@ def _judged(texts: Sequence[Text], track: Track, *, decimal_comma: bool) -> Anal
     entries = sorted((e for g in chosen for e in g.entries), key=lambda e: e.t_ns)
     settled_ns = track.times_ns[0] + STALE_NS
     right = tuple(e for e in entries if e.right)
-    # a timer that fires while the first message is still on its way shows what the node started with
+    # a timer that fires before the first message arrives shows the node's initial values
     wrong = tuple(e for e in entries if not e.right and e.t_ns > settled_ns)
     return Analysis(groups, right, wrong, _needed(track))
 
 
 def _luck(group: Group, track: Track) -> float:
-    """Return how many pairs of a template are expected to show positions by chance, all of its texts together."""
+    """Return how many pairs of a template are expected to show positions by chance, over all of its texts."""
     if not group.pairs:
         return 0.0
     first, second = group.pair or group.pairs[0]

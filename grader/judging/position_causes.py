@@ -1,4 +1,4 @@
-"""Names what wrong position logs show instead: swapped, one number only, the twist, an old pose, and so on."""
+"""Finds what wrong position logs show instead: swapped numbers, only one, the twist, an old pose, and so on."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.judging.position_logs.analysis import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
+from grader.judging.position_logs import STALE_NS, Analysis, Entry, Group, Pose, Track, Wanted, X, Y, matched
 from grader.judging.texts import Pair, Printed
 from grader.judging.wording import counted, moment, number, quote, span
 
-#: Share of a template's texts that must show the same thing for it to be named.
+#: Minimum share of a template's texts that must show the same mistake for it to be reported.
 _SURE = 0.8
-#: Most texts of a template that are looked at for a cause.
+#: Maximum number of a template's texts that are examined for a cause.
 _SAMPLE = 40
-#: Most pairs of one template that are compared with older poses.
+#: Maximum number of a template's pairs that are compared with older poses.
 _MOST_PAIRS = 12
 _TWIST = "twist.twist.linear.x"
 _TURN = "twist.twist.angular.z"
@@ -29,7 +29,7 @@ class Cause:
 
     Attributes:
         name: One word for evidence.
-        sentence: What was found, to follow a place and a colon.
+        sentence: What was found, written to follow a place and a colon.
         hint: One thing to do; empty if nothing is very likely right.
     """
 
@@ -83,11 +83,11 @@ _SINGLES = (
 
 
 def cause_of(analysis: Analysis, track: Track) -> Cause:
-    """Return what the texts show instead of the position, or at least where they first differ."""
+    """Return the cause that explains what the texts show, or at least where they first differ."""
     if analysis.by_chance:
         return _chance(analysis)
     sampled = [_sample(g) for g in analysis.groups]
-    if analysis.right and analysis.wrong:  # a position log most of the time, so no other thing
+    if analysis.right and analysis.wrong:  # a position log most of the time, so it shows nothing else
         return _first_difference(analysis, track)
     likely = _few(analysis) or _constant(sampled, track)
     if likely is None:
@@ -132,7 +132,7 @@ def _sure(group: Group) -> bool:
 
 
 def _single(groups: Sequence[Group], track: Track) -> Cause | None:
-    """Return that x or y alone is there, in groups whose numbers never show the other."""
+    """Return a cause if only x or only y is logged, in groups whose numbers never show the other."""
     for name, path, sentence, hint in _SINGLES:
         for group in groups:
             places = range(min(len(e.numbers) for e in group.entries))
@@ -142,14 +142,14 @@ def _single(groups: Sequence[Group], track: Track) -> Cause | None:
 
 
 def _follows(group: Group, place: int, path: str, track: Track) -> bool:
-    """Return whether the number at a place shows a changing number of the current pose nearly always."""
+    """Return whether the number at an index nearly always shows a changing value of the current pose."""
     shown = [any(e.numbers[place].shows(track.pose(k).at(path)) for k in track.current(e.t_ns)) for e in group.entries]
     changes = len({e.numbers[place].value for e in group.entries}) > 1
     return changes and sum(shown) >= _SURE * len(shown)
 
 
 def _constant(groups: Sequence[Group], track: Track) -> Cause | None:
-    """Return that the same pair is logged all the time while the robot moved."""
+    """Return a cause if the same pair is logged all the time although the robot moved."""
     if not track.moves:
         return None
     for group in groups:
@@ -173,7 +173,7 @@ def _constant_cause(entry: Entry, pair: Pair, track: Track) -> Cause:
 
 
 def _stale(groups: Sequence[Group], track: Track) -> Cause | None:
-    """Return by how much the logged poses lag, if each of them was current once."""
+    """Return by how much the logged poses lag, if each of them was current at some time."""
     for group in groups:
         for pair in group.pairs[:_MOST_PAIRS]:
             lags = [_lag_ns(e, pair, track) for e in group.entries]
