@@ -8,8 +8,7 @@ from collections import Counter
 import pytest
 from click.testing import CliRunner
 
-from grader.app.seeds import read_key
-from grader.app.variants import ByKey, by_key, checked
+from grader.app.seeds import ByKey, by_key, checked, read_key
 from grader.cli.main import app
 from grader.core.errors import KeyFileError, VariantError
 

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 import grader
-from grader.app.reproducing import reproduction
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError

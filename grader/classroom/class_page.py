@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-from grader.classroom.cache_key import Conditions
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
 from grader.classroom.roster import Person, fold_name
+from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 

@@ -18,8 +18,7 @@ from typing import Any, Protocol
 import msgspec
 
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.checkup import NO_WALLS, missing
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation

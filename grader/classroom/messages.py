@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import msgspec
 
-from grader.classroom.cache_key import Conditions
+from grader.classroom.store import Conditions
 from grader.core.errors import HarnessError
 from grader.core.exercise import Drawn
 from grader.reporting.delivery import write_whole

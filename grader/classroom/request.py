@@ -8,11 +8,10 @@ from pathlib import Path
 
 from grader.app.request import GradeRequest
 from grader.app.seeds import SeedKey
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.downloads import AUTO
 from grader.classroom.intake import HandedInEntry
 from grader.classroom.outputs import Platforms
-from grader.classroom.store import Kept, State, Store
+from grader.classroom.store import Kept, State, Store, unusable_digest
 from grader.core.errors import GraderError, SubmissionError
 from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission

@@ -20,10 +20,9 @@ from grader.app.evidence_writer import Keeper
 from grader.app.grade import Progress, grade
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions, unusable_digest
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State, unusable_digest
 from grader.core.errors import GraderError, SubmissionError
 from grader.core.report import Report, Reproduction
 from grader.reporting.audience import for_student

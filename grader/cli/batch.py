@@ -16,7 +16,7 @@ from grader.reporting.escape import encoded, shown
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
-    from grader.classroom.summary import Graded
+    from grader.classroom.outputs import Graded
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
 _RERUNS = ("changed", "failed", "undecided", "all")
@@ -171,7 +171,7 @@ def _graders(scheduler: str | None, jobs: int | None) -> AbstractContextManager[
 
 
 def _print(graded: Graded, *, as_json: bool) -> None:
-    from grader.classroom.summary import render_summary, summary_json  # noqa: PLC0415  as above
+    from grader.classroom.outputs import render_summary, summary_json  # noqa: PLC0415  as above
 
     text = summary_json(graded) if as_json else render_summary(graded)
     sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))

@@ -14,8 +14,7 @@ import click
 
 import grader
 from grader.app.exit_codes import ALL_MET, INTERRUPTED, UNDECIDED, UNUSABLE, exit_code
-from grader.app.progress import shown_progress
-from grader.cli import batch, doctor, explain, export, rejudge, rubric, selftest
+from grader.cli import batch, export, rejudge, rubric
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -26,12 +25,13 @@ from grader.cli.options import (
     parse_percent,
     parse_share,
     readers,
+    shown_progress,
     time_budget_option,
 )
 from grader.core.checkup import TIERS, missing
 from grader.core.errors import GraderError, HarnessError, RubricError
 from grader.core.releases import TRIED
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.reporting.delivery import Output, deliver, early_delivery, prepared, show
 from grader.reporting.escape import encoded, shown
 from grader.reporting.formats import FORMATS
 
@@ -223,17 +223,57 @@ def _observe(  # noqa: PLR0913  one parameter an option
     return ALL_MET
 
 
+@click.command(name="doctor")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+def _doctor(*, as_json: bool) -> int:
+    """Say what this machine can do: ROS, an exchange of messages, sandboxes, limits, and what mends each lack.
+
+    Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
+    """
+    from grader.app.doctor import examine  # noqa: PLC0415  the rest of the grader, which --help does not need
+    from grader.reporting.doctor import checkup_to_json, render_checkup  # noqa: PLC0415
+
+    with shown_progress(wanted=True) as progress:
+        checkup = examine(progress)
+    if as_json:
+        show(lambda _: checkup_to_json(checkup), for_people=False)
+    else:
+        show(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour), for_people=True)
+    return ALL_MET if checkup.safe else UNUSABLE
+
+
+@click.command(name="explain")
+@click.argument("name", metavar="CRITERION")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
+    """Explain a CRITERION, or a check by its name.
+
+    Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
+    for it.
+    """
+    from grader.app.explain import explain  # noqa: PLC0415  the rest of the grader, which --help does not need
+    from grader.reporting.explained import explanations_to_json, render_explanations  # noqa: PLC0415
+
+    found = explain(name, rubrics)
+    if as_json:
+        show(lambda _: explanations_to_json(found), for_people=False)
+    else:
+        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+    return ALL_MET
+
+
 #: The command `grade`; further subcommands are added to it.
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
 _grade.context_settings = app.context_settings
 app.add_command(_observe)
 app.add_command(rejudge.command)
 app.add_command(batch.command)
-app.add_command(explain.command)
-app.add_command(doctor.command)
+app.add_command(_explain)
+app.add_command(_doctor)
 app.add_command(export.command)
 app.add_command(rubric.command)
-app.add_command(selftest.command)
+app.add_command(rubric.selftest_command)
 
 
 def main() -> None:

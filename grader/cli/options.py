@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import importlib.util
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
@@ -17,11 +19,14 @@ from grader.core.exercise import Audience
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.audience import Readers
 from grader.reporting.delivery import Output
+from grader.reporting.escape import shown
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
-    from grader.app.seeds import SeedKey
-    from grader.app.variants import ByKey
+    from grader.app.seeds import ByKey, SeedKey
+if TYPE_CHECKING:
+    from grader.app.grade import Progress
+
 
 #: What `-o` calls the folder of recordings that a report rests on.
 EVIDENCE = "evidence"
@@ -72,7 +77,7 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
         return None
     if key is None or not student:
         raise click.BadParameter("--student and --variant-key need each other")
-    from grader.app.variants import by_key  # noqa: PLC0415  reading, which --help does not need
+    from grader.app.seeds import by_key  # noqa: PLC0415  reading, which --help does not need
 
     return by_key(key, student)
 
@@ -152,3 +157,20 @@ def nearest(found: str, known: Sequence[str]) -> str:
     """Return the end of a sentence that names what was probably meant, or all there is."""
     near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+
+
+@contextmanager
+def shown_progress(*, wanted: bool) -> Iterator[Progress]:
+    """Show on a terminal what is being done, and leave no trace of it there."""
+    if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
+        yield _say_nothing
+        return
+    from rich.console import Console  # noqa: PLC0415  only for a terminal
+    from rich.text import Text  # noqa: PLC0415
+
+    with Console(stderr=True).status("starting") as status:
+        yield lambda step: status.update(Text(shown(step)))
+
+
+def _say_nothing(step: str) -> None:
+    del step

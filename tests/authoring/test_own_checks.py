@@ -18,10 +18,10 @@ from ruamel.yaml import YAML
 
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
-from grader.classroom.cache_key import Conditions
 from grader.classroom.cluster.jobs import lay_out
 from grader.classroom.cluster.sending import checks_of
 from grader.classroom.messages import GradingJob, Terms
+from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.errors import RubricError
 from grader.core.exercise import Outcome

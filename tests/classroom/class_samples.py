@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.app.request import GradeRequest
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
+from grader.classroom.outputs import Graded
 from grader.classroom.request import ClassRequest
-from grader.classroom.store import ResultStatus, State
-from grader.classroom.summary import Graded
+from grader.classroom.store import ResultStatus, State, unusable_digest
 from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
 from grader.submissions.submission import stage_submission

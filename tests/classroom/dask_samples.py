@@ -12,10 +12,9 @@ from typing import Any
 from distributed.scheduler import KilledWorker
 
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
 from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 
 CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "auto", "auto")
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"

@@ -13,9 +13,8 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import LocalScheduler, Task
-from grader.classroom.store import ResultStatus, State, dump
+from grader.classroom.store import Conditions, ResultStatus, State, dump
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))

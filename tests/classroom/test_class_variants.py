@@ -11,12 +11,11 @@ import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in
 
 from grader.app.request import GradeRequest
-from grader.app.variants import by_key
+from grader.app.seeds import by_key
 from grader.classroom import worker
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import State
-from grader.classroom.summary import Graded
+from grader.classroom.outputs import Graded
+from grader.classroom.store import Conditions, State
 from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
 from grader.rubrics.builtin import builtin_rubrics

@@ -12,9 +12,8 @@ import pytest
 
 from grader.app.request import GradeRequest
 from grader.classroom import worker
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict

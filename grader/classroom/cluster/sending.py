@@ -11,7 +11,6 @@ from pathlib import Path
 from grader.app.grade import read_exercises, wanted_files
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
 from grader.classroom.messages import (
     Files,
@@ -24,7 +23,7 @@ from grader.classroom.messages import (
     unpack,
     write_answer,
 )
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import ResultStatus, State, unusable_digest
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.rubrics.loader import own_check_files
