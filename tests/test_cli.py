@@ -25,7 +25,7 @@ class Session:
         self.requests = []
         self.result = a_report()
 
-    def grade(self, request, progress, hear=None, early=None, *, pictures=True):
+    def grade(self, request, progress, on_recorded=None, on_partial_report=None, *, pictures=True):
         self.requests.append(request)
         self.pictures = pictures
         progress("exercise 1: alone")
@@ -300,8 +300,9 @@ CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
 from cli_samples import a_report
-from grader import cli, session
-def grade(request, progress, hear=None, early=None, *, pictures=True):
+from grader.app import grade as session
+from grader.cli import main
+def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()

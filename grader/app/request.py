@@ -1,4 +1,4 @@
-"""What a user asks to be graded, and how."""
+"""A request to grade a submission, and the command that reproduces its result."""
 
 from __future__ import annotations
 
@@ -19,26 +19,27 @@ from grader.submissions.collected import Collected
 
 @dataclass(frozen=True, slots=True)
 class GradeRequest:
-    """What is to be graded, and how.
+    """What to grade, and how.
 
     Attributes:
         submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all of the rubrics, of the built-in ones for those that are not
-            only graded by request.
-        every: Whether to grade every exercise of which the submission has a file, and no other.
+        exercises: Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only
+            graded by request.
+        every: Whether to grade exactly the exercises that the submission has a file for.
         rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of every drawn value; None derives it from the submission and the seed key.
-        seed_key: The key for that.
-        odom_bag: An /odom recording to play instead of the project's own.
+        seed: Seed of all drawn values; None derives it from the submission and the seed key.
+        seed_key: The key to derive the seed with.
+        odom_bag: An /odom recording to play instead of the built-in one.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
-        time_budget_s: Real time that all recordings may take together.
-        workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
-        collected: What was read of the submission before, perhaps elsewhere; None to read it now.
-        student: Id of the student whose variants are graded; empty where nothing varies.
-        variant_key: File with the course key, as the user typed it; None if nobody did.
-        spot_checks: Share of submissions, from 0 to 1, that are drawn to be recorded on the wall clock as well.
-        draw: What variants come to; None if nobody says, and then a rubric that has some is refused.
+        time_budget_s: Real time that all recordings together may take.
+        workers: Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
+        collected: The files of the submission if they were read before, perhaps on another machine; None to read
+            them now.
+        student: Id of the student whose variant is graded; empty if nothing varies.
+        variant_key: File with the course key, as the user typed it; None if not given.
+        spot_checks: Share of submissions, from 0 to 1, that are also recorded on the wall clock.
+        draw: Supplies variant values; if None, rubrics with variants are refused.
     """
 
     submission: str
@@ -62,13 +63,13 @@ class GradeRequest:
 def reproduction(
     request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
 ) -> Reproduction:
-    """Return what gives a report again.
+    """Return the command that reproduces a report, with digests of all that it reads besides the submission.
 
     Args:
-        request: What was asked for.
-        exercises: The exercises graded.
-        odometry: The /odom recording that was played, if one was.
-        seed: The seed used, also where none was asked for.
+        request: The request.
+        exercises: The graded exercises.
+        odometry: The /odom recording that was played, if any.
+        seed: The seed used, whether requested or derived.
     """
     return Reproduction(
         command=command_words(request, seed),
@@ -78,8 +79,8 @@ def reproduction(
 
 
 def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
-    """Return the words of the command, with the seed used and every option that the result depends on."""
-    words = ["grade", _plainly_a_path(request.submission)]
+    """Return the words of the command, with the seed and every option that affects the result."""
+    words = ["grade", _unambiguous_path(request.submission)]
     for exercise in request.exercises:
         words += ["--exercise", exercise]
     if request.every:
@@ -105,13 +106,13 @@ def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
 
 
 def recording_digest(odometry: Odometry) -> str:
-    """Return `sha256:` over the topic, times and bytes of a recording, however it is stored."""
+    """Return `sha256:` over the topic, times and bytes of a recording; independent of the storage format."""
     digest = hashlib.sha256(f"{odometry.topic}\n".encode())
     for message in odometry.messages:
         digest.update(f"{message.t_ns} {len(message.cdr)}\n".encode() + message.cdr)
     return f"sha256:{digest.hexdigest()}"
 
 
-def _plainly_a_path(path: str) -> str:
-    """Return a path that is taken neither for an option nor for the name of a command."""
+def _unambiguous_path(path: str) -> str:
+    """Return a path that cannot be mistaken for an option or a subcommand."""
     return path if os.sep in path or path in (".", "..") else os.path.join(".", path)  # noqa: PTH118  a bare ./

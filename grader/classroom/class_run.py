@@ -1,4 +1,4 @@
-"""A class graded from end to end: the visible list of stages."""
+"""Grades a class from end to end, and compares its submissions if requested."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ def grade_class(
     warn: Callable[[str], None],
     make_scheduler: MakeScheduler = LocalScheduler,
 ) -> Graded:
-    """Grade a class, or go on with it.
+    """Grade a class, or resume grading it.
 
     Args:
-        course: What is to be graded, and how.
-        watcher: Hears how it gets on.
-        warn: Hears what an instructor must know before it begins.
-        make_scheduler: Makes what grades so many submissions at a time.
+        course: What to grade, and how.
+        watcher: Shows the progress.
+        warn: Called with warnings for the instructor before grading begins.
+        make_scheduler: Makes the scheduler for a number of parallel submissions.
 
     Raises:
-        GraderError: Something that grading needs cannot be used; its class says who must act.
+        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
     """
     exercises = read_exercises(replace(course.grading, draw=First()), course.sources)
     refuse_without_key(course, exercises)
@@ -68,11 +68,11 @@ def grade_class(
         matching = match(intake.entries, roster)
         intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
-        decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
+        decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         with scratch_folder() as scratch:
             digests = {entry.name: _digest(entry, scratch) for entry in intake.entries}
         own = _seeded(own, digests, course)
-        # Where a digest is not known, grading it, in a process of its own, will say why.
+        # If a digest is unknown, grading the submission in its own process will report why.
         keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
         due = due_now(store, intake.entries, keys, course.rerun)
         before = len(intake.entries) - len(due)
@@ -84,14 +84,14 @@ def grade_class(
             not_replaced = run.grade(due, warn, make_scheduler)
             graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
         except (KeyboardInterrupt, HarnessError):
-            with suppress(GraderError):  # what stopped the run says more
+            with suppress(GraderError):  # the error that stopped the run is more useful
                 _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
             raise
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
-    """Return what all results of a class depend on; raises RecordingError for a recording that cannot be used."""
+    """Collect what all results of a class depend on; raises RecordingError for an unusable recording."""
     odometry = read_recording(grading, exercises)
     return Conditions(
         grader=grader.__version__,
@@ -112,7 +112,7 @@ def _digest(entry: HandedInEntry, scratch: Path) -> str:
 
 
 def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: ClassRequest) -> dict[str, Conditions]:
-    """Return the conditions with the seed of each submission: what grades it is told the seed, never the key."""
+    """Add the seed of each submission to its conditions: the grading process gets the seed, never the key."""
     if course.grading.seed is not None:
         return dict(own)
     key = course.seed_key or kept_key(course.results / SEED_KEY)
@@ -136,7 +136,7 @@ def _book(
 
 
 def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store) -> Graded:
-    """Return the class with what is said of similar submissions, if that was asked for."""
+    """Compare the submissions if requested, and add the result to the class."""
     if course.given is None:
         return replace(graded, links=link_of_before(store))
     found = compare_class(intake.entries, graded.book.rows, course.given, store)
@@ -144,7 +144,7 @@ def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store
 
 
 def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
-    """Return what belongs to this run alone; without what was graded it is one that was stopped."""
+    """Describe this run; it counts as stopped if there is no result."""
     return RunOfClass(
         conditions=conditions,
         title=title_of(course.sources),
@@ -159,7 +159,7 @@ def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: G
 
 
 def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest) -> Graded:
-    """Write what is made for the whole class, and return the class with what was written."""
+    """Write the files for the whole class, and return the class with the list of files."""
     wanted = course.platforms
     names = [row.name for row in graded.book.rows if row.report is not None] if wanted.gradescope else []
     results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}

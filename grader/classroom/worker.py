@@ -16,7 +16,7 @@ from typing import Any
 
 import msgspec
 
-from grader.app.evidence_writer import Keeper
+from grader.app.evidence_writer import EvidenceWriter
 from grader.app.grade import Progress, grade
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
@@ -90,13 +90,13 @@ def _graded(task: Task, progress: Progress) -> ResultStatus:
         draw=Recorded(own) if own is not None else None,
     )
     task.into.mkdir()
-    keeper = Keeper([task.into / EVIDENCE], request)
-    report = grade(request, progress, keeper.hear)
+    writer = EvidenceWriter([task.into / EVIDENCE], request)
+    report = grade(request, progress, writer.remember)
     progress("writing the results")
     today = date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
     for name, text in _files(report, task, today).items():
         write_whole(task.into / name, text.encode())
-    keeper.write(report)
+    writer.write(report)
     key = _used(conditions, report.reproduce).key(report.digest)
     return ResultStatus(
         state=State.GRADED if report.final else State.UNDECIDED,

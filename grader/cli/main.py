@@ -1,4 +1,4 @@
-"""The command line: what is asked for, what is printed where, and the exit code."""
+"""The command line: subcommands, output and exit codes."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _EPILOG = (
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
-# The name of the command that runs when no subcommand is named; no argument of a process can hold a NUL.
+# Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
 _DEFAULT = "\0"
 
 
 class CommandLine(click.Group):
-    """Subcommands, and a default command that runs when the first argument names none of them."""
+    """Subcommands, and a default command that runs if the first argument is none of them."""
 
     def __init__(self, default: click.Command, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -53,11 +53,11 @@ class CommandLine(click.Group):
         self.add_command(default, _DEFAULT)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Name the default command unless a subcommand is named."""
+        """Insert the default command unless the first argument is a subcommand."""
         return super().parse_args(ctx, args if args and args[0] in self.commands else [_DEFAULT, *args])
 
     def invoke(self, ctx: click.Context) -> None:
-        """Run the command and leave with its exit code; every problem becomes a line on standard error."""
+        """Run the command and exit with its code; errors are printed on standard error."""
         ctx.exit(_guarded(lambda: super(CommandLine, self).invoke(ctx)))
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -180,10 +180,10 @@ def _grade(  # noqa: PLR0913  one parameter an option
         draw=drawn_by(student, variant_key),
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
-    keeper = evidence_writer.Keeper(folders, request)
+    writer = evidence_writer.EvidenceWriter(folders, request)
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
-        report = grade.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
+        report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
         _warn(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
@@ -193,7 +193,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     if folders and seen is not report:
         _warn("the evidence is not kept: it holds what the rubric withholds from students")
     else:
-        keeper.write(report)
+        writer.write(report)
     return exit_code(seen, min_score)
 
 
@@ -282,7 +282,7 @@ def main() -> None:
 
 
 def _guarded(run: Callable[[], object]) -> int:
-    """Return the exit code of a command, whatever becomes of it."""
+    """Run a command and return its exit code, whether it succeeds or raises."""
     try:
         code = run()
     except click.exceptions.Exit:
@@ -291,14 +291,14 @@ def _guarded(run: Callable[[], object]) -> int:
         _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
-        # A rubric may have several mistakes, one a line; in any other message a line break comes from a hostile name.
+        # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.
         lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
         _complain(*lines, hint=error.hint)
         return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: no report was made", err=True)
         return INTERRUPTED
-    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+    except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
             traceback.print_exc()
         _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")

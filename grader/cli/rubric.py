@@ -1,4 +1,4 @@
-"""The commands `grade rubric ...`: what authors of rubrics need."""
+"""The commands `grade rubric ...` and `grade selftest`, for authors of rubrics."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     from grader.mutation.showing import render_results, results_to_json  # noqa: PLC0415  as above
     from grader.rubrics.loader import NOTES  # noqa: PLC0415  the rest of the grader, and libcst
 
-    # A pattern of the shell names the notes as well.
+    # A shell pattern such as rubrics/*.yaml matches the notes as well.
     named = [path for path in rubrics if not path.name.endswith(NOTES)]
     if not named:
         raise click.BadParameter(f"expected rubrics, found notes only; name {rubrics[0].name.removesuffix(NOTES)}.yaml")
