@@ -111,9 +111,9 @@ def _clock(asked: str, reports: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _cost(book: Gradebook) -> str:
-    used = [row.standing for row in book.rows if row.standing is not None]
-    processor = sum(standing.usage.get("processor_s", 0.0) for standing in used)
-    peak = max((standing.usage.get("peak_bytes", 0.0) for standing in used), default=0.0)
+    used = [row.result for row in book.rows if row.result is not None]
+    processor = sum(status.usage.get("processor_s", 0.0) for status in used)
+    peak = max((status.usage.get("peak_bytes", 0.0) for status in used), default=0.0)
     return f"{processor:.1f} s of processor time in all, at most {peak / _MIB:.0f} MiB in one process"
 
 
@@ -281,7 +281,7 @@ def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
 
 
 def _problem(row: Row, run: RunOfClass) -> str:
-    hint = row.standing.hint if row.standing is not None else ""
+    hint = row.result.hint if row.result is not None else ""
     said = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
     return f": {'; '.join(said)}" if said else ""
 

@@ -40,6 +40,9 @@ from grader.similarity.finding import find_similar, read_programs
 from grader.similarity.library import ComparedProgram, Handed, Similar
 from grader.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 
+SIMILARITY_FOLDER, SIMILARITY_TABLE = "similarity", "similarity.csv"
+_SIMILARITY_TITLE = "Similar submissions"
+
 
 def grade_class(
     course: ClassRequest,
@@ -138,7 +141,7 @@ def _book(
 def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store) -> Graded:
     """Compare the submissions if requested, and add the result to the class."""
     if course.given is None:
-        return replace(graded, links=link_of_before(store))
+        return replace(graded, links=link_of_earlier_run(store))
     found = compare_class(intake.entries, graded.book.rows, course.given, store)
     return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
 
@@ -191,13 +194,9 @@ def _text(path: Path) -> str:
         return ""
 
 
-FOLDER, TABLE = "similarity", "similarity.csv"
-_TITLE = "Similar submissions"
-
-
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What came of comparing a class: a sentence for the summary, the files to open, and the link to the page."""
+    """The result of comparing a class: a sentence for the summary, the files to open, and a link to the page."""
 
     remark: str
     files: tuple[Path, ...]
@@ -207,39 +206,39 @@ class Compared:
 def compare_class(
     entries: Sequence[HandedInEntry], rows: Sequence[Row], given: Sequence[ComparedProgram], store: Store
 ) -> Compared:
-    """Compare all submissions, and write what was found.
+    """Compare all submissions, and write the similarity pages and table; no score depends on them.
 
     Args:
         entries: The submissions.
-        rows: How they stand.
-        given: The files that everybody was given.
+        rows: Their rows in the gradebook.
+        given: The files handed out to everyone.
         store: Receives the pages.
 
     Raises:
-        HarnessError: They cannot be written.
+        HarnessError: The pages cannot be written.
     """
-    standing = {row.name: row for row in rows}
-    handed = [_handed(entry, standing.get(entry.name)) for entry in entries]
-    similar = find_similar(_told_apart(handed), given)
+    row_of = {row.name: row for row in rows}
+    handed = [_handed(entry, row_of.get(entry.name)) for entry in entries]
+    similar = find_similar(_with_distinct_labels(handed), given)
     pages = [page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))]
     for rank, name in enumerate(pages):
-        store.write(f"{FOLDER}/{name}", render_pair(similar, rank).encode())
-    table = store.write(TABLE, render_table(similar).encode())
-    overview = store.write(f"{FOLDER}/{OVERVIEW}", render_overview(similar).encode())
-    for old in (store.folder / FOLDER).glob("pair-*.html"):
+        store.write(f"{SIMILARITY_FOLDER}/{name}", render_pair(similar, rank).encode())
+    table = store.write(SIMILARITY_TABLE, render_table(similar).encode())
+    overview = store.write(f"{SIMILARITY_FOLDER}/{OVERVIEW}", render_overview(similar).encode())
+    for old in (store.folder / SIMILARITY_FOLDER).glob("pair-*.html"):
         if old.name not in pages:
             old.unlink(missing_ok=True)
     found = _counted(similar)
     return Compared(f"similar submissions: {found}", (table, overview), _link(found))
 
 
-def link_of_before(store: Store) -> tuple[PageLink, ...]:
-    """Return the link to what an earlier run found, if one did."""
-    return (_link("of an earlier run"),) if (store.folder / FOLDER / OVERVIEW).is_file() else ()
+def link_of_earlier_run(store: Store) -> tuple[PageLink, ...]:
+    """Return the link to the similarity page of an earlier run, if there is one."""
+    return (_link("of an earlier run"),) if (store.folder / SIMILARITY_FOLDER / OVERVIEW).is_file() else ()
 
 
 def _link(note: str) -> PageLink:
-    return PageLink(_TITLE, f"{FOLDER}/{OVERVIEW}", note)
+    return PageLink(_SIMILARITY_TITLE, f"{SIMILARITY_FOLDER}/{OVERVIEW}", note)
 
 
 def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
@@ -254,8 +253,8 @@ def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
     )
 
 
-def _told_apart(handed: Sequence[Handed]) -> list[Handed]:
-    """Return the submissions; people of the same name are called by that of the submission too."""
+def _with_distinct_labels(handed: Sequence[Handed]) -> list[Handed]:
+    """Add the name of the submission to labels that occur more than once."""
     count = Counter(one.label for one in handed)
     return [replace(one, label=f"{one.label} ({one.name})") if count[one.label] > 1 else one for one in handed]
 

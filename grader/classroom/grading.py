@@ -1,4 +1,4 @@
-"""Grades the submissions of a class that are due, and takes in each result when it is ready."""
+"""Grades the submissions of a class that are due, each with the variant of its student, and stores the results."""
 
 from __future__ import annotations
 
@@ -22,14 +22,18 @@ from grader.core.exercise import Exercise
 from grader.execution.supervisor import MARGIN_S, TRIES
 from grader.reporting.html.assets import shared_assets
 
-#: Less room than this, where results or scratch files go, and nothing can be graded.
+#: Free disk space below which nothing can be graded, for results and temporary files.
 LEAST_FREE_BYTES = 4 << 20
-#: Seconds that an attempt may take beyond what its recordings may.
+#: Seconds that an attempt may take in addition to the limits of its recordings.
 _BEYOND_S = 300.0
+_NOBODY = "whose variant it is to be graded by is not clear: nobody on the roster goes with it for sure"
+_NO_ID = (
+    "whose variant it is to be graded by is not clear: the roster has no number, user name or address of this person"
+)
 
 
 def deadline_s(budget_s: float) -> float:
-    """Return the real time after which grading one submission is given up: every limit inside has passed by then."""
+    """Return the real time after which an attempt is killed; all its inner limits have expired by then."""
     return budget_s + TRIES * MARGIN_S + _BEYOND_S
 
 
@@ -38,11 +42,11 @@ class ClassRun:
     """One run of the command over a class.
 
     Attributes:
-        course: What was asked for.
-        exercises: What is graded.
+        course: The request.
+        exercises: The exercises to grade.
         conditions: Name of a submission -> what its result depends on.
-        store: Where they go.
-        watcher: Hears how it gets on.
+        store: Receives the results.
+        watcher: Shows the progress.
     """
 
     course: ClassRequest
@@ -52,16 +56,16 @@ class ClassRun:
     watcher: Watcher
 
     def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
-        """Grade what is due, and return the names of those whose result is still the one of before.
+        """Grade submissions, and return the names of those whose earlier, better result was kept.
 
         Args:
             due: The submissions.
-            warn: Hears what an instructor must know before it begins.
+            warn: Called with warnings for the instructor before grading begins.
             make: Makes the scheduler.
 
         Raises:
             EnvironmentFault: Nothing can be graded here.
-            HarnessError: A disk is full; what was done is kept.
+            HarnessError: A disk is full; results stored so far are kept.
         """
         left = {entry.name for entry in due}
         self._note(left)
@@ -88,21 +92,21 @@ class ClassRun:
         with closing(scheduler.run(tasks, self.watcher.step)) as attempts:
             for attempt in attempts:
                 name = attempt.task.name
-                if not self._take(name, attempt.task.into, attempt.standing, left):
+                if not self._take(name, attempt.task.into, attempt.status, left):
                     not_replaced.append(name)
-                self._stop_if_full(attempt.standing)
+                self._stop_if_full(attempt.status)
         return tuple(sorted(not_replaced))
 
-    def _take(self, name: str, fresh: Path, standing: ResultStatus, left: set[str]) -> bool:
-        """Take in what came of a submission; return whether it is its result now."""
-        replaced = self.store.commit(name, fresh, standing)
+    def _take(self, name: str, fresh: Path, status: ResultStatus, left: set[str]) -> bool:
+        """Store the result of an attempt; return whether it replaced the earlier one."""
+        replaced = self.store.commit(name, fresh, status)
         left.discard(name)
         self._note(left)
-        self.watcher.done(name, standing)
+        self.watcher.done(name, status)
         return replaced
 
     def _note(self, left: set[str]) -> None:
-        """Note what is still to be graded again; what is new or changed shows without a note."""
+        """Store which submissions `--rerun` still has to grade; new or changed ones are found without a note."""
         if self.course.rerun != CHANGED:
             self.store.note_pending(self.course.rerun, left)
 
@@ -127,9 +131,9 @@ class ClassRun:
         digest = unusable_digest(SubmissionError(entry.problem))
         return ResultStatus(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
 
-    def _stop_if_full(self, standing: ResultStatus) -> None:
-        """Raise HarnessError if an attempt failed because a disk is full: the others would fail too."""
-        if standing.state is not State.FAILED:
+    def _stop_if_full(self, status: ResultStatus) -> None:
+        """Raise HarnessError if an attempt failed because a disk is full, as the others would fail too."""
+        if status.state is not State.FAILED:
             return
         for place in (self.store, Store(Path(tempfile.gettempdir()))):
             if place.free_bytes < LEAST_FREE_BYTES:
@@ -137,26 +141,20 @@ class ClassRun:
                 raise HarnessError(f"{place.folder}: expected room for results, found the disk full", hint)
 
 
-_NOBODY = "whose variant it is to be graded by is not clear: nobody on the roster goes with it for sure"
-_NO_ID = (
-    "whose variant it is to be graded by is not clear: the roster has no number, user name or address of this person"
-)
-
-
 def student_of(person: Person | None) -> str:
-    """Return what a person's variants are drawn for: the number, else the user name, else the address; or nothing."""
+    """Return the id that a person's variants are drawn for: number, else user name, else email address."""
     return "" if person is None else next((text for text in (person.id, person.user, person.email) if text), "")
 
 
 def with_known_students(
     entries: Sequence[HandedInEntry], people: Mapping[str, Person], exercises: Sequence[Exercise]
 ) -> tuple[HandedInEntry, ...]:
-    """Return the submissions; where something varies, those whose student is not known cannot be graded.
+    """If rubrics have variants, refuse the submissions whose student is not known.
 
     Args:
         entries: The submissions.
-        people: Name of a submission -> whose it is, for those that are clear.
-        exercises: What is graded.
+        people: Name of a submission -> its student, for unambiguous matches.
+        exercises: The exercises to grade.
     """
     if not vary(exercises):
         return tuple(entries)
@@ -172,16 +170,16 @@ def _known(entry: HandedInEntry, person: Person | None) -> HandedInEntry:
 
 
 def vary(exercises: Sequence[Exercise]) -> bool:
-    """Return whether anything differs from student to student."""
+    """Whether any exercise has variants."""
     return any(exercise.variant is not None for exercise in exercises)
 
 
 def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
-    """Make sure that variants can be drawn, if there are any.
+    """Check that there are a course key and a roster if exercises have variants.
 
     Raises:
-        ClassError: There is no roster.
-        VariantError: There is no course key.
+        ClassError: The roster is missing.
+        VariantError: The course key is missing.
     """
     if not vary(exercises):
         return
@@ -200,14 +198,14 @@ def own_conditions(
     exercises: Sequence[Exercise],
     conditions: Conditions,
 ) -> dict[str, Conditions]:
-    """Return name of a submission -> what it is graded with.
+    """Return name of a submission -> the conditions it is graded with.
 
     Args:
-        course: What was asked for.
+        course: The request.
         entries: The submissions.
-        people: Name of a submission -> whose it is.
-        exercises: What is graded, by nobody's variant.
-        conditions: What the whole class is graded with.
+        people: Name of a submission -> its student.
+        exercises: The exercises to grade, read with the first value of each variant.
+        conditions: The conditions of the whole class.
 
     Raises:
         GraderError: The course key or a rubric cannot be used.

@@ -1,4 +1,4 @@
-"""What is written for the whole class: the page, the gradebook, JSON, and files for the platforms asked for."""
+"""Output for the whole class: page, gradebook, platform files, JSON, and the summary on the terminal."""
 
 from __future__ import annotations
 
@@ -17,17 +17,24 @@ from grader.reporting.escape import json_value, shown
 from grader.reporting.json_report import json_text
 
 PAGE, GRADEBOOK, CLASS, ASSETS = "index.html", "gradebook.csv", "batch.json", "assets"
+SCHEMA = "grader/batch/v1"
+#: Most names in one line of the summary.
+_MOST = 10
+#: Suffixes of files that people open.
+_OPENED = (".csv", ".html")
+#: Statuses without a line of their own in the summary.
+_UNREMARKABLE = {Status.GRADED, Status.MISSING}
 
 
 @dataclass(frozen=True, slots=True)
 class Platforms:
-    """The platforms that are to be told.
+    """The platforms to export scores to.
 
     Attributes:
-        canvas: Number of the assignment in Canvas; empty if Canvas is not asked for.
-        canvas_gradebook: The gradebook that Canvas exported; None if the roster has Canvas' numbers.
-        moodle: The users that Moodle exported; None if Moodle is not asked for.
-        gradescope: Whether Gradescope is asked for.
+        canvas: Number of the assignment in Canvas; empty for no export to Canvas.
+        canvas_gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
+        moodle: The users exported from Moodle; None for no export to Moodle.
+        gradescope: Whether to export to Gradescope.
     """
 
     canvas: str = ""
@@ -37,7 +44,7 @@ class Platforms:
 
 
 def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *, gradescope: bool) -> Platforms:
-    """Return what the platforms need, read; raises ClassError for a table that cannot be used."""
+    """Read the tables for the requested platforms; raises ClassError for an unusable table."""
     return Platforms(
         canvas,
         None if canvas_gradebook is None else read_users(canvas_gradebook),
@@ -47,12 +54,12 @@ def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *
 
 
 def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
-    """Return platform -> its files; raises ClassError for what a platform could not take.
+    """Return platform -> its export; raises ClassError if a platform would reject it.
 
     Args:
-        book: The class.
+        book: The gradebook.
         wanted: The platforms.
-        results: Name of an entry -> Gradescope's results.json of its report.
+        results: Name of an entry -> its results.json for Gradescope.
     """
     made: dict[str, Export] = {}
     if wanted.canvas:
@@ -72,14 +79,14 @@ def class_files(
     links: Sequence[PageLink] = (),
     standalone: bool = False,
 ) -> dict[str, bytes]:
-    """Return name below the folder for results -> content, of all that is made for the class; the page is last.
+    """Return name -> content of all files for the class, relative to the results folder; the page is last.
 
     Args:
-        book: The class.
-        made: What platforms are told.
-        run: The run that writes it.
-        links: Other pages in the folder, which the page of the class leads to.
-        standalone: Whether the page holds its scripts, instead of sharing them with the reports.
+        book: The gradebook.
+        made: The exports for platforms.
+        run: The run that writes the files.
+        links: Other pages in the folder, to be linked from the class page.
+        standalone: Whether the page includes its scripts, instead of sharing them with the reports.
     """
     files = {GRADEBOOK: render_gradebook(book).encode()}
     for export in made.values():
@@ -90,26 +97,19 @@ def class_files(
     return files
 
 
-SCHEMA = "grader/batch/v1"
-_MOST = 10
-#: Endings of files that people open.
-_OPENED = (".csv", ".html")
-_MINUS = {Status.GRADED, Status.MISSING}
-
-
 @dataclass(frozen=True, slots=True)
 class Graded:
     """A class after grading.
 
     Attributes:
-        book: How everybody stands.
-        graded: Submissions that were graded now.
-        kept_before: Submissions whose results were there already.
-        not_replaced: Names of those whose new attempt came to less than the result that was there, which stays.
-        files: What was written for the whole class.
-        left_out: Platform -> who is not in its file, and why.
-        remarks: What else must be known of those files.
-        links: Pages of their own in the folder for results, which the page of the class leads to.
+        book: The gradebook.
+        graded: Number of submissions graded in this run.
+        kept_before: Number of submissions that already had results.
+        not_replaced: Names of submissions whose new attempt was worse than the stored result, which was kept.
+        files: The files written for the whole class.
+        left_out: Platform -> who is missing in its file, and why.
+        remarks: Remarks about these files.
+        links: Further pages in the results folder, linked from the class page.
     """
 
     book: Gradebook
@@ -123,7 +123,7 @@ class Graded:
 
 
 def render_summary(graded: Graded) -> str:
-    """Return the class in a few lines: how many stand how, the scores, and everybody who needs a look."""
+    """Summarise the class in a few lines: counts, scores, and everybody who needs attention."""
     book = graded.book
     lines = [f"graded now: {graded.graded}, done before: {graded.kept_before}"]
     lines += [f"{status.value}: {book.count(status)}" for status in Status if book.count(status)]
@@ -136,7 +136,7 @@ def render_summary(graded: Graded) -> str:
 
 
 def summary_json(graded: Graded) -> str:
-    """Return the class as JSON text."""
+    """Render the class as JSON."""
     book = graded.book
     matching = book.matching
     return json_text(
@@ -208,7 +208,7 @@ def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
     yield from _list("a new attempt came to less, the result of before stays", not_replaced)
     yield from _list("results of other files or of another rubric", [r.name for r in book.rows if r.outdated])
     for row in book.rows:
-        if row.status not in _MINUS:
+        if row.status not in _UNREMARKABLE:
             yield f"{row.status.value}: {shown(row.name, limit=80)}: {shown(row.problem or _points(row), limit=300)}"
     yield from map(shown, book.remarks)
 

@@ -47,11 +47,11 @@ class MadeUp:
     def prepare(self, isolation):
         return []
 
-    def run(self, tasks, hear):
+    def run(self, tasks, on_step):
         for number, task in enumerate(tasks):
-            yield Attempt(task, self.standing(task, number))
+            yield Attempt(task, self.status(task, number))
 
-    def standing(self, task, number):
+    def status(self, task, number):
         with tempfile.TemporaryDirectory() as staged:
             digest = stage_submission(str(task.submission), (), Path(staged)).digest
         key = task.conditions.key(digest)

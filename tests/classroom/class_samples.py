@@ -45,16 +45,16 @@ class FakeScheduler:
     def prepare(self, isolation: str) -> list[Any]:
         return ["no walls"] if isolation == "none" else []
 
-    def run(self, tasks: Sequence[Task], hear: Callable[..., Any]) -> Iterator[Attempt]:
+    def run(self, tasks: Sequence[Task], on_step: Callable[..., Any]) -> Iterator[Attempt]:
         for task in tasks:
             if len(self.graded) == self.stop_after:
                 raise KeyboardInterrupt
-            hear(task.name, "grading")
+            on_step(task.name, "grading")
             self.graded.append(task.name)
             self.tasks[task.name] = task
-            yield Attempt(task, self.standing(task))
+            yield Attempt(task, self.status(task))
 
-    def standing(self, task: Task) -> ResultStatus:
+    def status(self, task: Task) -> ResultStatus:
         staging = task.into.parent / "staging"
         staging.mkdir()
         try:

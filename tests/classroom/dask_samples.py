@@ -46,8 +46,8 @@ def graded(
 ) -> JobResult:
     """Return an answer with a result."""
     key = CONDITIONS.key("sha256:2") if key is None else key
-    standing = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
-    return JobResult(machine, kept.dump(standing), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
+    status = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
+    return JobResult(machine, kept.dump(status), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
 
 
 class FakeFuture:

@@ -86,7 +86,7 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     """So that it can be anywhere; the line that repeats the run names student and key."""
     heard = []
 
-    def refuse(request: GradeRequest, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    def refuse(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> None:
         heard.append(request)
         raise HarnessError("enough")
 
@@ -94,7 +94,7 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
     conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
-    standing = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
+    status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
     (request,) = heard
     assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)
-    assert standing.state is State.FAILED
+    assert status.state is State.FAILED
