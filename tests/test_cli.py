@@ -375,7 +375,7 @@ def test_a_terminal_sees_progress_and_colours():
 def test_help_starts_light():
     """Neither rich nor pydantic nor ROS is imported before they are needed."""
     code = (
-        "import sys\nfrom grader import cli\n"
+        "import sys\nfrom grader.cli import main\n"
         "try: main.app(['--help'])\nexcept SystemExit: pass\n"
         "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy'}\n"
         "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"

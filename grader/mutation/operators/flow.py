@@ -32,7 +32,7 @@ def lines_of(function: cst.FunctionDef) -> Sequence[Any]:
 
 
 def at_top(function: cst.FunctionDef, text: str) -> tuple[Edit, ...]:
-    """Return the edit that puts a statement before the others of a function; none if that has no block of its own."""
+    """Return the edit that inserts a statement at the start of a function; none if its body is on the same line."""
     lines = lines_of(function)
     return ((lines[0], cst.FlattenSentinel([statement(text), lines[0]])),) if lines else ()
 
@@ -43,7 +43,7 @@ def parameters(function: cst.FunctionDef) -> list[str]:
 
 
 def owner(function: cst.FunctionDef) -> str:
-    """Return where a function can keep something between two calls: `self`, or the function itself."""
+    """Return an object where a function can store state between calls: `self`, or the function itself."""
     names = parameters(function)
     return names[0] if names[:1] == ["self"] else function.name.value
 
@@ -54,7 +54,7 @@ def alone(program: Program, node: cst.CSTNode) -> bool:
     return line is not None and len(line.body) == 1
 
 
-#: Statements that people repeat by accident, where that makes a difference.
+#: Statements that people repeat by accident, and where this changes the behaviour.
 _REPEATED = ("publish", "call_async", "call", *LEVELS)
 
 
@@ -160,7 +160,7 @@ def wrong_order(program: Program) -> Iterator[Mutation]:
 
 
 def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode) -> bool:
-    """Whether a line needs the one before it: a name that is set there, a message that is filled, what starts ROS."""
+    """Whether a line depends on the one before it, which sets a name, fills a message, or starts ROS."""
     used = {program.code(node) for node in [*program.all(cst.Name, other), *program.all(cst.Attribute, other)]}
     made = {program.code(target.target) for target in program.all(cst.AssignTarget, one)}
     filled = {
@@ -244,7 +244,7 @@ def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutat
 
 
 def _kept(program: Program, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
-    """Return the edit by which an expression has the value that it had at first."""
+    """Return the edit that makes an expression keep its first value."""
     own, name = owner(function), f"kept_{program.line(value)}"
     text = f"{own}.__dict__.setdefault('{name}', {program.code(value)})"
     return ((value, cst.parse_expression(text)),)
@@ -338,5 +338,5 @@ def _breaks(program: Program, loop: cst.While) -> bool:
 
 
 def _is_guard(program: Program, node: cst.CSTNode) -> bool:
-    """Whether a test asks if the file is run as a program: the grader runs it either way."""
+    """Whether a condition is the `__main__` guard, which makes no difference to the grader."""
     return "__name__" in program.code(node)
