@@ -23,24 +23,24 @@ from grader.rubrics.loader import own_check_files, read_rubric
 from grader.rubrics.variants import First
 
 PACKAGE = "rclpy-grader"
-#: A zip knows no time before this; the same files give the same bytes.
+#: The earliest time that a zip can store; a fixed time makes archives reproducible.
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 _PROGRAM, _FILE, _PRIVATE = 0o100755, 0o100644, 0o100600
-#: What every environment has of its own, for its own Python.
+#: Packages that every environment brings for its own Python.
 _WITH_PYTHON = ("pip", "setuptools", "wheel")
 _NOT_PACKED = ("__pycache__", "shipped")
 
 
 def integration(name: str) -> bytes:
-    """Return one of the files that platforms run, such as `gradescope/setup.sh`."""
+    """Read one of the files that platforms run, such as `gradescope/setup.sh`."""
     return (shipped("integrations") / name).read_bytes()
 
 
 def wheel() -> tuple[str, bytes]:
-    """Return the name and the bytes of a wheel of the package that is running.
+    """Build a wheel of the running package, and return its name and content.
 
     Raises:
-        EnvironmentFault: The package is not installed, only importable, or needs more than when it was installed.
+        EnvironmentFault: The package is not installed, or its requirements changed since it was installed.
     """
     try:
         installed = importlib.metadata.distribution(PACKAGE)
@@ -61,9 +61,9 @@ def wheel() -> tuple[str, bytes]:
 
 
 def pins() -> str:
-    """Return the versions of all that the package needs, as they are installed here, as constraints for pip.
+    """Return the installed versions of all dependencies, as constraints for pip.
 
-    They hold for this Python and later ones: of an older one it is not known whether it can have them.
+    They apply to this Python version and later ones, since older ones may not support these versions.
     """
     found: dict[str, str] = {}
     done: set[tuple[str, tuple[str, ...]]] = set()
@@ -73,7 +73,7 @@ def pins() -> str:
         try:
             distribution = importlib.metadata.distribution(name)
         except importlib.metadata.PackageNotFoundError:
-            continue  # for another system
+            continue  # required on other systems only
         if (name, extras) not in done:
             done.add((name, extras))
             found[_normal(name)] = distribution.version
@@ -85,7 +85,7 @@ def pins() -> str:
 
 
 def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = (), private: tuple[str, ...] = ()) -> bytes:
-    """Return a zip of files by name, in that order; programs can be run, private files read by their owner."""
+    """Zip files in the given order; `programs` are executable, and only the owner can read `private` ones."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -97,10 +97,10 @@ def zipped(files: Mapping[str, bytes], programs: tuple[str, ...] = (), private: 
 
 
 def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
-    """Refuse a checkout that was installed before it came to need what it needs now."""
+    """Refuse a checkout whose requirements have grown since it was installed."""
     if sys.version_info < (3, 11):
         return
-    tomllib = importlib.import_module("tomllib")  # Python 3.10 has none
+    tomllib = importlib.import_module("tomllib")  # not in Python 3.10
     project = Path(grader.__file__).resolve().parent.parent / "pyproject.toml"
     if not project.is_file():
         return
@@ -138,7 +138,7 @@ def _recorded(name: str, content: bytes) -> str:
 
 
 def _needed(requirements: Iterable[str], extras: tuple[str, ...]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the name and the extras of each requirement that holds for some extras of the one that requires it."""
+    """Yield name and extras of each requirement that applies with the given extras."""
     for requirement in requirements:
         of_extra = re.search(r"extra *== *['\"]([^'\"]+)", requirement)
         if of_extra is None or of_extra[1] in extras:
@@ -151,11 +151,11 @@ def _normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-#: Files that are run; the others are read.
+#: Executable files.
 _PROGRAMS = ("prepare", "setup.sh", "run_autograder", "autograder.py")
-#: The key that drawn values follow from, where `run_autograder` looks for it.
+#: File with the seed key, as `run_autograder` expects it.
 SEED_KEY = "seed.key"
-#: Classroom 50 fetches no more than this.
+#: Largest autograder that Classroom 50 fetches.
 CLASSROOM50_BYTES = 10 * 1024 * 1024
 _OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
 _HEX_DIGITS = 40
@@ -164,10 +164,10 @@ _NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """What a platform is to grade, and how.
+    """What a platform grades, and how.
 
     Attributes:
-        exercises: Exercise ids; empty for all of the rubrics.
+        exercises: Exercise ids; empty for all exercises of the rubrics.
         rubrics: Rubric files; empty for the built-in ones.
         isolation: As on the command line.
     """
@@ -178,11 +178,11 @@ class Chosen:
 
 
 def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
-    """Return the autograder zip for Gradescope; raises GraderError if it would not work there.
+    """Build the autograder zip for Gradescope; raises GraderError if it would not work there.
 
     Args:
-        chosen: What it grades.
-        seed_key: File with the key that drawn values follow from; None for the public practice key.
+        chosen: What to grade.
+        seed_key: File with the seed key; None for the public practice key.
     """
     files = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
     if seed_key is not None:
@@ -191,10 +191,10 @@ def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
 
 
 def classroom50(chosen: Chosen) -> dict[str, bytes]:
-    """Return the files of an assignment's autograder for Classroom 50, by name.
+    """Build the files of an assignment's autograder for Classroom 50, by name.
 
     Raises:
-        GraderError: They would not work there.
+        GraderError: The autograder would not work there.
     """
     files = {"autograder.py": integration("classroom50/autograder.py"), **_common(chosen)}
     size = sum(map(len, files.values()))
@@ -205,13 +205,13 @@ def classroom50(chosen: Chosen) -> dict[str, bytes]:
 
 
 def workflow(action: str) -> str:
-    """Return the workflow of a student's repository, which grades with an action at one commit.
+    """Render the workflow for students' repositories, which uses the action at a fixed commit.
 
     Args:
-        action: `OWNER/NAME@COMMIT`, the commit with all of its 40 digits: what it names never changes.
+        action: `OWNER/NAME@COMMIT`, with all 40 digits of the commit.
 
     Raises:
-        GraderError: It is of another form.
+        GraderError: The argument has another form.
     """
     repository, _, commit = action.partition("@")
     parts = repository.split("/")
@@ -226,7 +226,7 @@ def workflow(action: str) -> str:
 def _common(chosen: Chosen) -> dict[str, bytes]:
     _check(chosen)
     name, content = wheel()
-    # Numbered: two rubrics may have one name in two folders, and names of files may be anything.
+    # Numbered, because rubrics in different folders may share a name, and file names may be arbitrary.
     rubrics = {f"rubrics/{n}/rubric.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
     settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
     checks = {
@@ -245,7 +245,7 @@ def _common(chosen: Chosen) -> dict[str, bytes]:
 
 
 def _check(chosen: Chosen) -> None:
-    """Find mistakes now that would otherwise be found by the first student."""
+    """Check the rubrics now, so that the first student does not run into a mistake."""
     paths = chosen.rubrics or tuple(builtin_rubrics().values())
     exercises = [read_rubric(path, draw=First()) for path in paths]
     for path, found in zip(paths, exercises, strict=True):

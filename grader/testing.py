@@ -1,4 +1,4 @@
-"""Helpers to test checks of one's own: traces made by hand, and a check put to them.
+"""Helpers to test your own checks: build traces by hand, and run a check on them.
 
     from grader.testing import TraceBuilder, judge
 
@@ -6,8 +6,7 @@
         trace = TraceBuilder("pump.py").messages("/flow", "std_msgs/msg/Float32", {"data": 1.5}, rate_hz=10).trace()
         assert judge(StartsEarly("/flow", within=500_000_000), trace).credit == 1
 
-Times are seconds since the scenario began. What a node did and what the grader did to it are put in any order; the
-trace is sorted as a recording is.
+Times are seconds since the scenario began. Add observations in any order; the trace is sorted like a recording.
 """
 
 from __future__ import annotations
@@ -40,31 +39,31 @@ from grader.judging.run_check import breach
 
 __all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
 
-#: Order within one instant: the scenario, the grader, the graph, what nodes did.
+#: Order within one instant: the scenario, the grader, the graph, the nodes.
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
 
-#: Fields of a message, or what gives them by the message's number, from 0 on.
+#: Fields of a message, or a function that returns them for the index of a message.
 Value = Mapping[str, Any] | Callable[[int], Mapping[str, Any]]
 
 
 def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) -> Finding:
-    """Return what a check finds in a trace, after making sure that a report could be made of it.
+    """Run a check on a trace, and make sure that its finding can be reported.
 
     Args:
-        check: The check; it is asked twice.
+        check: The check; it is run twice.
         trace: The trace.
         sources: Text of the students' files by name, for a check that has `judge_sources`.
 
     Raises:
-        ValueError: It gave something that is no good Finding, or another one when it was asked again, or it changed the
-            trace, which other checks read too.
+        ValueError: The check returned an invalid Finding, or a different one the second time, or it changed the trace,
+            which other checks share.
     """
     before = repr(trace)
     finding = _asked(check, trace, sources)
     wrong = breach(finding)
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
-    if repr(_asked(check, trace, sources)) != repr(finding):  # NaN is no other NaN
+    if repr(_asked(check, trace, sources)) != repr(finding):  # NaN never equals itself
         raise ValueError(f"{type(check).__name__} found something else when it was asked again")
     if repr(trace) != before:
         raise ValueError(f"{type(check).__name__} changed the trace")
@@ -79,14 +78,14 @@ def _asked(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Fin
 
 @dataclass(slots=True)
 class TraceBuilder:
-    """Collects what was observed, and makes a trace of it; every method but the last gives the builder back.
+    """Builds a trace from observations; every method except `trace` returns the builder.
 
-    A topic with messages has a publisher in the graph, whether it was named or not; a subscription has to be named.
+    A topic with messages gets a publisher in the graph automatically; subscriptions have to be added.
 
     Attributes:
-        process: File name of the student's process that things are said of.
-        node: Its node.
-        stop_s: When observation ends.
+        process: File name of the student's process that is observed.
+        node: Name of its node.
+        stop_s: End of the observation.
         clock: Which clock the nodes ran on.
     """
 
@@ -104,7 +103,7 @@ class TraceBuilder:
         return self
 
     def message(self, t_s: float, topic: str, type_: str, value: Mapping[str, Any]) -> TraceBuilder:
-        """Add one message of the student's node, its fields nested by name."""
+        """Add one message of the student's node, with nested dicts for its fields."""
         return self.add(Message(nanoseconds(t_s), topic, type_, value))
 
     def messages(  # noqa: PLR0913  what, where and when
@@ -116,8 +115,8 @@ class TraceBuilder:
             topic: Absolute name.
             type_: e.g. `std_msgs/msg/Float32`.
             value: Their fields, or a function of the message's number.
-            rate_hz: How many a second.
-            start_s: When the first is published.
+            rate_hz: Messages per second.
+            start_s: Time of the first message.
             stop_s: When they end; None for the end of the trace.
         """
         for number, t_ns in enumerate(self._times(rate_hz, start_s, stop_s)):
@@ -131,29 +130,29 @@ class TraceBuilder:
     def deliveries(  # noqa: PLR0913  as above
         self, topic: str, type_: str, value: Value, *, rate_hz: float, start_s: float = 0.1, stop_s: float | None = None
     ) -> TraceBuilder:
-        """Add messages that the grader published at a rate; as for `messages`."""
+        """Add messages that the grader published at a rate; see `messages`."""
         for number, t_ns in enumerate(self._times(rate_hz, start_s, stop_s)):
             self.add(Delivery(t_ns, topic, type_, value(number) if callable(value) else value))
         return self
 
     def log(self, t_s: float, text: str, severity: str = "INFO", line: int = 0) -> TraceBuilder:
-        """Add a record that the node wrote through its logger, from a line of its file if that is known."""
+        """Add a log record of the node, with its line in the file if known."""
         where = self.process if line else ""
         logger = self.node.rsplit("/", 1)[-1]
         return self.add(LogRecord(nanoseconds(t_s), self.process, severity, logger, text, where, line))
 
     def printed(self, t_s: float, text: str, stream: str = "stdout") -> TraceBuilder:
-        """Add a line that the process wrote without the logger."""
+        """Add a line that the process printed without the logger."""
         return self.add(OutputLine(nanoseconds(t_s), self.process, stream, text))
 
     def fault(
         self, t_s: float, text: str = "ValueError: no", kind: FaultKind = FaultKind.EXCEPTION, line: int = 1
     ) -> TraceBuilder:
-        """Add the end of the process: an exception, or another kind of fault, in a line of its file."""
+        """Add a fault that ended the process, such as an exception, with its line in the file."""
         return self.add(Fault(nanoseconds(t_s), self.process, kind, text, self.process if line else "", line))
 
     def exited(self, t_s: float, code: int = 0) -> TraceBuilder:
-        """Add the end of the process by itself, with an exit code."""
+        """Add a regular exit of the process, with its exit code."""
         text = f"exited with code {code}"
         return self.add(Fault(nanoseconds(t_s), self.process, FaultKind.EXITED, text, exit_code=code))
 
@@ -189,13 +188,13 @@ class TraceBuilder:
         """Add a service call, by the grader or by the student's client.
 
         Args:
-            t_s: When it was sent.
+            t_s: Time of the request.
             service: Absolute name.
             type_: e.g. `std_srvs/srv/Trigger`.
             request: Fields of the request.
             response: Fields of the response; None if there was none.
-            answer_s: How long after the request the response came.
-            by_student: Whether the student's node asked and the grader answered.
+            answer_s: Delay of the response.
+            by_student: Whether the student's node sent the request and the grader answered.
         """
         asks, answers = ("student", "grader") if by_student else ("grader", "student")
         number = 1 + sum(isinstance(o, Request) and (o.service, o.sender) == (service, asks) for o in self._seen)
@@ -207,11 +206,11 @@ class TraceBuilder:
         return self
 
     def mark(self, t_s: float, name: str, detail: str = "") -> TraceBuilder:
-        """Add a moment of the scenario itself; `grader.core.trace.Mark` lists the names."""
+        """Add an event of the scenario itself; `grader.core.trace.Mark` lists the names."""
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
     def trace(self, scenario: str = "alone") -> Trace:
-        """Return the trace, its observations in the order of a recording."""
+        """Return the trace, with its observations in the order of a recording."""
         graph = self._graph()
         ordered = sorted([*self._seen, *graph], key=lambda seen: (seen.t_ns, _PHASE.get(type(seen), 3)))
         return Trace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered))

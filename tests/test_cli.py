@@ -34,8 +34,8 @@ class Session:
         self,
         request: GradeRequest,
         progress: Callable[[str], None],
-        hear: object = None,
-        early: object = None,
+        on_recorded: object = None,
+        on_partial_report: object = None,
         *,
         pictures: bool = True,
     ) -> Report:
@@ -323,7 +323,7 @@ sys.path.insert(0, {folder!r})
 from cli_samples import a_report
 from grader.app import grade as session
 from grader.cli import main
-def grade(request, progress, hear=None, early=None, *, pictures=True):
+def grade(request, progress, on_recorded=None, on_partial_report=None, *, pictures=True):
     progress("exercise 1: \\x1b[31malone")
     sys.stdin.readline()
     return a_report()

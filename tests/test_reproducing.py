@@ -9,8 +9,7 @@ from click.testing import CliRunner
 
 from grader.app import grade
 from grader.app.grade import read_exercises
-from grader.app.reproducing import command_words, recording_digest, reproduction
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, command_words, recording_digest, reproduction
 from grader.cli import main
 from grader.core.scenario import TimedMessage
 from grader.execution.bag import Odometry

@@ -11,8 +11,7 @@ from typing import cast
 import pytest
 from click.testing import CliRunner, Result
 
-from grader.app.seeds import read_key
-from grader.app.variants import ByKey, by_key, checked
+from grader.app.seeds import ByKey, by_key, checked, read_key
 from grader.cli.main import app
 from grader.core.errors import KeyFileError, VariantError
 from grader.rubrics.variants import VariantOptions

@@ -1,1 +1,1 @@
-"""What the commands do: one module for each, a visible list of stages."""
+"""Implements the commands: one module for each, as a list of stages."""

@@ -1,4 +1,4 @@
-"""Examines this machine: what `grade doctor` calls."""
+"""Examines this machine for `grade doctor`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.choose import inspect_tiers, sandbox_memory
 from grader.execution.sandbox.tiers import is_for_others
 
-#: Messages of the trial node, one every tenth of a second from 0.1 s on, and how long it is observed.
+#: Messages that the trial node sends, one every 0.1 s starting at 0.1 s, and how long it is observed.
 TRIAL_MESSAGES = 10
 TRIAL_NS = NS_PER_S + NS_PER_S // 20
 TRIAL_TOPIC = "/trial"
@@ -36,10 +36,10 @@ rclpy.spin(node)
 
 
 def examine(progress: Progress) -> Checkup:
-    """Return what this machine can do; a few seconds.
+    """Find out what this machine can do; takes a few seconds.
 
     Args:
-        progress: Hears which step begins.
+        progress: Called at the start of each step.
     """
     progress("looking for ROS 2")
     ros, lack = _ros()
@@ -57,7 +57,7 @@ def examine(progress: Progress) -> Checkup:
 
 
 def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
-    """Return ROS, or what is wrong with it."""
+    """Find the ROS installation, or report as a fact why it cannot be used."""
     try:
         return find_ros(), ()
     except EnvironmentFault as fault:
@@ -65,13 +65,13 @@ def _ros() -> tuple[RosInstallation | None, tuple[Fact, ...]]:
 
 
 def _remedy(tiers: Sequence[TierReport]) -> str:
-    """Return what would help; to become another user comes last, for that asks for the most."""
+    """Return the easiest fix; running as another user comes last, because it takes the most effort."""
     ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
     return next((tier.remedy for tier in ordered if tier.remedy), "")
 
 
 def _exchange(tier: str, progress: Progress) -> Exchange:
-    """Observe a node of our own as a student's would be, and count what arrives."""
+    """Observe the trial node the way a student's node is observed, and count its messages."""
     started = time.perf_counter()
     arrived, problem = 0, ""
     with tempfile.TemporaryDirectory(prefix="grade-doctor-") as folder:

@@ -1,4 +1,4 @@
-"""Keeps what was recorded as evidence, beside the report that was made of it."""
+"""Writes recordings to disk as evidence, with the report that was made from them."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from grader.reporting.json_report import dumps
 from grader.rubrics.variants import Recorded
 
 
-class Keeper:
-    """Hears of a run while it is graded, and writes it down when its report has been delivered.
+class EvidenceWriter:
+    """Remembers a run while it is graded, and writes it after its report has been delivered.
 
     Args:
-        folders: Where to; checked at once, because grading takes long.
-        request: How grading was asked for.
+        folders: Destinations; checked right away, because grading takes long.
+        request: The request that is graded.
 
     Raises:
-        EvidenceError: Evidence cannot be kept in one of the folders.
+        EvidenceError: Evidence cannot be written to one of the folders.
     """
 
     def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:
@@ -31,24 +31,24 @@ class Keeper:
             check_place(folder)
         self._folders = folders
         self._request = request
-        self._heard: tuple[Run, Sequence[Exercise]] | None = None
+        self._recorded: tuple[Run, Sequence[Exercise]] | None = None
 
-    def hear(self, run: Run, exercises: Sequence[Exercise]) -> None:
-        """Remember a whole run, and what was asked of it."""
-        self._heard = (run, exercises)
+    def remember(self, run: Run, exercises: Sequence[Exercise]) -> None:
+        """Remember a complete run and the exercises it was recorded for."""
+        self._recorded = (run, exercises)
 
     def write(self, report: Report) -> None:
-        """Write the run and its report; raises EvidenceError if that cannot be done."""
-        if self._heard is None or not self._folders:
+        """Write the run and its report; raises EvidenceError if that fails."""
+        if self._recorded is None or not self._folders:
             return
-        run, exercises = self._heard
+        run, exercises = self._recorded
         for folder in self._folders:
             asked = request_to_json(self._request, exercises)
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
 def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
-    """Return what a command to reproduce the report needs besides path, seed and rubrics, and what variants came to."""
+    """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
     return {
         "exercises": list(request.exercises),
         "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
@@ -61,7 +61,7 @@ def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -
 
 
 def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
-    """Return the request that would record a kept run again, to be judged by these rubrics."""
+    """Return the request that would record a kept run again and judge it by these rubrics."""
     bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
     return GradeRequest(
         submission=submission,

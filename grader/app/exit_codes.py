@@ -1,4 +1,4 @@
-"""Exit codes of the command line, and what they say about a report."""
+"""Exit codes of the command line."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def exit_code(report: Report, min_score: Fraction | None) -> int:
-    """Return what the exit code says about a report.
+    """Return the exit code for a report.
 
     Args:
-        report: The result, as far as whoever sees the exit code may see it.
-        min_score: Least share of the points, in percent, that counts as success; None asks for every criterion.
+        report: The report as its reader may see it.
+        min_score: Smallest share of the points, in percent, that counts as success; None requires every criterion.
     """
     if not report.final:
         return UNDECIDED

@@ -1,4 +1,4 @@
-"""Finds what `grade explain` is asked about: criteria and checks by name, with what their rubrics and manuals say."""
+"""Finds criteria and checks by name for `grade explain`, with the text of their rubrics and manuals."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ from grader.rubrics.loader import own_checks
 from grader.rubrics.units import format_quantity
 from grader.rubrics.variants import First
 
-#: Names offered where none is known.
+#: Most names suggested for an unknown one.
 OFFERED = 3
 
 
 def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Return what a name stands for: a criterion id, `exercise/criterion`, or the name of a check.
+    """Explain a criterion id, `exercise/criterion`, or the name of a check.
 
     Args:
-        name: As typed.
-        rubrics: Where criteria are looked for; empty for the built-in rubrics.
+        name: The name as typed.
+        rubrics: The rubrics to search for criteria; empty for the built-in ones.
 
     Raises:
         GraderError: Nothing has that name.
@@ -63,7 +63,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
 
 
 def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Return what every criterion of some rubrics asks; of the built-in ones if none is named.
+    """Explain every criterion of the given rubrics, or of the built-in ones if none are given.
 
     Raises:
         RubricError: A rubric cannot be used.
@@ -72,7 +72,7 @@ def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Return what every check asks, those of the rubrics' own included, and which criteria of the rubrics use it.
+    """Explain every check, including those that rubrics define, and list the criteria that use it.
 
     Raises:
         RubricError: A rubric cannot be used.
@@ -121,7 +121,7 @@ def _fields(criterion: Criterion) -> tuple[Field[Any], ...]:
 
 
 def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | None) -> Parameter:
-    """Return a parameter with its value in a check, or with its default if there is none."""
+    """Describe a parameter with its value in a check, or with its default if no check is given."""
     annotation = get_type_hints(kind, include_extras=True)[field.name]
     value = field.default if check is None else getattr(check, field.name)
     text = "" if value is MISSING else _written(value, annotation)
@@ -129,7 +129,7 @@ def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | No
 
 
 def _written(value: Any, annotation: Any) -> str:
-    """Return a value as a rubric writes it."""
+    """Format a value the way a rubric writes it."""
     unit = _unit(annotation)
     if value is None:
         return "none"
@@ -151,7 +151,7 @@ def _several(values: Mapping[str, Any] | tuple[Any, ...]) -> str:
 
 
 def _parts(value: Any) -> str:
-    """Return those parts of a parameter that a rubric gives, as it writes them."""
+    """Format the non-default parts of a parameter the way a rubric writes them."""
     hints = get_type_hints(type(value), include_extras=True)
     given = [f for f in fields(value) if getattr(value, f.name) not in (f.default, (), {}, None)]
     parts = (f"{f.name}: {_written(getattr(value, f.name), hints[f.name])}" for f in given)
@@ -159,7 +159,7 @@ def _parts(value: Any) -> str:
 
 
 def _unit(annotation: Any) -> Unit | None:
-    """Return the unit of an annotation, also where `None` may stand instead of a quantity."""
+    """Return the unit of an annotation, also of an optional one."""
     for part in (annotation, *get_args(annotation)):
         for mark in getattr(part, "__metadata__", ()):
             if isinstance(mark, Unit):
@@ -168,7 +168,7 @@ def _unit(annotation: Any) -> Unit | None:
 
 
 def _situation(scenario: Scenario) -> str:
-    """Return in a sentence what runs, for how long, and what the grader publishes meanwhile."""
+    """Describe in one sentence what runs, for how long, and what the grader publishes meanwhile."""
     span = scenario.span
     text = f"{' and '.join(scenario.processes)} observed for {_time(span.duration_ns)}"
     if span.after_first_message_on:
@@ -212,7 +212,7 @@ def _count(count: Count) -> str:
 
 
 def _cases(items: tuple[Any, ...], what: str) -> str:
-    """Return how many cases there are, and whether their order is drawn."""
+    """Describe how many cases there are, and whether their order is drawn."""
     low, high = cases(items)
     order = " in a drawn order" if _is_open(items) else ""
     return f"{low if low == high else f'{low} to {high}'} {what}{order}"

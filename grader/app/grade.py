@@ -1,4 +1,4 @@
-"""Grades one submission from end to end: the visible list of stages."""
+"""Grades one submission from end to end."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 import grader
-from grader.app.reproducing import reproduction
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, reproduction
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
@@ -39,13 +38,13 @@ Key = tuple[str, str]
 
 
 class EarlyReports:
-    """Makes a partial report each time an exercise has been recorded and others have not.
+    """Makes a partial report whenever one exercise is completely recorded and others are not.
 
     Args:
-        exercises: What is graded, in the order of the report.
-        scenarios: What is recorded; an exercise of which nothing is recorded is judged as soon as any other is.
-        run: All that is known before recording.
-        hear: Hears each partial report.
+        exercises: The exercises to grade, in the order of the report.
+        scenarios: The scenarios to record; an exercise without one is judged along with the first that is recorded.
+        run: The run as known before recording.
+        on_report: Called with each partial report.
     """
 
     def __init__(
@@ -53,53 +52,53 @@ class EarlyReports:
         exercises: Sequence[Exercise],
         scenarios: Collection[Key],
         run: Run,
-        hear: Callable[[Report], None],
+        on_report: Callable[[Report], None],
     ) -> None:
         self._exercises = exercises
         self._awaited = set(scenarios)
         self._run = run
-        self._hear = hear
+        self._on_report = on_report
         self._traces: dict[Key, Trace] = {}
         self._started = time.perf_counter()
 
     def take(self, key: Key, trace: Trace) -> None:
-        """Take a recording; if it was the last of its exercise, but not of all, make a partial report."""
+        """Take a recording; make a partial report if it completes its exercise but not the whole run."""
         self._traces[key] = trace
         self._awaited.discard(key)
         pending = {exercise for exercise, _ in self._awaited}
         if pending and key[0] not in pending:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
-            self._hear(judge_run(self._exercises, run, pictures=False, pending=pending))
+            self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
 
 
 class Progress(Protocol):
-    """Hears what is being done, in a short phrase such as `exercise 1: alone`."""
+    """Called at the start of each step with a short phrase such as `exercise 1: alone`."""
 
     def __call__(self, step: str) -> None:
-        """Take note of the step that begins."""
+        """Report that a step begins."""
         ...
 
 
 def grade(
     request: GradeRequest,
     progress: Progress,
-    hear: Callable[[Run, Sequence[Exercise]], None] | None = None,
-    early: Callable[[Report], None] | None = None,
+    on_recorded: Callable[[Run, Sequence[Exercise]], None] | None = None,
+    on_partial_report: Callable[[Report], None] | None = None,
     *,
     pictures: bool = True,
 ) -> Report:
     """Grade one submission.
 
     Args:
-        request: What is to be graded, and how.
-        progress: Hears which step begins.
-        hear: Hears what was recorded, and for which exercises.
-        early: Hears a partial report whenever an exercise is done and others are not.
-        pictures: Whether the report is to hold figures, which only some formats show.
+        request: What to grade, and how.
+        progress: Called at the start of each step.
+        on_recorded: Called with the complete recording and the exercises it was made for.
+        on_partial_report: Called with a partial report whenever one exercise is done and others are not.
+        pictures: Whether the report includes charts, which only some formats show.
 
     Raises:
-        GraderError: Something that grading needs cannot be used; its class says who must act.
+        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
     """
     started = time.perf_counter()
     with open_session(request.isolation, request.workers, progress) as session:
@@ -128,18 +127,18 @@ def grade(
             ),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
-        take = EarlyReports(exercises, jobs, run, early).take if early is not None else None
+        take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None
         checks = SpotChecks(request.spot_checks, seed, submission.digest, read_reaches(submission.root))
         later = request.clock == AUTO and checks.certain
         first = None if later else take
         traces = session.record(jobs, request.clock, progress, first, budget_s=request.time_budget_s)
         if request.clock == AUTO:
-            # what the grader itself wants to see twice takes nothing of a submission's time
+            # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
-            traces = check(checks, jobs, traces, record, take or _nobody_hears)
+            traces = check(checks, jobs, traces, record, take or _ignore)
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
-        if hear is not None:
-            hear(run, exercises)
+        if on_recorded is not None:
+            on_recorded(run, exercises)
         return judge_run(exercises, run, pictures=pictures)
 
 
@@ -147,19 +146,19 @@ def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeB
     return session.recorder.record([replace(job, budget=budget)], progress)[0]
 
 
-def _nobody_hears(key: tuple[str, str], trace: Trace) -> None:
-    """Stand for whoever would hear of a trace early."""
+def _ignore(key: tuple[str, str], trace: Trace) -> None:
+    """Stand in for the callback when nobody wants partial reports."""
 
 
 def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> list[Exercise]:
-    """Return the exercises to grade, in rubric order.
+    """Read the exercises to grade, in rubric order.
 
     Args:
-        request: What is to be graded.
-        submissions: What else students write, besides the submission; no check of a rubric's own is taken from there.
+        request: What to grade.
+        submissions: Other paths that students control; no rubric may load its own checks from there.
 
     Raises:
-        RubricError: A rubric cannot be used, or none has an exercise that was asked for.
+        RubricError: A rubric cannot be used, or no rubric has a requested exercise.
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     paths = request.rubrics or _builtin(request)
@@ -169,7 +168,7 @@ def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> l
 
 
 def _builtin(request: GradeRequest) -> list[Path]:
-    """Return the files of the built-in rubrics that are asked for; the others need not be read."""
+    """Return the files of the requested built-in rubrics, so that the others are not read."""
     headers = builtin_headers()
     require_exercises(request.exercises, [header.id for header in headers])
     wanted = request.exercises or [h.id for h in headers if request.every or not h.by_request]
@@ -177,7 +176,7 @@ def _builtin(request: GradeRequest) -> list[Path]:
 
 
 def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odometry | None:
-    """Return the /odom recording, if one was named or an exercise plays one."""
+    """Read the /odom recording if one was given or an exercise plays one."""
     if request.odom_bag is not None:
         return read_odometry(request.odom_bag)
     stimuli = (stimulus for e in exercises for scenario in e.scenarios for stimulus in scenario.stimuli)
@@ -187,7 +186,7 @@ def read_recording(request: GradeRequest, exercises: Sequence[Exercise]) -> Odom
 def plan_jobs(
     request: GradeRequest, exercises: Sequence[Exercise], submission: Submission, odometry: Odometry | None, seed: int
 ) -> dict[tuple[str, str], Job]:
-    """Return what has to be recorded, by exercise and scenario; a scenario with a missing file is left out."""
+    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out."""
     clock = planned_clock(request.clock)
     return {
         (exercise.id, scenario.id): Job(
@@ -201,7 +200,7 @@ def plan_jobs(
 
 
 def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
-    """Return the exercises of which a submission has a file, and the submission as they see it."""
+    """Return the exercises that a submission has a file for, and the submission limited to their files."""
     begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
     if not begun:
         where = shown(submission.path, 500)
@@ -211,7 +210,7 @@ def _begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[
 
 
 def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
-    """Return the names of the files that exercises ask for."""
+    """Return the names of the files that exercises require, without repetitions."""
     return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
 
 
@@ -223,23 +222,23 @@ def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) ->
 
 
 def _seed_notes(request: GradeRequest) -> tuple[str, ...]:
-    """Say that the drawn values could be known beforehand, if so."""
+    """Note that students could have predicted the drawn values, if they could."""
     return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
 
 
 def _release_notes(distro: str) -> tuple[str, ...]:
-    """Say that nobody has tried this ROS release with the grader, if so."""
+    """Note that the grader was never tested with this ROS release, if so."""
     if distro in TRIED:
         return ()
     return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
 
 
 def _isolation_notes(session: RecordingSession) -> tuple[str, ...]:
-    """Say that the submission ran without walls, or what its sandbox does not hold back."""
+    """Note that the submission ran without a sandbox, or which properties its sandbox lacks."""
     if session.isolation.name == NO_ISOLATION:
         return ("the submission ran without a sandbox: as asked",)
-    open_ones = [str(found) for found in session.containment if not found.holds]
-    return (f"sandbox {session.isolation.name}: {'; '.join(open_ones)}",) if open_ones else ()
+    lacking = [str(found) for found in session.containment if not found.holds]
+    return (f"sandbox {session.isolation.name}: {'; '.join(lacking)}",) if lacking else ()
 
 
 def _environment(session: RecordingSession) -> Environment:

@@ -1,4 +1,4 @@
-"""Runs nodes without a rubric, and says what they do: what `grade observe` calls."""
+"""Runs nodes without a rubric and summarises what they do, for `grade observe`."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from grader.judging.judge_run import summarise
 from grader.rubrics.builtin import builtin_odometry
 from grader.submissions.submission import stage_submission
 
-#: When a recording that was named begins to play; so long the nodes see no odometry.
+#: When a given recording starts playing; before that the nodes receive no odometry.
 ODOMETRY_AFTER_NS = NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
 class ObserveRequest:
-    """What is to be observed, and how.
+    """What to observe, and how.
 
     Attributes:
-        files: Python files, each of which runs as a process of its own.
+        files: Python files; each runs in its own process.
         duration_ns: How long they are observed.
-        odom_bag: An /odom recording to play to them, if any.
+        odom_bag: An /odom recording to play; None for no odometry.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto` or `none`.
     """
@@ -47,12 +47,12 @@ class ObserveRequest:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What nodes did.
+    """The observed behaviour of the nodes.
 
     Attributes:
-        trace: All of it.
-        processes: Names of their files.
-        isolation: The sandbox tier.
+        trace: The complete trace.
+        processes: File names of the processes.
+        isolation: The sandbox tier used.
     """
 
     trace: Trace
@@ -61,7 +61,7 @@ class Watched:
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
-    """Run the files together and return what they did.
+    """Run the files together and summarise what they did.
 
     Raises:
         GraderError: Something that the run needs cannot be used.
@@ -74,9 +74,9 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     """Run the files together and return the trace.
 
     Args:
-        request: What is to be run, and how.
-        progress: Hears which step begins.
-        scenario: What happens to them; None for nothing but the recording that is named, for the time that is.
+        request: What to run, and how.
+        progress: Called at the start of each step.
+        scenario: The scenario; None for one that only plays the given recording, for the given duration.
 
     Raises:
         GraderError: Something that the run needs cannot be used.
@@ -102,7 +102,7 @@ def _undisturbed(request: ObserveRequest, names: list[str]) -> Scenario:
 
 
 def _names(files: tuple[Path, ...]) -> list[str]:
-    """Return the files' names, which must differ; raises SubmissionError for anything but .py files."""
+    """Return the file names; raises SubmissionError for duplicates and for anything but .py files."""
     for file in files:
         if not file.is_file() or file.suffix != ".py":
             raise SubmissionError(f"{file}: expected a .py file, found none", "name the files of the nodes to run")
@@ -114,7 +114,7 @@ def _names(files: tuple[Path, ...]) -> list[str]:
 
 
 def _stage(files: tuple[Path, ...], names: list[str], into: Path) -> Submission:
-    """Stage the folder that holds all files, so that their helper modules are there; a lone file may come alone."""
+    """Stage the common folder of the files, which has their helper modules; a single file may be staged alone."""
     root = into / "submission"
     root.mkdir()
     folder = os.path.commonpath([file.resolve().parent for file in files])

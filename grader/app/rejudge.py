@@ -1,4 +1,4 @@
-"""Judges kept evidence again, without running anything: one submission as grading does, or a whole class at once."""
+"""Judges kept evidence again without running anything: one submission, or a whole class at once."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from pathlib import Path
 from grader.app.evidence_writer import request_of
 from grader.app.exit_codes import UNUSABLE, exit_code
 from grader.app.grade import read_exercises
-from grader.app.reproducing import command_words
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, command_words
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import Report
@@ -29,23 +28,23 @@ from grader.reporting.json_report import dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.variants import First
 
-#: Fewer submissions than this are judged in this process.
+#: With fewer submissions than this for each process, another process does not pay off.
 WORTH_A_POOL = 16
-#: Thresholds of Python's collector while many recordings are read.
+#: Thresholds of the garbage collector while many recordings are read.
 COLLECTING = (200_000, 20, 20)
 _WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """How evidence is to be judged.
+    """How to judge evidence.
 
     Attributes:
-        exercises: What is asked: all that the rubrics have.
-        chosen: Exercise ids that were named; empty for those that were graded.
-        rubrics: Rubric files that were named; empty for the built-in ones.
-        pictures: Whether reports are to hold figures.
-        verify: Whether recordings are compared with what is judged.
+        exercises: All exercises of the rubrics.
+        chosen: Requested exercise ids; empty for those that were graded.
+        rubrics: Given rubric files; empty for the built-in ones.
+        pictures: Whether reports include charts.
+        verify: Whether to compare the stored trace with the recordings.
     """
 
     exercises: tuple[Exercise, ...]
@@ -57,14 +56,14 @@ class Judgement:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is to be made of every report of a class.
+    """The outputs wanted for each report of a class.
 
     Attributes:
-        files: Formats, each with the folder that its files go to.
-        reports: Whether results hold the report as JSON.
-        changes: Whether results hold what changed.
+        files: Formats, each with the folder for its files.
+        reports: Whether results include the report as JSON.
+        changes: Whether results include the changes since grading.
         min_score: See `exit_code`.
-        readers: Who reads all that, and when.
+        readers: Who reads the outputs, and when.
     """
 
     files: tuple[Output, ...] = ()
@@ -77,16 +76,16 @@ class Wanted:
 def judgement(
     chosen: tuple[str, ...], rubrics: tuple[Path, ...], *, pictures: bool = False, verify: bool = False
 ) -> Judgement:
-    """Return how to judge; raises RubricError for a rubric that cannot be used or an exercise that none has."""
+    """Read the rubrics to judge by; raises RubricError for an unusable rubric or an unknown exercise."""
     exercises = read_exercises(GradeRequest("", every=True, exercises=chosen, rubrics=rubrics, draw=First()))
     return Judgement(tuple(exercises), chosen, rubrics, pictures, verify)
 
 
 def rejudge(evidence: Evidence, how: Judgement) -> Report:
-    """Return the report of one submission's evidence.
+    """Judge one submission's evidence and return the report.
 
     Raises:
-        EvidenceError: It is damaged, or holds no exercise that is asked for.
+        EvidenceError: The evidence is damaged, or holds none of the requested exercises.
     """
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
@@ -99,7 +98,7 @@ def rejudge(evidence: Evidence, how: Judgement) -> Report:
 
 
 def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange | None:
-    """Return what a new report changes for a submission; None if its first report is gone."""
+    """Compare a new report with the first one; None if the first one is missing or unreadable."""
     before = first_report(evidence)
     if before is None:
         return None
@@ -110,10 +109,10 @@ def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange 
 
 
 def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
-    """Return name and folder of all evidence in and below some paths, in order.
+    """Return the name and folder of all evidence in and below the given paths, in order.
 
     Raises:
-        EvidenceError: There is none in one of them.
+        EvidenceError: One of the paths holds no evidence.
     """
     named: dict[Path, str] = {}
     used: Counter[str] = Counter()
@@ -132,23 +131,23 @@ def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
 def rejudge_class(
     named: Sequence[tuple[str, Path]], how: Judgement, wanted: Wanted, *, jobs: int | None = None
 ) -> list[RejudgedResult]:
-    """Return one result for each submission, in the order given; one that cannot be judged keeps no other back.
+    """Judge many submissions, and return their results in the given order; a failure of one does not affect the others.
 
     Args:
-        named: Name and folder of evidence.
+        named: Name and folder of the evidence.
         how: How to judge.
-        wanted: What to make of the reports.
-        jobs: Processes; None for one a core.
+        wanted: The outputs to write.
+        jobs: Number of processes; None for one per core.
     """
     workers = min(jobs or len(os.sched_getaffinity(0)), max(1, len(named) // WORTH_A_POOL))
     if workers == 1:
-        with _little_collecting():
+        with _rare_collection():
             return [_result(name, folder, how, wanted) for name, folder in named]
     with ProcessPoolExecutor(workers, initializer=_prepare, initargs=(how, wanted)) as pool:
         return list(pool.map(_result_there, named, chunksize=max(1, min(32, len(named) // (4 * workers)))))
 
 
-#: What a process of the pool was started for.
+#: What a pool process has to do; set once when it starts.
 _task: list[tuple[Judgement, Wanted]] = []
 
 
@@ -159,8 +158,8 @@ def _prepare(how: Judgement, wanted: Wanted) -> None:
 
 
 @contextmanager
-def _little_collecting() -> Iterator[None]:
-    """Look for cyclic garbage seldom: reading a recording makes many objects and few cycles."""
+def _rare_collection() -> Iterator[None]:
+    """Run the cyclic garbage collector rarely: reading a recording makes many objects and few cycles."""
     usual = gc.get_threshold()
     gc.freeze()
     gc.set_threshold(*COLLECTING)
@@ -205,7 +204,7 @@ def _write(name: str, report: Report, wanted: Wanted) -> None:
 
 
 def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:
-    """Return the exercises that evidence holds and that are asked for."""
+    """Return the requested exercises that the evidence holds."""
     held = evidence.exercises
     known = [e.id for e in how.exercises]
     missing = [id_ for id_ in (how.chosen or (() if how.rubrics else held)) if id_ not in held or id_ not in known]
@@ -219,7 +218,7 @@ def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:
 
 
 def _as_recorded(exercises: list[Exercise], request: GradeRequest) -> list[Exercise]:
-    """Return the exercises with the values that were this student's own when they were graded."""
+    """Return the exercises with the student's variant values from when they were graded."""
     if all(exercise.variant is None for exercise in exercises):
         return exercises
     wanted = tuple(exercise.id for exercise in exercises)
@@ -227,7 +226,7 @@ def _as_recorded(exercises: list[Exercise], request: GradeRequest) -> list[Exerc
 
 
 def _name(folder: Path, root: Path) -> str:
-    """Return what people call a folder of evidence: its path below the root, without a last part `evidence`."""
+    """Name a folder of evidence by its path below the root, without a trailing `evidence`."""
     parts = list(folder.relative_to(root).parts) if folder != root else [folder.resolve().name]
     if len(parts) > 1 and parts[-1] == "evidence":
         parts.pop()
@@ -235,6 +234,6 @@ def _name(folder: Path, root: Path) -> str:
 
 
 def codes(results: Sequence[RejudgedResult]) -> Iterator[int]:
-    """Yield the exit codes of all submissions, that which matters most first."""
+    """Yield the exit codes of all submissions, the most serious first."""
     order = (UNUSABLE, 3, 1, 0)
     yield from sorted((r.code for r in results), key=order.index)

@@ -1,38 +1,45 @@
-"""What a user asks to be graded, and how."""
+"""A request to grade a submission, and the command that reproduces its result."""
 
 from __future__ import annotations
 
+import hashlib
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.app.seeds import PRACTICE, SeedKey
+from grader.core.exercise import Exercise
 from grader.core.limits import TIME_BUDGET_S
+from grader.core.report import Reproduction
+from grader.execution.bag import Odometry
 from grader.rubrics.variants import Draw
 from grader.submissions.collected import Collected
 
 
 @dataclass(frozen=True, slots=True)
 class GradeRequest:
-    """What is to be graded, and how.
+    """What to grade, and how.
 
     Attributes:
         submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all of the rubrics, of the built-in ones for those that are not
-            only graded by request.
-        every: Whether to grade every exercise of which the submission has a file, and no other.
+        exercises: Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only
+            graded by request.
+        every: Whether to grade exactly the exercises that the submission has a file for.
         rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of every drawn value; None derives it from the submission and the seed key.
-        seed_key: The key for that.
-        odom_bag: An /odom recording to play instead of the project's own.
+        seed: Seed of all drawn values; None derives it from the submission and the seed key.
+        seed_key: The key to derive the seed with.
+        odom_bag: An /odom recording to play instead of the built-in one.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
-        time_budget_s: Real time that all recordings may take together.
-        workers: Most scenarios recorded side by side; None leaves it to the machine's processors. Changes no result.
-        collected: What was read of the submission before, perhaps elsewhere; None to read it now.
-        student: Id of the student whose variants are graded; empty where nothing varies.
-        variant_key: File with the course key, as the user typed it; None if nobody did.
-        spot_checks: Share of submissions, from 0 to 1, that are drawn to be recorded on the wall clock as well.
-        draw: What variants come to; None if nobody says, and then a rubric that has some is refused.
+        time_budget_s: Real time that all recordings together may take.
+        workers: Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
+        collected: The files of the submission if they were read before, perhaps on another machine; None to read
+            them now.
+        student: Id of the student whose variant is graded; empty if nothing varies.
+        variant_key: File with the course key, as the user typed it; None if not given.
+        spot_checks: Share of submissions, from 0 to 1, that are also recorded on the wall clock.
+        draw: Supplies variant values; if None, rubrics with variants are refused.
     """
 
     submission: str
@@ -51,3 +58,61 @@ class GradeRequest:
     student: str = ""
     variant_key: Path | None = None
     draw: Draw | None = None
+
+
+def reproduction(
+    request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
+) -> Reproduction:
+    """Return the command that reproduces a report, with digests of all that it reads besides the submission.
+
+    Args:
+        request: The request.
+        exercises: The graded exercises.
+        odometry: The /odom recording that was played, if any.
+        seed: The seed used, whether requested or derived.
+    """
+    return Reproduction(
+        command=command_words(request, seed),
+        rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
+        recording="" if odometry is None else recording_digest(odometry),
+    )
+
+
+def command_words(request: GradeRequest, seed: int) -> tuple[str, ...]:
+    """Return the words of the command, with the seed and every option that affects the result."""
+    words = ["grade", _unambiguous_path(request.submission)]
+    for exercise in request.exercises:
+        words += ["--exercise", exercise]
+    if request.every:
+        words.append("--all")
+    for rubric in request.rubrics:
+        words += ["--rubric", str(rubric)]
+    words += ["--seed", str(seed)]
+    if request.student:
+        words += ["--student", request.student]
+    if request.variant_key is not None:
+        words += ["--variant-key", str(request.variant_key)]
+    if request.odom_bag is not None:
+        words += ["--odom-bag", str(request.odom_bag)]
+    if request.clock != "auto":
+        words += ["--clock", request.clock]
+    if request.isolation != "auto":
+        words += ["--isolation", request.isolation]
+    if request.time_budget_s != TIME_BUDGET_S:
+        words += ["--time-budget", f"{request.time_budget_s:g}"]
+    if request.spot_checks:
+        words += ["--spot-checks", f"{request.spot_checks:.6%}".rstrip("%").rstrip("0").rstrip(".") + "%"]
+    return tuple(words)
+
+
+def recording_digest(odometry: Odometry) -> str:
+    """Return `sha256:` over the topic, times and bytes of a recording; independent of the storage format."""
+    digest = hashlib.sha256(f"{odometry.topic}\n".encode())
+    for message in odometry.messages:
+        digest.update(f"{message.t_ns} {len(message.cdr)}\n".encode() + message.cdr)
+    return f"sha256:{digest.hexdigest()}"
+
+
+def _unambiguous_path(path: str) -> str:
+    """Return a path that cannot be mistaken for an option or a subcommand."""
+    return path if os.sep in path or path in (".", "..") else os.path.join(".", path)  # noqa: PTH118  a bare ./

@@ -1,4 +1,4 @@
-"""Seeds: the number that all drawn values follow from, and the keys that it is made of."""
+"""Keys, and what is derived from them: the seed of a run, and the variant of a student."""
 
 from __future__ import annotations
 
@@ -7,26 +7,42 @@ import hmac
 import os
 import secrets
 import stat
+import unicodedata
 from collections.abc import MutableMapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.core.errors import KeyFileError
+from grader.core.errors import KeyFileError, VariantError
+from grader.core.exercise import Drawn, Exercise, Value
+from grader.rubrics.loader import read_rubric
+from grader.rubrics.variants import VariantOptions
 from grader.submissions.collected import shown
 
-#: Fewest and most bytes of a key; one that could be guessed would tell students what is drawn.
+#: Fewest and most bytes of a key; with a key that can be guessed, students could predict the drawn values.
 LEAST_BYTES, MOST_BYTES = 16, 4096
+#: Environment variable with the seed key itself, for a CI that stores it as a secret.
+VARIABLE = "GRADER_SEED_KEY"
+#: Shown in reports when anyone can compute the seed.
+PRACTICE_NOTE = "drawn values follow from the public practice key; --seed-key FILE draws values that nobody can predict"
+#: Most characters in the id of a student.
+MOST_ID = 200
+_SEED_SCHEME = b"grader/seed/v1\n"
+_VARIANT_SCHEME = "grader/variant/v1"
+#: 48 bits: exact in every JSON reader, short enough to type, and too many to try in a student's process.
+_HEX_DIGITS = 12
+_KEY_BYTES = 32
+_VARIANT_BYTES = 16
 
 
 def read_key(path: Path, what: str) -> bytes:
-    """Return the key in a file, without the blanks around it.
+    """Read a key from a file, and strip whitespace.
 
     Args:
         path: The file.
-        what: What messages call the key, such as `course key`.
+        what: Name of the key in messages, such as `course key`.
 
     Raises:
-        KeyFileError: It cannot be used.
+        KeyFileError: The file cannot be read, or the key is too short or too long.
     """
     where = shown(str(path), 500)
     try:
@@ -38,7 +54,7 @@ def read_key(path: Path, what: str) -> bytes:
 
 
 def checked_key(key: bytes, where: str) -> bytes:
-    """Return a key; raises KeyFileError for one that is too short or too long, without a word of what is in it."""
+    """Check the length of a key; the message of the KeyFileError reveals nothing else about it."""
     if not LEAST_BYTES <= len(key) <= MOST_BYTES:
         found = f"more than {MOST_BYTES}" if len(key) > MOST_BYTES else str(len(key))
         hint = "make one: head -c 32 /dev/urandom | base64 > course.key"
@@ -46,50 +62,40 @@ def checked_key(key: bytes, where: str) -> bytes:
     return key
 
 
-#: Holds the seed key itself, for a CI that keeps it as a secret.
-VARIABLE = "GRADER_SEED_KEY"
-#: What reports say where anybody can work out the seed.
-PRACTICE_NOTE = "drawn values follow from the public practice key; --seed-key FILE draws values that nobody can predict"
-_SCHEME = b"grader/seed/v1\n"
-#: 48 bits: exact in every JSON reader, short enough to type, and too many to try in a student's process.
-_HEX_DIGITS = 12
-_KEY_BYTES = 32
-
-
 @dataclass(frozen=True, slots=True)
 class SeedKey:
-    """The key that seeds are made with; its value is in no text that is made of this object.
+    """The key that seeds are derived from; the repr of this object does not reveal it.
 
     Attributes:
         value: The key.
-        public: Whether everybody knows it.
+        public: Whether the key is publicly known.
     """
 
     value: bytes = field(repr=False)
     public: bool = False
 
     def seed(self, digest: str) -> int:
-        """Return the seed of a submission by its digest.
+        """Derive the seed of a submission from its digest.
 
-        It belongs to this digest alone: who knows it can repeat the run, but learns nothing about the seed of another
-        submission, nor of the same one after any change. So reports may show it to students.
+        The seed allows students to repeat the run, but reveals nothing about the seed of another submission, or of the
+        same one after a change. So reports may show it.
         """
-        return int(hmac.new(self.value, _SCHEME + digest.encode(), hashlib.sha256).hexdigest()[:_HEX_DIGITS], 16)
+        return int(hmac.new(self.value, _SEED_SCHEME + digest.encode(), hashlib.sha256).hexdigest()[:_HEX_DIGITS], 16)
 
 
-#: The key of a student's own runs, and of any run without another key.
+#: The key of students' own runs, and of any run without another key.
 PRACTICE = SeedKey(b"rclpy-grader: the public practice key, for runs that nobody is marked by", public=True)
 
 
 def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.environ) -> SeedKey | None:
-    """Return the key that a run was given; None if it was given none.
+    """Return the seed key from a file or the environment; None if neither has one.
 
-    The variable is taken out of the environment, so that no process started later has it.
+    Removes the variable from the environment, so that no process started later inherits it.
 
     Args:
-        path: What `--seed-key` names; None if it was not given.
-        environment: Where `GRADER_SEED_KEY` may stand; empty counts as unset, for that is what a CI without the
-            secret makes of it.
+        path: The file given with `--seed-key`; None if not given.
+        environment: May hold `GRADER_SEED_KEY`. An empty value counts as unset, because CI systems set it if the secret
+            does not exist.
 
     Raises:
         KeyFileError: The key cannot be used.
@@ -101,10 +107,10 @@ def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.envir
 
 
 def kept_key(path: Path) -> SeedKey:
-    """Return the key in a file that only its owner can read; the first call makes it.
+    """Return the key in a file that only its owner can read; create it on the first call.
 
     Raises:
-        KeyFileError: It cannot be read or made.
+        KeyFileError: The file cannot be read or created.
     """
     try:
         made = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
@@ -121,7 +127,7 @@ def kept_key(path: Path) -> SeedKey:
 
 
 def _close_to_others(path: Path) -> None:
-    """Take a key away from everybody but its owner: copying a folder may have opened it."""
+    """Restrict a key to its owner: copying the folder may have made it readable for others."""
     try:
         found = path.lstat()
         if not stat.S_ISREG(found.st_mode):
@@ -130,3 +136,53 @@ def _close_to_others(path: Path) -> None:
             path.chmod(0o600)
     except OSError as error:
         raise KeyFileError(f"{path}: expected a seed key that only you can read: {error.strerror}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class ByKey:
+    """Draws the variant of a student from the course key.
+
+    Attributes:
+        key: The course key.
+        student: Id of the student; case, surrounding whitespace and Unicode normalisation make no difference.
+    """
+
+    key: bytes
+    student: str
+
+    def value(self, exercise: str, options: VariantOptions) -> Value | None:
+        """Pick a value by the HMAC-SHA256 of exercise, variant and student."""
+        text = "\n".join((_VARIANT_SCHEME, exercise, options.name, folded(self.student)))
+        digest = hmac.new(self.key, text.encode(), hashlib.sha256).digest()
+        # With 128 bits, the bias of the modulo towards the first values is at most 2**-114.
+        return options.value(int.from_bytes(digest[:_VARIANT_BYTES], "big") % options.count)
+
+
+def folded(student: str) -> str:
+    """Normalise the id of a student, so that different spellings of one id compare equal."""
+    return unicodedata.normalize("NFKC", student).strip().casefold()
+
+
+def by_key(path: Path, student: str) -> ByKey:
+    """Read the course key for a student; raises GraderError if the key or the id cannot be used."""
+    return ByKey(read_key(path, "course key"), checked(student))
+
+
+def checked(student: str) -> str:
+    """Strip whitespace from the id of a student; raises VariantError if the id cannot be used."""
+    plain = student.strip()
+    if not folded(plain) or len(plain) > MOST_ID or not plain.isprintable():
+        text = f"expected the id of a student, up to {MOST_ID} signs on one line, found `{shown(student)}`"
+        raise VariantError(f"--student: {text}")
+    return plain
+
+
+def sheet(path: Path, key: Path, student: str) -> Exercise:
+    """Read a rubric with one student's variant; raises GraderError if rubric, key or id cannot be used."""
+    return read_rubric(path, draw=by_key(key, student))
+
+
+def drawn(exercises: list[Exercise], student: str) -> Drawn | None:
+    """Return the variant values of the exercises; None if they have no variants."""
+    values = {e.id: dict(e.variant.values) for e in exercises if e.variant is not None}
+    return Drawn(student, values) if values else None

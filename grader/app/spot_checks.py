@@ -1,6 +1,6 @@
-"""Spot checks: what was recorded with the grader in the student's process is recorded once more on the wall clock.
+"""Spot checks: records a scenario again on the wall clock, with no code of the grader in the student's process.
 
-There, nothing of the grader is in the student's process. Where the two disagree, the wall clock decides.
+If the two recordings disagree, the wall clock decides.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from grader.execution.stimuli import schedule
 from grader.execution.supervisor import Job
 from grader.judging.agreement import Difference, differences, sentence
 
-#: How long a program is watched from its first message, or from the first stimulus, on.
+#: How long a program is observed after its first message or the first stimulus.
 WATCHED_NS = 6 * NS_PER_S
-#: How much longer than in virtual time a first message is waited for.
+#: How much longer than in virtual time the first message may take.
 PATIENCE_NS = 10 * NS_PER_S
-#: So often a disagreement has to be seen, and so often the machine may be too busy to show one.
+#: How often a disagreement must occur to count, and after how many attempts on a busy machine the check is given up.
 TIMES = 2
 BUSY_TIMES = 3
 BUSY = "the machine was too busy for a check on the wall clock"
@@ -32,11 +32,11 @@ Finished = Callable[[Key, Trace], None]
 
 
 def shortened(plan: Plan, virtual: Trace) -> Plan:
-    """Return the beginning of a plan for the wall clock, with the same stimuli.
+    """Shorten a plan to its beginning, for a spot check on the wall clock with the same stimuli.
 
     Args:
-        plan: The whole plan.
-        virtual: What came of it in virtual time.
+        plan: The complete plan.
+        virtual: Its trace in virtual time.
     """
     bare = bare_plan(plan, virtual)
     if plan.first_message_on:
@@ -49,25 +49,25 @@ def shortened(plan: Plan, virtual: Trace) -> Plan:
 
 
 def bare_plan(plan: Plan, virtual: Trace) -> Plan:
-    """Return a plan for the wall clock with nothing of the grader in the students' processes."""
+    """Change a plan to the wall clock, with no code of the grader in the student's processes."""
     first_node_ns = next((graph.t_ns for graph in virtual.graphs() if graph.nodes), 0)
     return replace(plan, clock=WALL, bare=True, first_node_ns=first_node_ns, stop_when_unfit=False)
 
 
 def is_drawn(share: float, seed: int, digest: str) -> bool:
-    """Return whether a submission is one of a share of them: always or never, and only who has the key knows."""
+    """Whether a submission is drawn. Depends only on seed and digest, so only the owner of the key can predict it."""
     return int(derive(seed, "spot check", digest)[:12], 16) < share * 16**12
 
 
 @dataclass(frozen=True, slots=True)
 class SpotChecks:
-    """Which submissions are checked, and how.
+    """Decides which recordings of a submission are checked.
 
     Attributes:
-        share: The share of submissions that are drawn, from 0 to 1.
-        seed: The seed of a submission's drawn values; decides with its digest whether it is drawn.
+        share: Share of submissions that are drawn, from 0 to 1.
+        seed: Seed of the submission's drawn values; together with the digest it decides whether it is drawn.
         digest: The submission's digest.
-        reaches: By what names its files reach for the insides of their process.
+        reaches: Names in its files that access internals of their process.
     """
 
     share: float
@@ -77,16 +77,16 @@ class SpotChecks:
 
     @property
     def drawn(self) -> bool:
-        """Whether this submission is one of the share."""
+        """Whether this submission is drawn for a spot check."""
         return is_drawn(self.share, self.seed, self.digest)
 
     @property
     def certain(self) -> bool:
-        """Whether it is checked whatever its processes do."""
+        """Whether this submission is checked no matter what its processes do."""
         return self.drawn or bool(self.reaches)
 
     def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> list[Key]:
-        """Return what is checked: recordings that nothing was wrong with; in virtual time, unless it is suspected."""
+        """Select the recordings to check: valid ones in virtual time, and of a suspect also those on the wall clock."""
         drawn = self.drawn
         return [
             key
@@ -95,7 +95,7 @@ class SpotChecks:
         ]
 
     def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
-        """Return whether a program has to pass its check, since it reaches for the insides of its process."""
+        """Whether the exercise must pass its check, because a program accesses internals of its process."""
         return bool(self.reaches) or any(t.reached for (exercise, _), t in traces.items() if exercise == key[0])
 
 
@@ -106,17 +106,17 @@ def check(
     record: Record,
     finished: Finished,
 ) -> dict[Key, Trace]:
-    """Check what is due and return all traces, those of an exercise whose clocks disagree from the wall clock.
+    """Run the spot checks that are due; where the clocks disagree, replace the exercise's traces by wall-clock ones.
 
-    A machine that is too busy for a check says nothing: virtual time counts then, with a note; only of a program that
-    reaches for the insides of its process nothing is decided.
+    If the machine is too busy for a check, the trace in virtual time counts and gets a note. Only for a program that
+    accesses internals of its process, the result is then undecided.
 
     Args:
-        checks: What is to be checked.
-        jobs: What was recorded, by exercise and scenario.
-        traces: What came of it.
+        checks: Decides what to check.
+        jobs: The recorded jobs, by exercise and scenario.
+        traces: Their traces.
         record: Records a job.
-        finished: Hears each trace of an exercise that was checked.
+        finished: Called with each trace of a checked exercise.
     """
     found = dict(traces)
     due = checks.due(jobs, traces)
@@ -137,10 +137,10 @@ def check(
 
 
 def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
-    """Return whether a recording of processes that all start at once is checked.
+    """Whether a recording is checked; one whose processes start at different times never is.
 
-    One in virtual time is if it is drawn or suspected; one on the wall clock only if it is suspected: the program may
-    find the grader in its process.
+    A recording in virtual time is checked if it is drawn or suspect. One on the wall clock is checked only if it is
+    suspect, because the program may find the grader in its process.
     """
     on_virtual = (drawn or suspect) and not trace.clock_reason
     wanted = suspect if trace.clock is ClockKind.WALL else on_virtual
@@ -148,7 +148,7 @@ def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
 
 
 def _disagreement(job: Job, virtual: Trace, record: Record) -> tuple[Difference | None, bool]:
-    """Return how the clocks disagree, each time that it is tried, and whether the machine was too busy to tell."""
+    """Return a difference that occurred in repeated attempts, and whether the machine was too busy to find out."""
     plan = shortened(job.plan, virtual)
     seen: list[Difference] = []
     busy = 0
@@ -175,7 +175,7 @@ def _unchecked(trace: Trace, *, suspect: bool) -> Trace:
 def _decided(
     difference: Difference, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record
 ) -> dict[Key, Trace]:
-    """Record all of an exercise on the wall clock, which decides."""
+    """Record all scenarios of an exercise on the wall clock, which decides."""
     decided = {}
     for key, job in jobs.items():
         virtual = traces[key]

@@ -1,1 +1,1 @@
-"""What authors of rubrics need: rubrics looked over, and skeletons of new ones."""
+"""Tools for authors of rubrics: checks of rubrics, and skeletons of new ones."""

@@ -1,4 +1,4 @@
-"""Looks a rubric over for its author: whether it can be used, its points, and what is odd about it."""
+"""Checks a rubric for its author: whether it is valid, its points, and likely mistakes."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from grader.rubrics.variants import First
 from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree, read_yaml
 from grader.submissions.collected import shown
 
-#: Points of a rubric are easy to reckon with if they add up to a multiple of this.
+#: The points of a rubric should add up to a multiple of this, for easy arithmetic.
 ROUND = 5
-#: Parameters of checks that name a stretch of time which a scenario must be long enough for.
+#: Check parameters with a duration that must fit into the scenario.
 _STRETCHES = ("window", "silence")
 
 
 def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
-    """Return what is odd in a rubric, in the order of the file.
+    """Return warnings about a rubric, in the order of the file.
 
     Args:
-        exercise: What the rubric says.
-        tree: The document, for places.
+        exercise: The exercise read from the rubric.
+        tree: The YAML document, for positions.
     """
     found = [*_of_points(exercise, tree), *_of_scenarios(exercise, tree), *_of_files(exercise, tree)]
     for index, criterion in enumerate(exercise.criteria):
@@ -85,11 +85,11 @@ def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A rubric that can be used.
+    """A valid rubric.
 
     Attributes:
-        summary: What it comes to, on one line.
-        warnings: What is odd, one line each, with line and column.
+        summary: A summary in one line.
+        warnings: Warnings, one line each, with line and column.
     """
 
     summary: str
@@ -97,10 +97,10 @@ class Checked:
 
 
 def check_rubric(path: Path) -> Checked:
-    """Return what a rubric comes to.
+    """Check a rubric, and summarise it.
 
     Raises:
-        RubricError: It cannot be used; its message lists every mistake.
+        RubricError: The rubric is invalid; the message lists every mistake.
     """
     exercise = read_rubric(path, draw=First())
     where = shown(str(path), 500)
@@ -109,7 +109,7 @@ def check_rubric(path: Path) -> Checked:
 
 
 def complaints(error: RubricError) -> list[str]:
-    """Return all that is wrong with a rubric, one line each, however much it is; remedies follow what they are for."""
+    """Return all mistakes of a rubric, one line each, each followed by its hint."""
     if not isinstance(error, RubricMistakes):
         hint = [f"hint: {error.hint}"] if error.hint else []
         return [*(f"error: {line}" for line in error.message.splitlines()), *hint]

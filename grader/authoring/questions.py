@@ -1,4 +1,4 @@
-"""What can be asked of nodes that do what the reference does: one row for each thing that was seen."""
+"""Proposes criteria for a new rubric, from the observed behaviour of a reference solution."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OVERRIDES = "qos_overrides."
 
 
 def parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
-    """Yield node, name and value of each parameter; the node is empty where one alone has any, a list is None."""
+    """Yield node, name and value of each parameter, with an empty node if only one has any; lists become None."""
     offers = [(o.name.partition(":"), o.detail) for o in trace.of(Offer) if o.kind == "parameter"]
     own = {(node, name): value for (node, _, name), value in offers if not _is_everybodys(name)}
     several = len({node for node, _ in own}) > 1
@@ -35,7 +35,7 @@ def _is_everybodys(name: str) -> bool:
 
 
 def _read(text: str) -> str | float | bool | None:
-    """Return the value that a node told as Python writes it; None for a list and for what is no value."""
+    """Parse a parameter value in Python syntax; None for lists and invalid values."""
     try:
         value = ast.literal_eval(text)
     except (ValueError, SyntaxError, MemoryError, RecursionError):
@@ -45,19 +45,19 @@ def _read(text: str) -> str | float | bool | None:
     return value if isinstance(value, (str, int, float)) and value != "" else None
 
 
-#: Times in a message are of the run.
+#: Suffixes of fields with times, which differ in each run.
 OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
 #: Something comes after anything.
 ANY: list[dict[str, Any]] = [{"when": {}, "then": {}}]
-#: More different inputs than this are no cases, and more fields than this are no answer that a person wrote down.
+#: Most distinct inputs to turn into cases, and most fields of an answer.
 _MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
 
 
 def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
-    """Return a case for each different input: what it held, and what came of it within a second.
+    """Return a case for each distinct input: its fields, and the answer within a second.
 
     Args:
-        trace: What was seen.
+        trace: The observed trace.
         given: Topic of the inputs.
         answered: Topic of the answers.
     """
@@ -73,7 +73,7 @@ def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
 
 
 def texts(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every text of a message by its path."""
+    """Yield path and value of every string in a message."""
     for name, inner in value.items():
         if isinstance(inner, Mapping):
             yield from texts(inner, f"{prefix}{name}.")
@@ -82,7 +82,7 @@ def texts(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str
 
 
 def _answers(trace: Trace, inputs: tuple[Delivery, ...], answered: str) -> list[Message | None]:
-    """Return the last answer to each input, within a second and before the next one; None where there was none."""
+    """Return the last answer to each input, within a second and before the next input; None if there is none."""
     stops = [*(sent.t_ns for sent in inputs), trace.stop_ns][1:]
     found: list[Message | None] = []
     for sent, stop_ns in zip(inputs, stops, strict=True):
@@ -96,7 +96,7 @@ def _scalars(value: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _telling(answers: list[Message]) -> list[str]:
-    """Return the paths that are not at their default in every answer."""
+    """Return the paths that differ from their default in at least one answer."""
     rows = [_scalars(answer.value) for answer in answers]
     return [path for path in (rows[0] if rows else ()) if any(row.get(path) for row in rows)][:_MOST_ANSWER_FIELDS]
 
@@ -109,23 +109,23 @@ def _case(sent: Delivery, answer: Message | None, paths: list[str]) -> dict[str,
     return {"when": when, "then": {path: held[path] for path in paths if path in held}}
 
 
-#: Fewer messages tell no rate, and more spread of the intervals than this share of them is no rate.
+#: Fewest messages to determine a rate, and largest spread of the intervals, as a share of them.
 _FEWEST, _STEADY = 5, 0.2
-#: Tolerance of a rate, and the one for half of the points, as shares of it.
+#: Tolerances of a rate for all and for half of the points, as shares of the rate.
 _TOLERANCE, _PARTLY = 0.05, 0.1
-#: Most constant fields that a row names.
+#: Most constant fields in one criterion.
 _MOST_FIELDS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A reference as it was seen.
+    """The observed behaviour of a reference solution.
 
     Attributes:
-        alone: The nodes by themselves.
-        driven: The nodes with the stimuli of the draft; the same as `alone` if there are none.
-        files: Their files.
-        window_s: Longest time from its first message on for which every topic was watched.
+        alone: Trace of the nodes without stimuli.
+        driven: Trace of the nodes with the stimuli of the draft; the same as `alone` if there are none.
+        files: File names of the nodes.
+        window_s: Longest time that every topic was observed after its first message.
     """
 
     alone: Trace
@@ -135,7 +135,7 @@ class Seen:
 
 
 def questions(seen: Seen) -> tuple[DraftCriterion, ...]:
-    """Return the rows for all that was seen, whether the checks they name exist or not."""
+    """Propose criteria for everything that was observed, even if their checks do not exist."""
     topics = summarise(seen.driven, seen.files, "").topics
     own = {end.topic for end in student_endpoints(seen.driven)}
     rows: list[DraftCriterion] = []
@@ -182,7 +182,7 @@ def _rate(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterio
 
 
 def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
-    """Return a row for a topic on which there is something only when something comes in."""
+    """Propose a criterion for a topic with messages only in response to inputs."""
     given = next((delivery.topic for delivery in seen.driven.of(Delivery)), topic.name)
     cases = cases_seen(seen.driven, given, topic.name)
     asked = {"input": given, "output": topic.name, "within": DraftQuantity("1 s"), "cases": cases}
@@ -213,7 +213,7 @@ def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriter
 
 
 def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str) -> Iterator[DraftCriterion]:
-    """Yield rows for a field that varies: drawn numbers first, then any in a range; those that fit are kept."""
+    """Propose criteria for a varying field: random numbers, then values in a range; unmet ones are dropped."""
     name = f"{as_id(topic.name)}_{as_id(path)}"
     comment = f"seen: {number(low)} to {number(high)}; decide: which range does the task ask for?"
     hint = f"{path} stays in its range"
@@ -227,14 +227,14 @@ def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str
 
 
 def _constant_texts(values: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Return the texts that are the same in all messages, by their paths, without empty ones."""
+    """Return the non-empty strings that are the same in all messages, by their paths."""
     rows = [dict(texts(value)) for value in values]
     first = rows[0] if rows else {}
     return {path: text for path, text in first.items() if text and all(row.get(path) == text for row in rows)}
 
 
 def _sorted_out(rows: Sequence[Mapping[str, float]]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Return the fields that never change with their value, and those that do with least and greatest value."""
+    """Return constant fields with their value, and varying fields with their smallest and largest value."""
     constant: dict[str, float] = {}
     varying: dict[str, tuple[float, float]] = {}
     for path in rows[0] if rows else ():
@@ -308,6 +308,6 @@ def _hertz(rate: float) -> DraftQuantity:
 
 
 def _round_range(low: float, high: float) -> dict[str, float]:
-    """Return bounds around what was seen, as round as its width is large: 20 and 30 for 20.3 to 29.8."""
+    """Return round bounds around observed values, in proportion to their range: 20 and 30 for 20.3 to 29.8."""
     step = 10.0 ** math.floor(math.log10(high - low))
     return {"low": float(f"{math.floor(low / step) * step:.9g}"), "high": float(f"{math.ceil(high / step) * step:.9g}")}

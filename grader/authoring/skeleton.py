@@ -12,19 +12,19 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class DraftQuantity:
-    """Text that is written as it is: a number with its unit."""
+    """Text that is written unquoted, such as a number with its unit."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class DraftStimulus:
-    """Something that the grader is to do to the nodes.
+    """A stimulus of the draft.
 
     Attributes:
         kind: Its key in a rubric.
         parameters: Its parameters, in order.
-        comment: What the author has to decide; empty for nothing.
+        comment: A decision left to the author; may be empty.
     """
 
     kind: str
@@ -34,16 +34,16 @@ class DraftStimulus:
 
 @dataclass(frozen=True, slots=True)
 class DraftCriterion:
-    """A row that the rubric may have.
+    """A proposed criterion.
 
     Attributes:
         id: Its id.
         title: Its title.
         check: Name of its check.
         parameters: The check's parameters, in order.
-        hint: What a student is told who misses it.
-        needs: Id of the criterion without which it makes no sense; empty for none.
-        comment: What the author has to decide; empty for nothing.
+        hint: Hint for students who do not meet it.
+        needs: Id of the criterion that it depends on; empty for none.
+        comment: A decision left to the author; may be empty.
     """
 
     id: str
@@ -57,17 +57,17 @@ class DraftCriterion:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """All that goes into a skeleton.
+    """The contents of a skeleton.
 
     Attributes:
         id: Id of the exercise.
-        files: Files of the reference, each a process.
-        duration_s: How long the scenario is observed.
-        after: Topic whose first message starts the clock; empty for the start of the nodes.
+        files: Files of the reference; each runs in its own process.
+        duration_s: Duration of the scenario.
+        after: Topic whose first message starts the observation; empty for the start of the nodes.
         may_exit: Files that end by themselves.
-        stimuli: What the grader does meanwhile.
-        criteria: The rows.
-        remarks: What else the author has to know, one sentence each.
+        stimuli: The stimuli.
+        criteria: The proposed criteria.
+        remarks: Remarks for the author, one sentence each.
     """
 
     id: str
@@ -81,27 +81,27 @@ class Draft:
 
 
 def as_id(text: str) -> str:
-    """Return an id made of any text: small letters, digits and `_`, a letter first."""
+    """Make an id from any text: lower-case letters, digits and `_`, starting with a letter."""
     words = re.sub(r"[^a-z0-9]+", "_", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text).lower()).strip("_")
     return words if words[:1].isalpha() else f"x_{words}".rstrip("_")
 
 
-#: Points of every row, until the author weighs them.
+#: Points of every criterion, until the author changes them.
 POINTS = 5
 _WIDTH = 100
-#: Longest line that holds all parameters of something.
+#: Longest line for parameters in flow style.
 _LONGEST = 120
-# What needs no quotation marks inside `{...}`, and is neither a number nor a word of YAML.
+# Text that needs no quotes inside `{...}`, and that YAML does not read as a number or a keyword.
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")
 
 
 def rubric_text(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]] = ()) -> str:
-    """Return the text of a rubric.
+    """Render a draft as the text of a rubric.
 
     Args:
-        draft: What goes into it.
-        left_out: Rows that stand in comments, each with the reason.
+        draft: The draft.
+        left_out: Criteria to put into comments, each with the reason.
     """
     return "\n".join(_lines(draft, left_out)) + "\n"
 
@@ -135,7 +135,7 @@ def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iter
 
 
 def scenario_id(draft: Draft) -> str:
-    """Return what the only scenario of a draft is called."""
+    """Return the id of the draft's only scenario."""
     return "alone" if len(draft.files) == 1 else "together"
 
 
@@ -180,7 +180,7 @@ def _comment(text: str, indent: str = "") -> Iterator[str]:
 
 
 def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator[str]:
-    """Yield parameters on the line of their key, or below it where that line would be long."""
+    """Yield parameters on the line of their key, or below it if the line would be too long."""
     line = f"{start} {_value(parameters)}"
     if len(line) <= _LONGEST:
         yield line
@@ -195,7 +195,7 @@ def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator
 
 
 def _value(value: Any) -> str:
-    """Return a value as YAML writes it on one line."""
+    """Format a value as YAML on one line."""
     if isinstance(value, DraftQuantity):
         return value.text
     if isinstance(value, Mapping):
@@ -211,7 +211,7 @@ def _number(value: float) -> str:
     if float(value).is_integer() and abs(value) < 1e15:
         return str(int(value))
     short = f"{value:.6g}"
-    # 32 bits of a float make a long tail that nobody wrote
+    # a 32-bit float has a long tail of digits that nobody wrote
     return short if abs(float(short) - value) <= 1e-7 * max(1.0, abs(value)) else repr(float(value))
 
 
@@ -221,7 +221,7 @@ def _plain(text: str) -> str:
 
 
 def _scalar(text: str) -> str:
-    """Return a sentence as YAML writes it after a key, on one line."""
+    """Format a sentence as a YAML value on one line."""
     risky = re.search(r"[\"'#:{}\[\]&*!|>%@`\\]|^[-?\s]", text) is not None or not text.isprintable()
     return json.dumps(text, ensure_ascii=False) if risky else text
 

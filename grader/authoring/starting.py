@@ -1,4 +1,4 @@
-"""Makes the skeleton of a rubric from a reference: runs it twice, asks about all it did, and keeps what it meets."""
+"""Makes the skeleton of a rubric from a reference: runs it twice, proposes criteria, and keeps those that it meets."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from grader.rubrics.loader import read_rubric
 from grader.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 
 ODOMETRY = "nav_msgs/msg/Odometry"
-#: Time before the first stimulus, so that waiting can be seen too.
+#: Time before the first stimulus, to observe how the nodes wait.
 FIRST_S = 1.0
 #: No message was named.
 NOTHING: Mapping[str, Sequence[Mapping[str, Any]]] = MappingProxyType({})
@@ -38,12 +38,12 @@ _CALLS = 3
 def stimuli_for(
     trace: Trace, duration_s: float, given: Mapping[str, Sequence[Mapping[str, Any]]] = NOTHING
 ) -> tuple[DraftStimulus, ...]:
-    """Return a stimulus for whatever of the nodes waits for somebody else.
+    """Propose stimuli for all endpoints of the nodes that wait for input.
 
     Args:
-        trace: The nodes as they were by themselves.
-        duration_s: How long the scenario will last.
-        given: Topic -> the fields of the messages to send there, where the author named some.
+        trace: Trace of the nodes without stimuli.
+        duration_s: Duration of the scenario.
+        given: Topic -> fields of the messages that the author wants to send.
     """
     return (*_topics(trace, duration_s, given), *_services(trace), *_parameters(trace))
 
@@ -81,7 +81,7 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
 
 
 def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, Any]]) -> DraftStimulus:
-    """Return the messages that the author named, spread over the time there is."""
+    """Spread the author's messages over the available time."""
     period_s = max(0.1, math.floor(10 * (duration_s - FIRST_S) / (len(values) + 1)) / 10)
     period, start = DraftQuantity(f"{min(2.0, period_s):g} s"), DraftQuantity(f"{FIRST_S:g} s")
     sent = {"topic": topic, "type": type_, "values": list(values), "period": period, "start": start}
@@ -105,19 +105,19 @@ def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
         yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: is it to be set as well?")
 
 
-#: Shortest time that tells anything of rates, and leaves room for stimuli.
+#: Shortest duration that is enough to measure rates and to send stimuli.
 SHORTEST_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """A rubric to begin with.
+    """The skeleton of a rubric.
 
     Attributes:
-        text: What its file holds.
-        criteria: How many rows it has; the reference meets all of them.
-        left_out: How many more stand in comments.
-        remarks: What the author should know of the run, one sentence each.
+        text: Content of the file.
+        criteria: Number of criteria; the reference meets all of them.
+        left_out: Number of criteria in comments.
+        remarks: Remarks about the run, one sentence each.
     """
 
     text: str
@@ -127,16 +127,16 @@ class Skeleton:
 
 
 def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", sent: Sequence[str] = ()) -> Skeleton:
-    """Return the skeleton of a rubric for what a reference does.
+    """Make the skeleton of a rubric from the behaviour of a reference.
 
     Args:
         request: The files of the reference, and how to run them.
-        progress: Hears which step begins.
-        id_: Id of the exercise; empty for one made of the first file's name.
+        progress: Called at the start of each step.
+        id_: Id of the exercise; empty to derive it from the name of the first file.
         sent: Messages to send to the reference, as `TOPIC={field: value}`.
 
     Raises:
-        SubmissionError: The reference ends with an exception, or does nothing that could be asked for.
+        SubmissionError: The reference raises an exception, or does nothing that can be checked.
         GraderError: Something that the run needs cannot be used.
     """
     given = read_sent(sent)
@@ -152,12 +152,12 @@ def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", se
         names = ", ".join(draft.files)
         raise SubmissionError(f"{names}: expected a reference that publishes, listens, serves or logs, found none")
     text = rubric_text(replace(draft, criteria=tuple(kept)), left_out)
-    _read(text)  # a mistake of ours is better found here than by the author
+    _read(text)  # find bugs of the grader here, not at the author's
     return Skeleton(text, len(kept), len(left_out), draft.remarks)
 
 
 def read_sent(sent: Sequence[str]) -> dict[str, list[Mapping[str, Any]]]:
-    """Return the fields of the messages to send, by topic; raises GraderError for what is of another form."""
+    """Parse the messages to send, by topic; raises GraderError for invalid ones."""
     given: dict[str, list[Mapping[str, Any]]] = {}
     for text in sent:
         topic, _, fields = text.partition("=")
@@ -178,7 +178,7 @@ def _remarks(trace: Trace) -> Iterator[str]:
 
 
 def _begun(trace: Trace, request: ObserveRequest, id_: str, given: Mapping[str, Sequence[Mapping[str, Any]]]) -> Draft:
-    """Return the draft of what happens to the reference, without a question."""
+    """Return a draft with the scenario of the reference and no criteria."""
     files = tuple(file.name for file in request.files)
     duration_s = request.duration_ns / NS_PER_S
     stimuli = stimuli_for(trace, duration_s, given)
@@ -198,7 +198,7 @@ def _begun(trace: Trace, request: ObserveRequest, id_: str, given: Mapping[str, 
 
 
 def _scenario_of(draft: Draft) -> Scenario:
-    """Return the scenario that a draft's text describes; some question has to stand in it."""
+    """Return the scenario of a draft, which must have at least one criterion to be read."""
     asked = DraftCriterion("any", "Any", "uses_logger", {"process": draft.files[0]}, "any")
     (scenario,) = _read(rubric_text(replace(draft, criteria=(asked,)))).scenarios
     return scenario
@@ -212,7 +212,7 @@ def _read(text: str) -> Exercise:
 
 
 def _window_s(trace: Trace, duration_s: float) -> float:
-    """Return how long every topic was watched from its first message on, in whole seconds."""
+    """Return how long every topic was observed after its first message, in whole seconds."""
     firsts: dict[str, int] = {}
     for message in trace.messages():
         firsts.setdefault(message.topic, message.t_ns)
@@ -223,14 +223,14 @@ def _window_s(trace: Trace, duration_s: float) -> float:
 def _sorted_out(
     draft: Draft, rows: Iterable[DraftCriterion], trace: Trace
 ) -> tuple[list[DraftCriterion], list[tuple[DraftCriterion, str]]]:
-    """Return the rows that the reference meets, and the others with the reason; a row twice asked stays once."""
+    """Split proposed criteria into those that the reference meets and the others, with the reason; drops duplicates."""
     kept: list[DraftCriterion] = []
     left_out: list[tuple[DraftCriterion, str]] = []
     for row in rows:
         ids = {other.id for other in kept}
         if row.id in ids or row.id.removesuffix("_range") + "_random" in ids:
             continue
-        row = replace(row, needs=row.needs if row.needs in ids else "")  # noqa: PLW2901  without what is not asked
+        row = replace(row, needs=row.needs if row.needs in ids else "")  # noqa: PLW2901  without dropped criteria
         reason = _unmet(replace(draft, criteria=(replace(row, needs=""),)), trace)
         if reason:
             left_out.append((row, reason))
@@ -241,7 +241,7 @@ def _sorted_out(
 
 
 def _unmet(draft: Draft, trace: Trace) -> str:
-    """Return why the reference does not meet the only row of a draft; empty if it does."""
+    """Return why the reference does not meet the only criterion of a draft; empty if it does."""
     try:
         (criterion,) = _read(rubric_text(draft)).criteria
         finding = criterion.check.judge(trace)
@@ -253,7 +253,7 @@ def _unmet(draft: Draft, trace: Trace) -> str:
 
 
 def _refuse_broken(trace: Trace, files: Iterable[str]) -> None:
-    """Raise SubmissionError if a process ended otherwise than with code 0."""
+    """Raise SubmissionError if a process crashed or exited with a code other than 0."""
     for fault in trace.faults():
         if fault.exit_code != 0:
             raise SubmissionError(f"{', '.join(files)}: expected a reference that runs, found {fault_sentence(fault)}")

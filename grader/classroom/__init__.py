@@ -1,1 +1,1 @@
-"""A class: who handed in what, each graded in a process of its own, results that stay, and what instructors open."""
+"""Grades a class: finds the submissions, grades each in its own process, stores results, and writes the overview."""

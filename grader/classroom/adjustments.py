@@ -1,4 +1,4 @@
-"""Late days, other scores and what to ignore: decisions of the instructor, from a small YAML file."""
+"""Reads an instructor's adjustments from a YAML file: late days, changed scores, ignored submissions."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ _Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, 
 
 @dataclass(frozen=True, slots=True)
 class Amount:
-    """Points, or a share of the points earned."""
+    """A number of points, or a percentage of the points earned."""
 
     value: Fraction
     percent: bool
 
     def of(self, earned: Fraction) -> Fraction:
-        """Return the points that this is of what was earned."""
+        """Convert to points, given the points earned."""
         return earned * self.value / 100 if self.percent else self.value
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What was decided for one submission.
+    """The instructor's decision about one submission.
 
     Attributes:
-        days_late: Days; each that has begun counts.
-        score: Score instead of that of the grader, late or not; None to leave it.
-        reason: Why.
-        ignore: Why the submission does not count at all; empty if it does.
-        where: Place in the file, for messages.
+        days_late: Late days; a started day counts in full.
+        score: Replaces the grader's score, whether late or not; None to keep it.
+        reason: The reason.
+        ignore: Why the submission does not count at all; empty if it counts.
+        where: Position in the file, for messages.
     """
 
     days_late: Fraction = Fraction(0)
@@ -53,12 +53,12 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Adjustments:
-    """What a file of adjustments says.
+    """The contents of an adjustments file.
 
     Attributes:
-        per_day: What a late day costs; None if nothing.
-        at_most: What all late days together cost at most; None for all that was earned.
-        students: Name, user name, address or number -> decision.
+        per_day: Penalty for each late day; None for no penalty.
+        at_most: Largest penalty for all late days together; None for all points earned.
+        students: Name, user name, email address or number -> decision.
     """
 
     per_day: Amount | None = None
@@ -68,15 +68,15 @@ class Adjustments:
 
 @dataclass(frozen=True, slots=True)
 class Adjusted:
-    """A score with all that was decided about it; the raw one stays beside it.
+    """A score after adjustments, together with the raw score.
 
     Attributes:
-        raw: Points of the grader; None if there are none, or they are not final.
-        score: What counts in the end; None for no score.
+        raw: The grader's points; None if there are none or they are not final.
+        score: The score that counts; None for no score.
         days_late: Late days.
-        penalty: Points taken off for them.
-        override: The score that was set instead; None if none was.
-        reason: Why, or why the submission is ignored.
+        penalty: Points deducted for late days.
+        override: The score set by the instructor; None if not set.
+        reason: The reason for the change, or for ignoring the submission.
         ignored: Whether the submission does not count.
     """
 
@@ -90,17 +90,17 @@ class Adjusted:
 
     @property
     def changed(self) -> bool:
-        """Whether anything was decided that changes the score."""
+        """Whether a decision changes the score."""
         return self.ignored or self.override is not None or self.penalty > 0
 
 
 def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adjusted:
-    """Return what a score becomes; late days cost each begun day, and never more than was earned.
+    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned.
 
     Args:
-        raw: Points of the grader; None if there are none.
-        decision: What was decided for this submission.
-        rules: What late days cost.
+        raw: The grader's points; None if there are none.
+        decision: The decision about this submission.
+        rules: The penalties for late days.
     """
     penalty = Fraction(0)
     if raw is not None and rules.per_day is not None:
@@ -140,10 +140,10 @@ class _File(BaseModel):
 
 
 def read_adjustments(path: Path) -> Adjustments:
-    """Return what a file says.
+    """Read an adjustments file.
 
     Raises:
-        ClassError: It cannot be read, or something in it has no meaning; every mistake is told with its place.
+        ClassError: The file cannot be read or has mistakes; the message names the first one and its position.
     """
     tree = _tree(path)
     try:
@@ -179,7 +179,7 @@ def _refusal(path: Path, mistakes: list[Mistake]) -> ClassError:
 
 
 def _without_reason(read: _File, tree: YamlTree) -> list[Mistake]:
-    """Return a mistake for each score that was set without a word."""
+    """Return a mistake for each score that was set without a reason."""
     return [
         tree.keys["students", name].mistake("expected a `reason` for the `score`, found none")
         for name, student in read.students.items()
@@ -210,6 +210,6 @@ def _decision(name: str, student: _Student, path: Path, tree: YamlTree) -> Decis
 
 
 def unknown_student(decision: Decision, name: str, known: list[str]) -> ClassError:
-    """Return what to say where a file names somebody who is not in the class."""
+    """Build the error for a decision about somebody who is not in the class."""
     message = f"{decision.where}: expected a submission or a person of the class, found `{name[:60]}`"
     return ClassError(message, nearest(name, known))

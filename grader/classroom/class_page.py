@@ -1,4 +1,4 @@
-"""The page of a class as plain values, without a folder of this machine in them."""
+"""Builds the contents of the class page, without absolute paths of this machine."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-from grader.classroom.cache_key import Conditions
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
 from grader.classroom.roster import Person, fold_name
+from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 
@@ -22,14 +22,14 @@ class RunOfClass:
 
     Attributes:
         conditions: What the results depend on.
-        title: What the class is called.
+        title: Title of the class.
         written: When the run ended, as text.
-        jobs: Submissions at a time.
+        jobs: Submissions graded in parallel.
         took_s: How long grading took.
-        graded: Submissions that were graded now.
-        kept: Submissions whose results were there already.
-        stopped: Whether it was stopped before everybody was graded.
-        folders: Folders of this machine, which no page names.
+        graded: Number of submissions graded in this run.
+        kept: Number of submissions that already had results.
+        stopped: Whether the run was stopped before all submissions were graded.
+        folders: Absolute paths of this machine, to be removed from the page.
     """
 
     conditions: Conditions
@@ -44,12 +44,12 @@ class RunOfClass:
 
 
 def title_of(sources: Sequence[Path]) -> str:
-    """Return what a class is called: the names of its sources, without the folders that they lie in."""
+    """Make the title of a class from the names of its sources, without their parent folders."""
     return ", ".join(source.resolve().name for source in sources)
 
 
 def folders_of(paths: Sequence[Path]) -> tuple[str, ...]:
-    """Return folders as they may stand in messages, the longest first."""
+    """Return the spellings of folders that messages may contain, the longest first."""
     found = {str(path) for path in paths} | {str(path.resolve()) for path in paths}
     return tuple(sorted((folder for folder in found if folder.startswith("/")), key=lambda f: (-len(f), f)))
 
@@ -58,10 +58,10 @@ _MIB = 1 << 20
 
 
 def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
-    """Return what the header of the page says.
+    """Build the header of the page.
 
     Args:
-        book: The class.
+        book: The gradebook.
         run: The run that writes the page.
     """
     reports = [row.report for row in book.rows if row.report is not None]
@@ -111,14 +111,14 @@ def _clock(asked: str, reports: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _cost(book: Gradebook) -> str:
-    used = [row.standing for row in book.rows if row.standing is not None]
-    processor = sum(standing.usage.get("processor_s", 0.0) for standing in used)
-    peak = max((standing.usage.get("peak_bytes", 0.0) for standing in used), default=0.0)
+    used = [row.result for row in book.rows if row.result is not None]
+    processor = sum(status.usage.get("processor_s", 0.0) for status in used)
+    peak = max((status.usage.get("peak_bytes", 0.0) for status in used), default=0.0)
     return f"{processor:.1f} s of processor time in all, at most {peak / _MIB:.0f} MiB in one process"
 
 
 def _counted(texts: Iterable[str]) -> str:
-    """Return the different texts; where there are several, with how many have each."""
+    """Join the distinct texts; if there are several, with a count for each."""
     counts = Counter(text for text in texts if text)
     if len(counts) <= 1:
         return next(iter(counts), "")
@@ -134,18 +134,18 @@ _TONES = {
     Status.MISSING: RowTone.NOTHING,
 }
 _NOT_GRADED = (Status.REFUSED, Status.FAILED, Status.NOT_RUN)
-# A path of three parts or more in the problem of a submission is one of this machine; ROS names are shorter.
+# A path with three or more parts in a problem is a path of this machine; ROS names are shorter.
 _PATH = re.compile(r"(?<![\w.])/(?:[^/\s:'\"`]+/){2,}([^/\s:'\"`]+)")
 _ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not come back"}
 
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
-    """Return the page of a class.
+    """Build the page of a class.
 
     Args:
-        book: The class.
-        run: The run that writes it.
-        links: Other pages in the folder for results.
+        book: The gradebook.
+        run: The run that writes the page.
+        links: Other pages in the results folder.
     """
     rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
     students = tuple(_student(row, run) for row in rows)
@@ -173,7 +173,7 @@ def _student(row: Row, run: RunOfClass) -> StudentRow:
 
 
 def _name(row: Row) -> str:
-    """Return what to call a row; an address that only a file name told is none."""
+    """Return the display name of a row; an email address known only from a file name is not used."""
     person = row.person
     unsure = person is not None and person.row is None and person.name == person.email
     return row.label if unsure else row.shown_name
@@ -182,10 +182,10 @@ def _name(row: Row) -> str:
 def _also(row: Row) -> Iterator[str]:
     yield row.name
     if row.person is not None:
-        yield from _told_by_roster(row.person)
+        yield from _roster_ids(row.person)
 
 
-def _told_by_roster(person: Person) -> tuple[str, ...]:
+def _roster_ids(person: Person) -> tuple[str, ...]:
     return (person.user, person.id, person.email if person.row is not None else "")
 
 
@@ -205,7 +205,7 @@ def _adjustments(row: Row) -> Iterator[str]:
 
 
 def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator[Listing]:
-    """Yield all lists, empty ones too."""
+    """Yield all lists, including empty ones."""
     undecided = [(k, row) for k, row in enumerate(rows) if row.status is Status.UNDECIDED]
     yield Listing(
         "undecided",
@@ -281,7 +281,7 @@ def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
 
 
 def _problem(row: Row, run: RunOfClass) -> str:
-    hint = row.standing.hint if row.standing is not None else ""
+    hint = row.result.hint if row.result is not None else ""
     said = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
     return f": {'; '.join(said)}" if said else ""
 
@@ -301,11 +301,11 @@ def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:
 
 
 def without_folders(text: str, folders: Sequence[str]) -> str:
-    """Return a sentence in which paths of this machine begin where the class begins.
+    """Make paths in a sentence relative to the class.
 
     Args:
         text: A sentence.
-        folders: Absolute paths that lead to it, the longest first; of any other path the last part is left.
+        folders: Absolute paths of the class, the longest first; other paths are cut to their last part.
     """
     for folder in folders:
         text = text.replace(f"{folder}/", "").replace(folder, folder.rsplit("/", 1)[-1])

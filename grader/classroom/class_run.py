@@ -1,4 +1,4 @@
-"""A class graded from end to end: the visible list of stages."""
+"""Grades a class from end to end, and compares its submissions if requested."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import json
 import os
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -16,29 +17,31 @@ from typing import Any
 
 import grader
 from grader.app.grade import read_exercises, read_recording
-from grader.app.reproducing import recording_digest
-from grader.app.request import GradeRequest
+from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
-from grader.classroom.cache_key import Conditions
 from grader.classroom.class_page import RunOfClass, folders_of, title_of
-from grader.classroom.gradebook import Gradebook, ReportData, decisions_for, make_gradebook
-from grader.classroom.grading import ClassRun
+from grader.classroom.gradebook import Gradebook, ReportData, Row, decisions_for, make_gradebook
+from grader.classroom.grading import ClassRun, own_conditions, refuse_without_key, with_known_students
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
-from grader.classroom.outputs import CLASS, class_files, exports
+from grader.classroom.outputs import CLASS, Graded, class_files, exports, summary_json
 from grader.classroom.request import ClassRequest, digest_of, due_now
 from grader.classroom.roster import RosterMatch, match, read_roster
-from grader.classroom.similar import compare_class, link_of_before
-from grader.classroom.store import SEED_KEY, Store, open_store
-from grader.classroom.summary import Graded, summary_json
-from grader.classroom.variants import own_conditions, refuse_without_key, with_known_students
+from grader.classroom.store import SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
 from grader.classroom.worker import GRADESCOPE, HANDED_BACK, REPORT
 from grader.core.errors import GraderError, HarnessError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
+from grader.reporting.class_page.contents import PageLink
 from grader.rubrics.variants import First
+from grader.similarity.finding import find_similar, read_programs
+from grader.similarity.library import ComparedProgram, Handed, Similar
+from grader.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
+
+SIMILARITY_FOLDER, SIMILARITY_TABLE = "similarity", "similarity.csv"
+_SIMILARITY_TITLE = "Similar submissions"
 
 
 def grade_class(
@@ -47,16 +50,16 @@ def grade_class(
     warn: Callable[[str], None],
     make_scheduler: MakeScheduler = LocalScheduler,
 ) -> Graded:
-    """Grade a class, or go on with it.
+    """Grade a class, or resume grading it.
 
     Args:
-        course: What is to be graded, and how.
-        watcher: Hears how it gets on.
-        warn: Hears what an instructor must know before it begins.
-        make_scheduler: Makes what grades so many submissions at a time.
+        course: What to grade, and how.
+        watcher: Shows the progress.
+        warn: Called with warnings for the instructor before grading begins.
+        make_scheduler: Makes the scheduler for a number of parallel submissions.
 
     Raises:
-        GraderError: Something that grading needs cannot be used; its class says who must act.
+        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
     """
     exercises = read_exercises(replace(course.grading, draw=First()), course.sources)
     refuse_without_key(course, exercises)
@@ -68,11 +71,11 @@ def grade_class(
         matching = match(intake.entries, roster)
         intake = replace(intake, entries=with_known_students(intake.entries, matching.people, exercises))
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
-        decisions_for(intake.entries, matching, adjustments)  # a slip in it is told before hours of grading
+        decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         with scratch_folder() as scratch:
             digests = {entry.name: _digest(entry, scratch) for entry in intake.entries}
         own = _seeded(own, digests, course)
-        # Where a digest is not known, grading it, in a process of its own, will say why.
+        # If a digest is unknown, grading the submission in its own process will report why.
         keys = {name: own[name].key(digest) if digest else "" for name, digest in digests.items()}
         due = due_now(store, intake.entries, keys, course.rerun)
         before = len(intake.entries) - len(due)
@@ -84,14 +87,14 @@ def grade_class(
             not_replaced = run.grade(due, warn, make_scheduler)
             graded = _compared(Graded(book(), len(due), before, not_replaced), intake, course, store)
         except (KeyboardInterrupt, HarnessError):
-            with suppress(GraderError):  # what stopped the run says more
+            with suppress(GraderError):  # the error that stopped the run is more useful
                 _write(class_files(book(), {}, _run(course, conditions, began), standalone=course.standalone), store)
             raise
         return _written(graded, _run(course, conditions, began, graded), store, course)
 
 
 def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Conditions:
-    """Return what all results of a class depend on; raises RecordingError for a recording that cannot be used."""
+    """Collect what all results of a class depend on; raises RecordingError for an unusable recording."""
     odometry = read_recording(grading, exercises)
     return Conditions(
         grader=grader.__version__,
@@ -112,7 +115,7 @@ def _digest(entry: HandedInEntry, scratch: Path) -> str:
 
 
 def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: ClassRequest) -> dict[str, Conditions]:
-    """Return the conditions with the seed of each submission: what grades it is told the seed, never the key."""
+    """Add the seed of each submission to its conditions: the grading process gets the seed, never the key."""
     if course.grading.seed is not None:
         return dict(own)
     key = course.seed_key or kept_key(course.results / SEED_KEY)
@@ -136,15 +139,15 @@ def _book(
 
 
 def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store) -> Graded:
-    """Return the class with what is said of similar submissions, if that was asked for."""
+    """Compare the submissions if requested, and add the result to the class."""
     if course.given is None:
-        return replace(graded, links=link_of_before(store))
+        return replace(graded, links=link_of_earlier_run(store))
     found = compare_class(intake.entries, graded.book.rows, course.given, store)
     return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
 
 
 def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
-    """Return what belongs to this run alone; without what was graded it is one that was stopped."""
+    """Describe this run; it counts as stopped if there is no result."""
     return RunOfClass(
         conditions=conditions,
         title=title_of(course.sources),
@@ -159,7 +162,7 @@ def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: G
 
 
 def _written(graded: Graded, run: RunOfClass, store: Store, course: ClassRequest) -> Graded:
-    """Write what is made for the whole class, and return the class with what was written."""
+    """Write the files for the whole class, and return the class with the list of files."""
     wanted = course.platforms
     names = [row.name for row in graded.book.rows if row.report is not None] if wanted.gradescope else []
     results = {name: text for name in names if (text := _text(store.place(name) / GRADESCOPE))}
@@ -189,3 +192,74 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """The result of comparing a class: a sentence for the summary, the files to open, and a link to the page."""
+
+    remark: str
+    files: tuple[Path, ...]
+    link: PageLink
+
+
+def compare_class(
+    entries: Sequence[HandedInEntry], rows: Sequence[Row], given: Sequence[ComparedProgram], store: Store
+) -> Compared:
+    """Compare all submissions, and write the similarity pages and table; no score depends on them.
+
+    Args:
+        entries: The submissions.
+        rows: Their rows in the gradebook.
+        given: The files handed out to everyone.
+        store: Receives the pages.
+
+    Raises:
+        HarnessError: The pages cannot be written.
+    """
+    row_of = {row.name: row for row in rows}
+    handed = [_handed(entry, row_of.get(entry.name)) for entry in entries]
+    similar = find_similar(_with_distinct_labels(handed), given)
+    pages = [page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))]
+    for rank, name in enumerate(pages):
+        store.write(f"{SIMILARITY_FOLDER}/{name}", render_pair(similar, rank).encode())
+    table = store.write(SIMILARITY_TABLE, render_table(similar).encode())
+    overview = store.write(f"{SIMILARITY_FOLDER}/{OVERVIEW}", render_overview(similar).encode())
+    for old in (store.folder / SIMILARITY_FOLDER).glob("pair-*.html"):
+        if old.name not in pages:
+            old.unlink(missing_ok=True)
+    found = _counted(similar)
+    return Compared(f"similar submissions: {found}", (table, overview), _link(found))
+
+
+def link_of_earlier_run(store: Store) -> tuple[PageLink, ...]:
+    """Return the link to the similarity page of an earlier run, if there is one."""
+    return (_link("of an earlier run"),) if (store.folder / SIMILARITY_FOLDER / OVERVIEW).is_file() else ()
+
+
+def _link(note: str) -> PageLink:
+    return PageLink(_SIMILARITY_TITLE, f"{SIMILARITY_FOLDER}/{OVERVIEW}", note)
+
+
+def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
+    programs, passed_over = ((), ()) if entry.problem else read_programs(entry.path)
+    return Handed(
+        name=entry.name,
+        label=entry.label if row is None else row.shown_name,
+        programs=programs,
+        passed_over=("it cannot be used",) if entry.problem else passed_over,
+        own=() if row is None else row.twin_of,
+        reported=row is not None and row.report is not None,
+    )
+
+
+def _with_distinct_labels(handed: Sequence[Handed]) -> list[Handed]:
+    """Add the name of the submission to labels that occur more than once."""
+    count = Counter(one.label for one in handed)
+    return [replace(one, label=f"{one.label} ({one.name})") if count[one.label] > 1 else one for one in handed]
+
+
+def _counted(similar: Similar) -> str:
+    pairs = f"{len(similar.pairs)} pair{'' if len(similar.pairs) == 1 else 's'}"
+    same = len(similar.same)
+    return f"{pairs}, {same} file{'' if same == 1 else 's'} handed in by several" if same else pairs

@@ -1,4 +1,4 @@
-"""Downloads of a whole class from a platform: how they name submissions, and how they are unpacked."""
+"""Unpacks class downloads of platforms, and interprets the names of their submissions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from grader.submissions.archives import (
 )
 from grader.submissions.collected import collision, is_skipped, listed, name_problem, shown, why_skipped
 
-#: Groups that a pattern may have; `file` makes several files of one student one submission.
+#: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")
 FOLDERS, AUTO = "folders", "auto"
 GITHUB, CLASSROOM50 = "github-classroom", "classroom50"
@@ -41,22 +41,22 @@ PATTERNS: Mapping[str, str] = {
     MOODLE: r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?",
     CANVAS: r"(?P<name>[^_]+)_(?:(?P<late>LATE)_)?(?P<id>\d+)_\d+_(?P<file>.+)",
 }
-#: All layouts that can be named.
+#: All layouts that can be requested.
 LAYOUTS = (AUTO, FOLDERS, GITHUB, CLASSROOM50, MOODLE, CANVAS)
-# Canvas puts a number behind the name of a file that was handed in again.
+# Canvas appends a number to the name of a resubmitted file.
 _HANDED_IN_AGAIN = re.compile(r"-\d+(?=\.[^.]+$)")
 _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
 
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """What the name of a folder or file in a download says.
+    """The information in the name of a folder or file in a download.
 
     Attributes:
-        identity: Group -> what it matched.
-        file: Name that the student's file had; empty if this is the whole submission.
-        late: Whether the platform says that it came late.
-        recognised: Whether the layout knows such names.
+        identity: Group -> matched text.
+        file: Original name of the student's file; empty if this is the complete submission.
+        late: Whether the platform marked it as late.
+        recognised: Whether the name fits the layout.
     """
 
     identity: Mapping[str, str]
@@ -71,8 +71,8 @@ class DownloadLayout:
 
     Attributes:
         name: One of `LAYOUTS`, or `pattern`.
-        pattern: What a name looks like; None where a name is simply that of the student.
-        prefix: What comes before the user's name in the names of clones.
+        pattern: Regular expression for names; None if the name identifies the student by itself.
+        prefix: Prefix of the user name in the names of cloned repositories.
     """
 
     name: str
@@ -80,7 +80,7 @@ class DownloadLayout:
     prefix: str = ""
 
     def read(self, label: str) -> Named:
-        """Return what the name of a folder, or of a file with its ending, says."""
+        """Interpret the name of a folder, or of a file including its suffix."""
         if self.name == FOLDERS:
             return Named({})
         if self.pattern is None:
@@ -97,13 +97,13 @@ class DownloadLayout:
 
 
 def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
-    """Return the layout of a download.
+    """Determine the layout of a download.
 
     Args:
         wanted: One of `LAYOUTS`.
-        pattern: A regular expression of the user's own; empty if there is none. It goes before `wanted`.
-        place: Name of the folder that everything lies in.
-        labels: Names in it.
+        pattern: The user's regular expression, which overrides `wanted`; empty if there is none.
+        place: Name of the top folder.
+        labels: Names in that folder.
 
     Raises:
         ClassError: The regular expression cannot be used.
@@ -139,26 +139,26 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 
 def _slug(place: str, labels: Sequence[str]) -> str:
-    """Return `hello-` for a folder `hello-submissions` in which every name begins like that."""
+    """Return `hello-` for a folder `hello-submissions` in which every name has this prefix."""
     match = _FOLDER_OF_CLONES.fullmatch(place)
     prefix = f"{match['slug']}-" if match else ""
     return prefix if prefix and labels and all(label.startswith(prefix) for label in labels) else ""
 
 
 def _common(labels: Sequence[str]) -> str:
-    """Return what all names begin with, up to a hyphen."""
+    """Return the common prefix of all names, up to its last hyphen."""
     if len(labels) < 2:
         return ""
     shared = os.path.commonprefix(list(labels))
     return shared[: shared.rfind("-") + 1]
 
 
-#: Largest download, most that it unpacks to, on disk and for a compressed tar in memory, and most entries in it.
+#: Largest download, its largest unpacked size (on disk; in memory for a compressed tar), and most entries.
 MAX_DOWNLOAD_BYTES = 1 << 30
 MAX_UNPACKED_BYTES = 4 << 30
 MAX_TAR_BYTES = 2 << 30
 MAX_ENTRIES = 300_000
-#: Most that one student's part of it unpacks to; what it may hold in the end is for grading to say.
+#: Largest unpacked size of one student's part; grading checks its own limits later.
 MAX_PART_BYTES = 2 * MAX_ARCHIVE_BYTES
 
 _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
@@ -166,12 +166,12 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 @dataclass(slots=True)
 class Unpacked:
-    """A download that lies in a folder now.
+    """An unpacked download.
 
     Attributes:
-        folder: Where; a folder around all submissions is left behind.
+        folder: The folder with the submissions, below a folder around all of them if there is one.
         refused: Name of a folder or file in it -> why it was not unpacked.
-        strays: Names that lead nowhere in the download, and why.
+        strays: Entries that belong to no submission, with the reason.
     """
 
     folder: Path
@@ -180,14 +180,14 @@ class Unpacked:
 
 
 def unpack_download(archive: Path, into: Path) -> Unpacked:
-    """Unpack a download, unless the same one was unpacked before.
+    """Unpack a download, unless it was unpacked before.
 
     Args:
         archive: A zip or tar file, compressed or not.
-        into: The folder for the copy, which is ours and need not exist; a note is kept beside it.
+        into: Destination folder, owned by the grader; it need not exist. A note is stored beside it.
 
     Raises:
-        ClassError: The archive cannot be read as a whole.
+        ClassError: The archive cannot be read.
         HarnessError: The copy cannot be written.
     """
     data = _read(archive)
@@ -224,7 +224,7 @@ def _read(archive: Path) -> bytes:
 
 
 def _known(note: Path, digest: str, into: Path) -> Unpacked | None:
-    """Return what was unpacked before, if it was the same download."""
+    """Return the earlier result if the same download was unpacked before."""
     try:
         kept = json.loads(note.read_bytes())
         found = Unpacked(into / kept["inner"], dict(kept["refused"]), list(kept["strays"]))
@@ -251,7 +251,7 @@ def _members(archive: Path, data: bytes) -> list[Member]:
 
 
 def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
-    """Write what may be written, each student's part whole or not at all."""
+    """Write the acceptable entries; each student's part completely or not at all."""
     named = [(member.name.removeprefix("./"), member) for member in members]
     around = _around(name for name, member in named if member.kind == FILE)
     top = into / around
@@ -282,9 +282,9 @@ def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
 
 
 def _around(files: Iterable[str]) -> str:
-    """Return the folder that all submissions of a download lie in, with a slash; empty if there is none.
+    """Return the folder around all submissions of a download, with a slash; empty if there is none.
 
-    A folder with several folders or archives, and no program of its own, is nobody's submission.
+    A folder with several folders or archives, and no program directly in it, is not itself a submission.
     """
     paths = [name.split("/") for name in files if not is_skipped(name)]
     if not paths or len({path[0] for path in paths}) != 1 or name_problem(paths[0][0]):
@@ -302,7 +302,7 @@ def _remove(path: Path) -> None:
 
 
 def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tuple[str, int]:
-    """Write what belongs to one student; return why it cannot be used, if so, and how many bytes were read."""
+    """Write the files of one student; return the problem, empty if there is none, and the number of bytes read."""
     problem = _name_problem(inside)
     if problem:
         return problem, 0

@@ -1,4 +1,4 @@
-"""The gradebook of a class: one row for each submission and each person without one, also as CSV."""
+"""The gradebook of a class, with a row for each submission and each person without one; also as CSV."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ReportData = Mapping[str, Any]
 
 
 class Status(str, Enum):
-    """How a row stands; the first four are the states of a result."""
+    """Status of a row; the first four are the states of a result."""
 
     GRADED = "graded"
     UNDECIDED = "undecided"
@@ -37,18 +37,18 @@ class Row:
     """One submission, or one person without one.
 
     Attributes:
-        name: Name of the entry, under which its results lie; empty for a person without a submission.
-        label: As the source calls it.
-        person: Who handed it in; None if nobody on the roster goes with it.
+        name: Name of the entry and of its results folder; empty for a person without a submission.
+        label: Its name in the source.
+        person: Who handed it in; None if nobody on the roster matches.
         status: See Status.
-        problem: Why there is no report, or why the last attempt came to nothing; may be empty.
-        standing: What lies in the folder for results; None if there is nothing.
+        problem: Why there is no report, or why the last attempt failed; may be empty.
+        result: The stored result; None if there is nothing.
         report: Its report; None if there is none.
-        handed_back: Its report as far as students may see it; None if there is none.
-        adjusted: The score, with what was decided about it.
+        handed_back: The report with what students may see; None if there is none.
+        adjusted: The score after the instructor's decisions.
         marked_late: Whether the platform marked it as late.
-        outdated: Whether the result is of other files or another rubric than those of now.
-        twin_of: Names of other submissions of the same person.
+        outdated: Whether the result belongs to different files or another rubric than the current ones.
+        twin_of: Names of other submissions by the same person.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Row:
     person: Person | None
     status: Status
     problem: str = ""
-    standing: ResultStatus | None = None
+    result: ResultStatus | None = None
     report: ReportData | None = None
     handed_back: ReportData | None = None
     adjusted: Adjusted = field(default_factory=Adjusted)
@@ -66,26 +66,26 @@ class Row:
 
     @property
     def shown_name(self) -> str:
-        """The person's name, or what the submission is called."""
+        """The person's name, or the label of the submission."""
         return self.person.name if self.person is not None else self.label
 
     @property
     def max_score(self) -> Fraction | None:
-        """Points to be had; None without a report."""
-        return None if self.standing is None or self.report is None else exactly(self.standing.max_score)
+        """Maximum points; None without a report."""
+        return None if self.result is None or self.report is None else exactly(self.result.max_score)
 
 
 @dataclass(frozen=True, slots=True)
 class Gradebook:
-    """A class.
+    """The gradebook of a class.
 
     Attributes:
         rows: Submissions by name, then people without one.
-        matching: Who could not be matched.
-        strays: What in the sources is no submission.
-        foreign: Names of results that belong to no submission of now.
-        layouts: Source and layout of each.
-        remarks: Sentences that an instructor must know.
+        matching: How submissions match the roster.
+        strays: Entries of the sources that are not submissions.
+        foreign: Names of results that belong to no current submission.
+        layouts: Each source with its layout.
+        remarks: Remarks for the instructor.
     """
 
     rows: tuple[Row, ...]
@@ -96,12 +96,12 @@ class Gradebook:
     remarks: tuple[str, ...] = ()
 
     def count(self, status: Status) -> int:
-        """Return how many rows stand like this."""
+        """Count the rows with a status."""
         return sum(row.status is status for row in self.rows)
 
     @property
     def to_export(self) -> tuple[Row, ...]:
-        """Rows with a score for a person of whom only one submission counts: what platforms may be told."""
+        """Rows to export to platforms: those with a score and a person, and only one submission that counts."""
         scored = [row for row in self.rows if row.adjusted.score is not None and row.person is not None]
         count = Counter(id(row.person) for row in scored)
         twins = {row.name for row in scored if any(t in {r.name for r in scored} for t in row.twin_of)}
@@ -109,11 +109,11 @@ class Gradebook:
 
 
 def exactly(number: float) -> Fraction:
-    """Return a score of a report, which has at most six digits after the point, as what it was written as."""
+    """Convert a score from a report, which has at most six decimals, to the exact fraction."""
     return Fraction(str(round(number, 6)))
 
 
-def make_gradebook(  # noqa: PLR0913  each comes from another place
+def make_gradebook(  # noqa: PLR0913  each comes from a different source
     intake: Intake,
     matching: RosterMatch,
     adjustments: Adjustments,
@@ -124,20 +124,20 @@ def make_gradebook(  # noqa: PLR0913  each comes from another place
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
 ) -> Gradebook:
-    """Put a class together.
+    """Assemble the gradebook.
 
     Args:
         intake: The submissions.
-        matching: Whose they are.
-        adjustments: What was decided.
-        kept: Name -> what lies in the folder for results.
-        keys: Name -> what the key of a result of now is; empty if that is not known.
+        matching: How they match the roster.
+        adjustments: The instructor's decisions.
+        kept: Name -> stored results.
+        keys: Name -> key that a current result has; empty if unknown.
         report_of: Reads the report of a submission.
-        handed_back_of: Reads it as far as students may see it.
-        foreign: Names of results of nobody.
+        handed_back_of: Reads the report with what students may see.
+        foreign: Names of results that belong to no submission.
 
     Raises:
-        ClassError: A decision names nobody of this class.
+        ClassError: A decision names somebody who is not in this class.
     """
     decisions = decisions_for(intake.entries, matching, adjustments)
     twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}
@@ -161,7 +161,7 @@ def make_gradebook(  # noqa: PLR0913  each comes from another place
 def decisions_for(
     entries: Sequence[HandedInEntry], matching: RosterMatch, adjustments: Adjustments
 ) -> dict[str, Decision]:
-    """Return name of an entry -> what was decided; raises ClassError for a decision about nobody of this class."""
+    """Return name of an entry -> decision; raises ClassError for a decision about somebody outside of the class."""
     found: dict[str, Decision] = {}
     for who, decision in adjustments.students.items():
         meant = [entry.name for entry in entries if fold_handle(who) in _called(entry, matching.people.get(entry.name))]
@@ -182,8 +182,8 @@ def _handles(person: Person) -> set[str]:
     return {*person.handles, *(fold_handle(t) for t in (person.name, person.user, person.email, person.id) if t)}
 
 
-def _has_report(standing: ResultStatus | None) -> bool:
-    return standing is not None and standing.state in (State.GRADED, State.UNDECIDED)
+def _has_report(status: ResultStatus | None) -> bool:
+    return status is not None and status.state in (State.GRADED, State.UNDECIDED)
 
 
 def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: ReportData | None, key: str) -> Row:
@@ -195,7 +195,7 @@ def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: Report
         person=matching.people.get(entry.name),
         status=Status(result.state.value) if result is not None and known else Status.NOT_RUN,
         problem="" if last is None else last.problem,
-        standing=result,
+        result=result,
         report=report,
         marked_late=entry.late,
         outdated=result is not None and bool(key) and result.state is not State.FAILED and result.key != key,
@@ -203,7 +203,7 @@ def _row(entry: HandedInEntry, matching: RosterMatch, kept: Kept, report: Report
 
 
 def _missing(person: Person, adjustments: Adjustments) -> Row:
-    """Return the row of somebody who handed in nothing, who may have been given a score all the same."""
+    """Return the row of a person without a submission, who may still have been given a score."""
     called = _handles(person)
     decision = next((d for who, d in adjustments.students.items() if fold_handle(who) in called), Decision())
     return Row("", person.name, person, Status.MISSING, adjusted=adjust(None, decision, adjustments))
@@ -230,14 +230,14 @@ _TEXT_LIMIT = 2_000
 
 
 def render_gradebook(book: Gradebook) -> str:
-    """Return the gradebook: one row for everybody, then points by exercise and criterion."""
-    exercises, criteria = _asked(book.rows)
+    """Render the gradebook as CSV: the columns of `COLUMNS`, then the points by exercise and criterion."""
+    exercises, criteria = _exercises_and_criteria(book.rows)
     header = [*COLUMNS, *exercises, *(f"{e}/{c}" for e, c in criteria)]
     return table(header, (_cells(row, exercises, criteria) for row in book.rows))
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return CSV as spreadsheets and platforms read it; the cells have been made safe before."""
+    """Render CSV for spreadsheets and platforms; the cells must already be safe."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(header)
@@ -246,7 +246,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def number(value: Fraction | float | None) -> str:
-    """Return points as digits; nothing where there are none."""
+    """Format points; None becomes an empty text."""
     if value is None:
         return ""
     rounded = round(float(value), 6)
@@ -254,12 +254,12 @@ def number(value: Fraction | float | None) -> str:
 
 
 def text_cell(text: str) -> str:
-    """Return foreign text for a cell: one line, and no formula."""
+    """Make untrusted text safe for a cell: one line, and no formula."""
     return csv_cell(text, limit=_TEXT_LIMIT)
 
 
 def remarks(row: Row) -> list[str]:
-    """Return what somebody who reads this row must know."""
+    """Return the remarks about a row."""
     found = [shown(row.problem, limit=500)] if row.problem else []
     if row.outdated:
         found.append("the result is of other files or of another rubric than now")
@@ -296,8 +296,8 @@ def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str
     ]
 
 
-def _asked(rows: Iterable[Row]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Return all exercises and criteria that occur, in the order of the reports."""
+def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[str, str]]]:
+    """Return all exercises and criteria of the rows, in the order of the reports."""
     exercises: dict[str, None] = {}
     criteria: dict[tuple[str, str], None] = {}
     for row in rows:
@@ -312,11 +312,11 @@ def _points(report: ReportData | None, exercises: Sequence[str], criteria: Seque
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
     return [
         *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
-        *("" if pair not in found or _open(found[pair]) else number(found[pair]["score"]) for pair in criteria),
+        *("" if pair not in found or _is_undecided(found[pair]) else number(found[pair]["score"]) for pair in criteria),
     ]
 
 
-def _open(criterion: Mapping[str, Any]) -> bool:
+def _is_undecided(criterion: Mapping[str, Any]) -> bool:
     return bool(criterion["outcome"] == "undecided")
 
 

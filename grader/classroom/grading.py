@@ -1,4 +1,4 @@
-"""Grades the submissions of a class that are due, and takes in each result when it is ready."""
+"""Grades the submissions of a class that are due, each with the variant of its student, and stores the results."""
 
 from __future__ import annotations
 
@@ -6,28 +6,34 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.classroom.cache_key import Conditions, unusable_digest
+from grader.app.grade import read_exercises
+from grader.app.seeds import ByKey, checked, drawn, read_key
 from grader.classroom.intake import HandedInEntry
 from grader.classroom.local import MakeScheduler, Task
 from grader.classroom.request import CHANGED, ClassRequest
-from grader.classroom.store import ResultStatus, State, Store
+from grader.classroom.roster import Person
+from grader.classroom.store import Conditions, ResultStatus, State, Store, unusable_digest
 from grader.classroom.watching import Watcher
-from grader.core.errors import HarnessError, SubmissionError
+from grader.core.errors import ClassError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
 from grader.execution.supervisor import MARGIN_S, TRIES
 from grader.reporting.html.assets import shared_assets
 
-#: Less room than this, where results or scratch files go, and nothing can be graded.
+#: Free disk space below which nothing can be graded, for results and temporary files.
 LEAST_FREE_BYTES = 4 << 20
-#: Seconds that an attempt may take beyond what its recordings may.
+#: Seconds that an attempt may take in addition to the limits of its recordings.
 _BEYOND_S = 300.0
+_NOBODY = "whose variant it is to be graded by is not clear: nobody on the roster goes with it for sure"
+_NO_ID = (
+    "whose variant it is to be graded by is not clear: the roster has no number, user name or address of this person"
+)
 
 
 def deadline_s(budget_s: float) -> float:
-    """Return the real time after which grading one submission is given up: every limit inside has passed by then."""
+    """Return the real time after which an attempt is killed; all its inner limits have expired by then."""
     return budget_s + TRIES * MARGIN_S + _BEYOND_S
 
 
@@ -36,11 +42,11 @@ class ClassRun:
     """One run of the command over a class.
 
     Attributes:
-        course: What was asked for.
-        exercises: What is graded.
+        course: The request.
+        exercises: The exercises to grade.
         conditions: Name of a submission -> what its result depends on.
-        store: Where they go.
-        watcher: Hears how it gets on.
+        store: Receives the results.
+        watcher: Shows the progress.
     """
 
     course: ClassRequest
@@ -50,16 +56,16 @@ class ClassRun:
     watcher: Watcher
 
     def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
-        """Grade what is due, and return the names of those whose result is still the one of before.
+        """Grade submissions, and return the names of those whose earlier, better result was kept.
 
         Args:
             due: The submissions.
-            warn: Hears what an instructor must know before it begins.
+            warn: Called with warnings for the instructor before grading begins.
             make: Makes the scheduler.
 
         Raises:
             EnvironmentFault: Nothing can be graded here.
-            HarnessError: A disk is full; what was done is kept.
+            HarnessError: A disk is full; results stored so far are kept.
         """
         left = {entry.name for entry in due}
         self._note(left)
@@ -86,21 +92,21 @@ class ClassRun:
         with closing(scheduler.run(tasks, self.watcher.step)) as attempts:
             for attempt in attempts:
                 name = attempt.task.name
-                if not self._take(name, attempt.task.into, attempt.standing, left):
+                if not self._take(name, attempt.task.into, attempt.status, left):
                     not_replaced.append(name)
-                self._stop_if_full(attempt.standing)
+                self._stop_if_full(attempt.status)
         return tuple(sorted(not_replaced))
 
-    def _take(self, name: str, fresh: Path, standing: ResultStatus, left: set[str]) -> bool:
-        """Take in what came of a submission; return whether it is its result now."""
-        replaced = self.store.commit(name, fresh, standing)
+    def _take(self, name: str, fresh: Path, status: ResultStatus, left: set[str]) -> bool:
+        """Store the result of an attempt; return whether it replaced the earlier one."""
+        replaced = self.store.commit(name, fresh, status)
         left.discard(name)
         self._note(left)
-        self.watcher.done(name, standing)
+        self.watcher.done(name, status)
         return replaced
 
     def _note(self, left: set[str]) -> None:
-        """Note what is still to be graded again; what is new or changed shows without a note."""
+        """Store which submissions `--rerun` still has to grade; new or changed ones are found without a note."""
         if self.course.rerun != CHANGED:
             self.store.note_pending(self.course.rerun, left)
 
@@ -125,11 +131,94 @@ class ClassRun:
         digest = unusable_digest(SubmissionError(entry.problem))
         return ResultStatus(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
 
-    def _stop_if_full(self, standing: ResultStatus) -> None:
-        """Raise HarnessError if an attempt failed because a disk is full: the others would fail too."""
-        if standing.state is not State.FAILED:
+    def _stop_if_full(self, status: ResultStatus) -> None:
+        """Raise HarnessError if an attempt failed because a disk is full, as the others would fail too."""
+        if status.state is not State.FAILED:
             return
         for place in (self.store, Store(Path(tempfile.gettempdir()))):
             if place.free_bytes < LEAST_FREE_BYTES:
                 hint = "free some space; the same command goes on where it was"
                 raise HarnessError(f"{place.folder}: expected room for results, found the disk full", hint)
+
+
+def student_of(person: Person | None) -> str:
+    """Return the id that a person's variants are drawn for: number, else user name, else email address."""
+    return "" if person is None else next((text for text in (person.id, person.user, person.email) if text), "")
+
+
+def with_known_students(
+    entries: Sequence[HandedInEntry], people: Mapping[str, Person], exercises: Sequence[Exercise]
+) -> tuple[HandedInEntry, ...]:
+    """If rubrics have variants, refuse the submissions whose student is not known.
+
+    Args:
+        entries: The submissions.
+        people: Name of a submission -> its student, for unambiguous matches.
+        exercises: The exercises to grade.
+    """
+    if not vary(exercises):
+        return tuple(entries)
+    return tuple(entry if entry.problem else _known(entry, people.get(entry.name)) for entry in entries)
+
+
+def _known(entry: HandedInEntry, person: Person | None) -> HandedInEntry:
+    try:
+        checked(student_of(person))
+    except VariantError:
+        return replace(entry, problem=_NOBODY if person is None else _NO_ID)
+    return entry
+
+
+def vary(exercises: Sequence[Exercise]) -> bool:
+    """Whether any exercise has variants."""
+    return any(exercise.variant is not None for exercise in exercises)
+
+
+def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
+    """Check that there are a course key and a roster if exercises have variants.
+
+    Raises:
+        ClassError: The roster is missing.
+        VariantError: The course key is missing.
+    """
+    if not vary(exercises):
+        return
+    if course.grading.variant_key is None:
+        text = "--variant-key: expected the course key, because a rubric has variants, found none"
+        raise VariantError(text, "name its file with --variant-key FILE")
+    if course.roster is None:
+        text = "--roster: expected the people of the class, because a rubric has variants, found no roster"
+        raise ClassError(text, "name it with --roster CSV: it says whose variant a submission is graded by")
+
+
+def own_conditions(
+    course: ClassRequest,
+    entries: Sequence[HandedInEntry],
+    people: Mapping[str, Person],
+    exercises: Sequence[Exercise],
+    conditions: Conditions,
+) -> dict[str, Conditions]:
+    """Return name of a submission -> the conditions it is graded with.
+
+    Args:
+        course: The request.
+        entries: The submissions.
+        people: Name of a submission -> its student.
+        exercises: The exercises to grade, read with the first value of each variant.
+        conditions: The conditions of the whole class.
+
+    Raises:
+        GraderError: The course key or a rubric cannot be used.
+    """
+    if not vary(exercises) or course.grading.variant_key is None:
+        return {entry.name: conditions for entry in entries}
+    key = read_key(course.grading.variant_key, "course key")
+    found: dict[str, Conditions] = {}
+    for entry in entries:
+        found[entry.name] = conditions
+        if not entry.problem:
+            draw = ByKey(key, checked(student_of(people.get(entry.name))))
+            own = read_exercises(replace(course.grading, draw=draw), course.sources)
+            digests = tuple((exercise.id, exercise.digest) for exercise in own)
+            found[entry.name] = replace(conditions, rubrics=digests, variants=drawn(own, draw.student))
+    return found

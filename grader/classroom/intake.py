@@ -1,4 +1,4 @@
-"""Finds the submissions of a class in folders and downloads, and gives each a safe name."""
+"""Finds the submissions of a class in folders and downloads, and gives each a unique safe name."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from grader.submissions.archives import ARCHIVE_SUFFIXES
 from grader.submissions.collected import is_skipped_file, is_skipped_folder, name_problem, shown, why_skipped
 from grader.submissions.staging import read_start
 
-#: Longest name, in bytes of UTF-8; room is left for a mark that tells two apart.
+#: Longest name, in bytes of UTF-8, not counting the suffix that makes it unique.
 MAX_BYTES = 80
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 _KEPT = frozenset("._@+-")
 
 
 def safe_name(text: str) -> str:
-    """Return text as one part of a path on any system: letters, digits and `._@+-`, in lower case, never empty."""
+    """Make text usable as one path component on any system: letters, digits and `._@+-`, lower case, never empty."""
     plain = unicodedata.normalize("NFKC", text).casefold()
     slug = "".join(c if c.isalnum() or c in _KEPT else "-" for c in unicodedata.normalize("NFC", plain))
     slug = re.sub(r"-{2,}", "-", slug).strip("-. ")
@@ -36,12 +36,12 @@ def safe_name(text: str) -> str:
 
 
 def distinct_names(wishes: Sequence[tuple[str, str]]) -> list[str]:
-    """Return one safe name for each wish, no two the same.
+    """Return a unique safe name for each wish, independent of their order.
 
-    A name does not depend on the order: all that wish for the same one get a mark that follows from what they are.
+    If several wish for the same name, each gets a suffix derived from its unique text.
 
     Args:
-        wishes: The name wished for, and what tells this one from all others, such as its path in the download.
+        wishes: The preferred name, and a unique text such as the path in the download.
     """
     names = [safe_name(wish) for wish, _ in wishes]
     count = Counter(names)
@@ -52,7 +52,7 @@ def _mark(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:6]
 
 
-#: Largest file of a student that lies beside those of others.
+#: Largest file of a student in a folder shared with other students' files.
 MAX_FILE_BYTES = 64 << 20
 
 
@@ -61,12 +61,12 @@ class HandedInEntry:
     """One submission of a class.
 
     Attributes:
-        name: Safe in paths and different from all others; results lie under it.
-        label: As the source calls it.
-        path: What is graded.
-        identity: What the name says of the student: `user`, `id`, `email`, `name`.
+        name: Unique and safe in paths; also the name of its results folder.
+        label: Its name in the source.
+        path: The folder or file to grade.
+        identity: What its name tells about the student: `user`, `id`, `email`, `name`.
         late: Whether the platform marked it as late.
-        recognised: Whether the layout knows names like this one.
+        recognised: Whether its name fits the layout.
         problem: Why it cannot be graded at all; empty if it can.
     """
 
@@ -81,12 +81,12 @@ class HandedInEntry:
 
 @dataclass(frozen=True, slots=True)
 class Intake:
-    """What was found in the sources.
+    """The submissions found in the sources.
 
     Attributes:
         entries: The submissions, ordered by name.
-        layouts: Source and layout of each, as text.
-        strays: What is no submission, and why; one line each.
+        layouts: Each source with its layout, as text.
+        strays: Entries that are not submissions, with the reason; one line each.
     """
 
     entries: tuple[HandedInEntry, ...]
@@ -96,7 +96,7 @@ class Intake:
 
 @dataclass(slots=True)
 class _Found:
-    """A submission before it has a name of its own; several files may belong to it."""
+    """A submission before it gets its unique name; it may consist of several files."""
 
     own: str
     label: str
@@ -115,12 +115,12 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
 
     Args:
         sources: Folders of submissions, or downloads.
-        results: The folder for results; downloads are unpacked in it.
+        results: The results folder; downloads are unpacked in it.
         layout: How submissions are named, one of `LAYOUTS`.
-        pattern: A regular expression for the names, instead.
+        pattern: A regular expression for names, used instead of the layout.
 
     Raises:
-        ClassError: A source cannot be used, or holds no submission.
+        ClassError: A source cannot be used, or has no submissions.
     """
     found: list[_Found] = []
     strays: list[str] = []
@@ -144,7 +144,7 @@ def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, patte
 
 
 def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[str, str]]:
-    """Return the folder that holds the submissions of a source, and what of it had to be refused."""
+    """Return the folder with the submissions of a source, and the entries that were refused."""
     if source.is_dir():
         return source, {}
     if not source.is_file():
@@ -155,7 +155,7 @@ def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[
 
 
 def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> DownloadLayout:
-    """Return how the submissions in a folder are named; single files count only where there is nothing else."""
+    """Determine the layout of a folder; plain files count only if there are no folders or archives."""
     names = [child.name for child in children if child.is_dir() or _is_archive(child)]
     return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
 
@@ -172,13 +172,13 @@ def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, str
             continue
         key = _student(child.name, named, layout)
         one = found.setdefault(key, _found(child, label, own, named))
-        if one.path != child:  # of the same student: files go together under their own names
+        if one.path != child:  # another file of the same student: they form one submission
             one.files = [*(one.files or [(one.named.file, one.path)]), (named.file, child)]
     return found
 
 
 def _read(layout: DownloadLayout, child: Path) -> tuple[Named, str]:
-    """Return what a name says, with or without the ending of an archive, and the name without it."""
+    """Interpret a name with or without an archive suffix; also return it without the suffix."""
     whole = layout.read(child.name)
     label = child.name if child.is_dir() else _stem(child.name)
     if whole.recognised and (whole.file or child.is_dir()):
@@ -187,7 +187,7 @@ def _read(layout: DownloadLayout, child: Path) -> tuple[Named, str]:
 
 
 def _student(name: str, named: Named, layout: DownloadLayout) -> tuple[str, ...]:
-    """Return what tells students of one source apart: who they are where a platform deals in files, else the name."""
+    """Return a key for the student: the identity if a platform stores single files, otherwise the name."""
     who = tuple(f"{key}={value}" for key, value in sorted(named.identity.items()))
     return who if who and (named.file or layout.name in PATTERNS) else ("", name)
 
@@ -199,7 +199,7 @@ def _found(path: Path, label: str, own: str, named: Named) -> _Found:
 
 
 def _refuse(found: _ByStudent, path: Path, own: str, layout: DownloadLayout, problem: str) -> None:
-    """Take note of a submission of which something was not unpacked; then nothing of it is graded."""
+    """Refuse a whole submission because a part of it was not unpacked."""
     named = layout.read(path.name)
     one = found.setdefault(_student(path.name, named, layout), _found(path, path.name, own, named))
     one.problem = problem
@@ -214,7 +214,7 @@ def _entry(one: _Found, name: str, results: Path) -> HandedInEntry:
 
 
 def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
-    """Copy the files of one student into a folder under their own names; return why that cannot be, if so."""
+    """Copy the files of one student into a folder under their original names; return the problem, if any."""
     counted = Counter(name for name, _ in files if name)
     wrong = next((f"found {name_problem(name)}: {shown(name)}" for name, _ in files if name and name_problem(name)), "")
     twice = next((f"found {shown(name)} twice" for name, count in counted.items() if count > 1), "")
@@ -240,9 +240,9 @@ def _put_together(files: Sequence[tuple[str, Path]], into: Path) -> str:
 
 
 def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
-    """Yield what lies in a folder in the order of names, without what systems and tools leave there.
+    """Yield the entries of a folder ordered by name, without files that operating systems and tools create.
 
-    What is left out but may be somebody's work becomes a stray.
+    Skipped entries that may be a student's work become strays.
     """
     try:
         names = sorted(os.listdir(folder), key=os.fsencode)  # noqa: PTH208  names, in the order of their bytes
@@ -263,7 +263,7 @@ def _is_archive(path: Path) -> bool:
 
 
 def _stem(name: str) -> str:
-    """Return a file name without the endings of archives."""
+    """Remove all archive suffixes from a file name."""
     stem = name
     while True:
         ending = next((end for end in ARCHIVE_SUFFIXES if stem.casefold().endswith(end) and len(stem) > len(end)), "")

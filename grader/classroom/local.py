@@ -1,4 +1,4 @@
-"""Grades submissions on this machine, one process each; and what any scheduler of a class does."""
+"""Grades submissions on this machine, each in its own process; also defines the interface of schedulers."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from typing import Any, Protocol
 import msgspec
 
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.checkup import NO_WALLS, missing
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation
@@ -31,18 +30,18 @@ class Task:
 
     Attributes:
         name: Name of the entry.
-        label: What the source calls it.
-        submission: Path of what was handed in.
-        into: Folder that is not there yet: receives what `worker.PARTS` names.
-        exercises: Exercise ids to grade; empty for all of the rubrics.
+        label: Its name in the source.
+        submission: Path of the submission.
+        into: Destination folder for the files of `worker.PARTS`; must not exist yet.
+        exercises: Exercise ids to grade; empty for all exercises of the rubrics.
         rubrics: Rubric files; empty for the built-in ones.
-        odom_bag: An /odom recording to play instead of the project's own.
+        odom_bag: An /odom recording to play instead of the built-in one.
         conditions: What the result depends on besides the submission.
-        workers: Most scenarios recorded side by side.
-        standalone: Whether the HTML report holds its scripts, instead of sharing them with the class.
-        deadline_s: Real time after which the attempt is given up.
-        collected: File of what was read of the submission on another machine; None to read it now.
-        variant_key: File with the course key, for the line that repeats the run; nothing is read from it.
+        workers: Most scenarios recorded in parallel.
+        standalone: Whether the HTML report includes its scripts, instead of sharing them with the class.
+        deadline_s: Real time after which the attempt is killed.
+        collected: File with the submission as read on another machine; None to read it now.
+        variant_key: Path of the course key for the command that reproduces the run; the file is not read.
     """
 
     name: str
@@ -62,48 +61,48 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """What came of a task; its files are in the folder that the task named."""
+    """The outcome of a task; its files are in the task's folder."""
 
     task: Task
-    standing: ResultStatus
+    status: ResultStatus
 
 
-class Hear(Protocol):
-    """Hears, from any thread, which step of which submission begins."""
+class OnStep(Protocol):
+    """Called, from any thread, when a step of a submission begins."""
 
     def __call__(self, name: str, step: str) -> None:
-        """Take note of it."""
+        """Report the step."""
         ...
 
 
 class ClassScheduler(Protocol):
-    """Grades submissions, several at the same time, on this machine or on others."""
+    """Grades submissions in parallel, on this machine or on others."""
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Make sure that grading is possible at all, and return what an instructor must know before it begins.
+        """Check that grading is possible, and return warnings for the instructor.
 
         Args:
-            isolation: The sandbox that was asked for.
+            isolation: The requested sandbox.
 
         Raises:
-            EnvironmentFault: It is not.
+            EnvironmentFault: Nothing can be graded.
         """
         ...
 
-    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
-        """Yield what comes of each task, once, as soon as it is there and in any order.
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield one attempt for each task as it finishes, in any order.
 
-        Closing the iterator gives up what is under way and leaves no process behind. A failure of one task is its
-        attempt's state, never an exception.
+        Closing the generator aborts the running tasks and leaves no process behind. A failed task yields an attempt in
+        the state FAILED; it never raises.
         """
         ...
 
 
-#: Makes the scheduler for so many submissions at a time.
+#: Makes a scheduler for a number of parallel submissions.
 MakeScheduler = Callable[[int], ClassScheduler]
 
 
-#: Longest line that a process may say.
+#: Longest line read from a process.
 _LINE_BYTES = 1 << 20
 WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
 
@@ -112,9 +111,9 @@ class LocalScheduler:
     """Grades on this machine.
 
     Args:
-        jobs: Submissions at a time.
-        command: What grades one; another one only in tests.
-        folder: What relative paths start from; None for the folder that this process is in.
+        jobs: Submissions graded in parallel.
+        command: Command that grades one submission; replaced only in tests.
+        folder: Base of relative paths; None for the current directory.
     """
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
@@ -126,7 +125,7 @@ class LocalScheduler:
         self._closed = False
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Look for ROS and try the sandbox; see `ClassScheduler`."""
+        """Find ROS and test the sandbox; see `ClassScheduler`."""
         choice = choose_isolation(isolation, find_ros())
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
@@ -135,19 +134,19 @@ class LocalScheduler:
             warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
         return warnings
 
-    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
-        """Yield what comes of each task; see `ClassScheduler`."""
-        # The system ends a process with the thread that started it: these threads live until all is done.
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield an attempt for each task; see `ClassScheduler`."""
+        # The kernel kills a worker when the thread that started it ends, so the threads live until all tasks are done.
         pool = ThreadPoolExecutor(self._jobs, thread_name_prefix="batch")
         try:
-            for future in as_completed([pool.submit(self._one, task, hear) for task in tasks]):
+            for future in as_completed([pool.submit(self._one, task, on_step) for task in tasks]):
                 yield future.result()
         finally:
             self._close()
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _one(self, task: Task, hear: Hear) -> Attempt:
-        hear(task.name, "starting")
+    def _one(self, task: Task, on_step: OnStep) -> Attempt:
+        on_step(task.name, "starting")
         try:
             process = self._start()
         except OSError as error:
@@ -162,12 +161,12 @@ class LocalScheduler:
         timer.daemon = True
         timer.start()
         try:
-            standing = self._listen(process, task, hear)
+            status = self._listen(process, task, on_step)
         finally:
             timer.cancel()
             self._end(process)
-        if standing is not None:
-            return Attempt(task, standing)
+        if status is not None:
+            return Attempt(task, status)
         if overdue.is_set():
             return _failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
         return _failed(task, f"the grader ended without a result (exit code {process.returncode})")
@@ -184,14 +183,14 @@ class LocalScheduler:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=None if os.environ.get("GRADER_DEBUG") == "1" else subprocess.DEVNULL,
-                cwd="/",  # Python imports from here first, and where the user is may lie a student's `json.py`
+                cwd="/",  # Python imports from here first, and the user's directory may contain a student's `json.py`
                 start_new_session=True,
             )
             self._running.add(process)
         return process
 
-    def _listen(self, process: subprocess.Popen[bytes], task: Task, hear: Hear) -> ResultStatus | None:
-        """Return what a process says of its task at last; None if it ends before."""
+    def _listen(self, process: subprocess.Popen[bytes], task: Task, on_step: OnStep) -> ResultStatus | None:
+        """Read messages from a process until it reports its result; None if it ends without one."""
         assert process.stdin is not None
         assert process.stdout is not None
         folder = self._folder or Path.cwd()
@@ -200,16 +199,16 @@ class LocalScheduler:
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.close()
         while line := process.stdout.readline(_LINE_BYTES):
-            said = _message(line)
-            if "done" in said:
-                return kept.load(json.dumps(said["done"]).encode())
-            if "step" in said:
-                hear(task.name, str(said["step"]))
+            message = _message(line)
+            if "done" in message:
+                return kept.load(json.dumps(message["done"]).encode())
+            if "step" in message:
+                on_step(task.name, str(message["step"]))
         return None
 
     def _end(self, process: subprocess.Popen[bytes]) -> None:
         with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=10)  # it has said all it had to say, and takes down what it set up
+            process.wait(timeout=10)  # it has reported its result and is cleaning up
         _kill(process)
         process.wait()
         for stream in (process.stdin, process.stdout):
@@ -229,10 +228,10 @@ class LocalScheduler:
 
 def _message(line: bytes) -> dict[str, Any]:
     try:
-        said = json.loads(line)
+        message = json.loads(line)
     except (ValueError, RecursionError):
         return {}
-    return said if isinstance(said, dict) else {}
+    return message if isinstance(message, dict) else {}
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:

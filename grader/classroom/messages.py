@@ -1,4 +1,4 @@
-"""What travels between the machines that share the grading of a class, as bytes that hold no code and name no place."""
+"""Messages between the machines that grade a class together, as bytes without code and without absolute paths."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import TypeVar
 
 import msgspec
 
-from grader.classroom.cache_key import Conditions
+from grader.classroom.store import Conditions
 from grader.core.errors import HarnessError
 from grader.core.exercise import Drawn
 from grader.reporting.delivery import write_whole
 from grader.submissions.collected import Collected, name_problem
 
-#: Most that one answer may hold, and most files in it.
+#: Largest size of an answer, and most files in it.
 MAX_ANSWER_BYTES = 512 << 20
 MAX_ANSWER_FILES = 1_000
 
-# Names of files are bytes: what a student calls a file need not be text.
+# File names are bytes, because a student's file name need not be valid text.
 Files = tuple[tuple[bytes, bytes], ...]
-_Parcel = TypeVar("_Parcel", "Terms", "GradingJob", "JobResult", "Fitness", "_Reading")
+_Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "_Reading")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +30,14 @@ class Terms:
     """What all submissions of a class are graded with.
 
     Attributes:
-        conditions: What results depend on.
-        exercises: Exercise ids to grade; empty for all of the rubrics.
+        conditions: What the results depend on.
+        exercises: Exercise ids to grade; empty for all exercises of the rubrics.
         rubrics: Relative path and content of each rubric file; empty for the built-in ones.
-        odom_bag: Relative path of an /odom recording; empty for the project's own.
-        recording: Its files, by their paths from there; that of a recording of one file is empty.
-        standalone: Whether each HTML report holds its scripts.
-        deadline_s: Real time after which an attempt is given up.
-        checks: Relative path and content of the rubrics' own files of checks.
+        odom_bag: Relative path of an /odom recording; empty for the built-in one.
+        recording: Its files, by their paths below it; a recording in a single file has an empty path.
+        standalone: Whether each HTML report includes its scripts.
+        deadline_s: Real time after which an attempt is killed.
+        checks: Relative path and content of the rubrics' own check files.
     """
 
     conditions: Conditions
@@ -56,11 +56,11 @@ class GradingJob:
 
     Attributes:
         name: Name of the entry.
-        label: What the source calls it.
-        path: What reports call it: a path from where the class is graded.
-        collected: What was handed in; see `pack_collected`.
-        variants: The values that are this student's own; None if nothing varies.
-        seed: The seed of every drawn value; the key that it was made with does not travel.
+        label: Its name in the source.
+        path: Its path in reports, relative to where the class is graded.
+        collected: The submission; see `pack_collected`.
+        variants: The student's variant values; None if nothing varies.
+        seed: Seed of all drawn values; the seed key itself is never sent.
     """
 
     name: str
@@ -73,18 +73,18 @@ class GradingJob:
 
 @dataclass(frozen=True, slots=True)
 class JobResult:
-    """What came of one submission.
+    """The result of one submission.
 
     Attributes:
-        machine: Who did it, for people.
-        standing: How it stands, as it lies in a folder for results; empty if nothing was tried.
-        files: The result: `report.json` and what belongs to it.
-        unfit: Why this machine can grade nothing; empty if it can.
-        hint: One thing to do about that.
+        machine: The machine that graded it, for people.
+        status: The status as stored in a results folder; empty if nothing was tried.
+        files: The result files, such as `report.json`.
+        unfit: Why this machine cannot grade; empty if it can.
+        hint: What to do about that.
     """
 
     machine: str
-    standing: bytes = b""
+    status: bytes = b""
     files: Files = ()
     unfit: str = ""
     hint: str = ""
@@ -95,10 +95,10 @@ class Fitness:
     """Whether a machine can grade.
 
     Attributes:
-        machine: Which one, for people.
-        unfit: Why it can grade nothing; empty if it can.
-        hint: One thing to do about that.
-        remarks: What an instructor must know of its sandbox.
+        machine: The machine, for people.
+        unfit: Why it cannot grade; empty if it can.
+        hint: What to do about that.
+        remarks: Warnings about its sandbox for the instructor.
     """
 
     machine: str
@@ -113,13 +113,13 @@ class _Reading:
     notes: tuple[bytes, ...]
 
 
-def pack(parcel: Terms | GradingJob | JobResult | Fitness) -> bytes:
-    """Return a parcel as bytes."""
-    return msgspec.msgpack.encode(parcel)
+def pack(message: Terms | GradingJob | JobResult | Fitness) -> bytes:
+    """Encode a message."""
+    return msgspec.msgpack.encode(message)
 
 
-def unpack(data: bytes, kind: type[_Parcel]) -> _Parcel:
-    """Return what bytes hold; raises HarnessError if that is something else."""
+def unpack(data: bytes, kind: type[_Message]) -> _Message:
+    """Decode a message; raises HarnessError for anything else."""
     try:
         return msgspec.msgpack.decode(data, type=kind)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError):
@@ -127,28 +127,28 @@ def unpack(data: bytes, kind: type[_Parcel]) -> _Parcel:
 
 
 def pack_collected(collected: Collected) -> bytes:
-    """Return what was read of a submission as bytes."""
+    """Encode the files of a submission."""
     files = tuple((os.fsencode(name), content) for name, content in collected.files)
     return msgspec.msgpack.encode(_Reading(files, tuple(map(os.fsencode, collected.notes))))
 
 
 def read_collected(data: bytes) -> Collected:
-    """Return what was read of a submission; raises HarnessError if the bytes hold something else."""
+    """Decode the files of a submission; raises HarnessError for anything else."""
     reading = unpack(data, _Reading)
     files = tuple((os.fsdecode(name), content) for name, content in reading.files)
     for name, _ in files:
-        if os.path.isabs(name) or ".." in name.split("/"):  # noqa: PTH117  a name, perhaps no path of this system
+        if os.path.isabs(name) or ".." in name.split("/"):  # noqa: PTH117  a name from elsewhere, not a path here
             raise HarnessError("submission: expected names that stay inside, found one that does not")
     return Collected(files, tuple(map(os.fsdecode, reading.notes)))
 
 
 def travelling_name(path: Path) -> bytes:
-    """Return a path by which a file can be called elsewhere: what a person typed, or from here if it was absolute."""
+    """Return a path's name on other machines: as typed, or relative to the current directory if it was absolute."""
     return os.fsencode(os.path.relpath(path) if path.is_absolute() else os.path.normpath(path))
 
 
 def files_below(folder: Path) -> Files:
-    """Return the plain files in a folder, by their relative paths and in order."""
+    """Read the plain files in a folder, ordered by their relative paths."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     return tuple((os.fsencode(path.relative_to(folder)), path.read_bytes()) for path in paths)
 
@@ -158,12 +158,12 @@ def write_answer(files: Iterable[tuple[bytes, bytes]], into: Path, allowed: froz
 
     Args:
         files: Relative path and content.
-        into: The folder, which is not there yet.
-        allowed: Names of files and folders that a result consists of.
+        into: The folder; must not exist yet.
+        allowed: Names of the files and folders of a result.
 
     Raises:
-        HarnessError: There is a file that no result has.
-        OSError: They cannot be written.
+        HarnessError: A file does not belong to a result.
+        OSError: The files cannot be written.
     """
     named = [(os.fsdecode(name), content) for name, content in files]
     if len(named) > MAX_ANSWER_FILES or any(name_problem(n) or n.split("/")[0] not in allowed for n, _ in named):

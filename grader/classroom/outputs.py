@@ -1,29 +1,40 @@
-"""What is written for the whole class: the page, the gradebook, JSON, and files for the platforms asked for."""
+"""Output for the whole class: page, gradebook, platform files, JSON, and the summary on the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from grader.classroom.class_page import RunOfClass, class_page
-from grader.classroom.gradebook import Gradebook, render_gradebook
+from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
 from grader.classroom.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
+from grader.reporting.escape import json_value, shown
+from grader.reporting.json_report import json_text
 
 PAGE, GRADEBOOK, CLASS, ASSETS = "index.html", "gradebook.csv", "batch.json", "assets"
+SCHEMA = "grader/batch/v1"
+#: Most names in one line of the summary.
+_MOST = 10
+#: Suffixes of files that people open.
+_OPENED = (".csv", ".html")
+#: Statuses without a line of their own in the summary.
+_UNREMARKABLE = {Status.GRADED, Status.MISSING}
 
 
 @dataclass(frozen=True, slots=True)
 class Platforms:
-    """The platforms that are to be told.
+    """The platforms to export scores to.
 
     Attributes:
-        canvas: Number of the assignment in Canvas; empty if Canvas is not asked for.
-        canvas_gradebook: The gradebook that Canvas exported; None if the roster has Canvas' numbers.
-        moodle: The users that Moodle exported; None if Moodle is not asked for.
-        gradescope: Whether Gradescope is asked for.
+        canvas: Number of the assignment in Canvas; empty for no export to Canvas.
+        canvas_gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
+        moodle: The users exported from Moodle; None for no export to Moodle.
+        gradescope: Whether to export to Gradescope.
     """
 
     canvas: str = ""
@@ -33,7 +44,7 @@ class Platforms:
 
 
 def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *, gradescope: bool) -> Platforms:
-    """Return what the platforms need, read; raises ClassError for a table that cannot be used."""
+    """Read the tables for the requested platforms; raises ClassError for an unusable table."""
     return Platforms(
         canvas,
         None if canvas_gradebook is None else read_users(canvas_gradebook),
@@ -43,12 +54,12 @@ def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *
 
 
 def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
-    """Return platform -> its files; raises ClassError for what a platform could not take.
+    """Return platform -> its export; raises ClassError if a platform would reject it.
 
     Args:
-        book: The class.
+        book: The gradebook.
         wanted: The platforms.
-        results: Name of an entry -> Gradescope's results.json of its report.
+        results: Name of an entry -> its results.json for Gradescope.
     """
     made: dict[str, Export] = {}
     if wanted.canvas:
@@ -68,14 +79,14 @@ def class_files(
     links: Sequence[PageLink] = (),
     standalone: bool = False,
 ) -> dict[str, bytes]:
-    """Return name below the folder for results -> content, of all that is made for the class; the page is last.
+    """Return name -> content of all files for the class, relative to the results folder; the page is last.
 
     Args:
-        book: The class.
-        made: What platforms are told.
-        run: The run that writes it.
-        links: Other pages in the folder, which the page of the class leads to.
-        standalone: Whether the page holds its scripts, instead of sharing them with the reports.
+        book: The gradebook.
+        made: The exports for platforms.
+        run: The run that writes the files.
+        links: Other pages in the folder, to be linked from the class page.
+        standalone: Whether the page includes its scripts, instead of sharing them with the reports.
     """
     files = {GRADEBOOK: render_gradebook(book).encode()}
     for export in made.values():
@@ -84,3 +95,131 @@ def class_files(
         files.update({f"{ASSETS}/{name}": data for name, data in class_assets().items()})
     files[PAGE] = render_class(class_page(book, run, links), assets=None if standalone else ASSETS).encode()
     return files
+
+
+@dataclass(frozen=True, slots=True)
+class Graded:
+    """A class after grading.
+
+    Attributes:
+        book: The gradebook.
+        graded: Number of submissions graded in this run.
+        kept_before: Number of submissions that already had results.
+        not_replaced: Names of submissions whose new attempt was worse than the stored result, which was kept.
+        files: The files written for the whole class.
+        left_out: Platform -> who is missing in its file, and why.
+        remarks: Remarks about these files.
+        links: Further pages in the results folder, linked from the class page.
+    """
+
+    book: Gradebook
+    graded: int
+    kept_before: int
+    not_replaced: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    links: tuple[PageLink, ...] = ()
+
+
+def render_summary(graded: Graded) -> str:
+    """Summarise the class in a few lines: counts, scores, and everybody who needs attention."""
+    book = graded.book
+    lines = [f"graded now: {graded.graded}, done before: {graded.kept_before}"]
+    lines += [f"{status.value}: {book.count(status)}" for status in Status if book.count(status)]
+    lines += _scores(book)
+    lines += _lists(book, graded.not_replaced)
+    lines += [f"not in {platform}: {line}" for platform, out in graded.left_out.items() for line in out]
+    lines += [f"note: {remark}" for remark in graded.remarks]
+    lines += [f"written: {shown(str(path), limit=300)}" for path in graded.files if path.suffix in _OPENED]
+    return "\n".join(lines) + "\n"
+
+
+def summary_json(graded: Graded) -> str:
+    """Render the class as JSON."""
+    book = graded.book
+    matching = book.matching
+    return json_text(
+        {
+            "schema": SCHEMA,
+            "graded_now": graded.graded,
+            "done_before": graded.kept_before,
+            "not_replaced": list(graded.not_replaced),
+            "counts": {status.value: book.count(status) for status in Status},
+            "students": [_row(row) for row in book.rows],
+            "unmatched": list(matching.unmatched),
+            "ambiguous": list(matching.ambiguous),
+            "duplicates": [list(names) for names in matching.duplicates],
+            "strays": json_value(book.strays),
+            "left_out": {platform: list(lines) for platform, lines in graded.left_out.items()},
+            "remarks": [*json_value(book.remarks), *graded.remarks],
+            "results_of_nobody": list(book.foreign),
+            "layouts": [{"source": json_value(source), "layout": layout} for source, layout in book.layouts],
+        }
+    )
+
+
+def _row(row: Row) -> dict[str, Any]:
+    person, adjusted = row.person, row.adjusted
+    return {
+        "name": row.name or None,
+        "label": json_value(row.label),
+        "person": None if person is None else json_value(person.name),
+        "status": row.status.value,
+        "score": json_value(adjusted.score),
+        "raw_score": None if row.report is None else row.report["score"],
+        "max_score": json_value(row.max_score),
+        "days_late": json_value(adjusted.days_late),
+        "penalty": json_value(adjusted.penalty),
+        "override": json_value(adjusted.override),
+        "reason": json_value(adjusted.reason) or None,
+        "problem": json_value(row.problem) or None,
+        "remarks": json_value(remarks(row)),
+        "outdated": row.outdated,
+    }
+
+
+def _scores(book: Gradebook) -> Iterator[str]:
+    shares = [
+        float(100 * row.adjusted.raw / row.max_score)
+        for row in book.rows
+        if row.adjusted.raw is not None and row.max_score
+    ]
+    if shares:
+        full = sum(share == 100 for share in shares)
+        yield (
+            f"scores: mean {statistics.fmean(shares):.1f} %, median {statistics.median(shares):.1f} %, "
+            f"from {min(shares):.1f} to {max(shares):.1f} %, full: {full}"
+        )
+    changed = [row for row in book.rows if row.adjusted.changed]
+    if changed:
+        yield f"changed by late days or decisions: {len(changed)}"
+
+
+def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
+    matching = book.matching
+    twins = [" = ".join(names) for names in matching.duplicates]
+    yield from _list("nobody on the roster goes with", matching.unmatched)
+    yield from _list("several people on the roster go with", matching.ambiguous)
+    yield from _list("several submissions of one person", twins)
+    yield from _list("nothing handed in", [person.name for person in matching.missing])
+    yield from _list("no submission", book.strays)
+    yield from _list("results in this folder that belong to no submission", book.foreign)
+    yield from _list("a new attempt came to less, the result of before stays", not_replaced)
+    yield from _list("results of other files or of another rubric", [r.name for r in book.rows if r.outdated])
+    for row in book.rows:
+        if row.status not in _UNREMARKABLE:
+            yield f"{row.status.value}: {shown(row.name, limit=80)}: {shown(row.problem or _points(row), limit=300)}"
+    yield from map(shown, book.remarks)
+
+
+def _points(row: Row) -> str:
+    score = None if row.report is None else row.report["score"]
+    return f"{number(score)}/{number(row.max_score)} so far"
+
+
+def _list(title: str, names: Sequence[str]) -> Iterator[str]:
+    if names:
+        first = ", ".join(shown(name, limit=120) for name in names[:_MOST])
+        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+        yield f"{title} ({len(names)}): {first}{more}"

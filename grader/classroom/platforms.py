@@ -1,4 +1,4 @@
-"""Scores as Canvas, Moodle and Gradescope take them; who cannot be told is named instead."""
+"""Exports scores for Canvas, Moodle and Gradescope, and lists the people who are left out."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from grader.reporting.escape import shown as safe
 from grader.reporting.json_report import json_text
 from grader.submissions.collected import listed, shown
 
-#: The columns that Canvas wants before the scores, in its order.
+#: The columns that Canvas requires before the scores, in this order.
 CANVAS_COLUMNS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
-#: The columns that Moodle may know people by, the surest first.
+#: The columns that Moodle can identify people by, the most reliable first.
 MOODLE_COLUMNS = ("Email address", "Username", "ID number")
 GRADESCOPE_COLUMNS = ("Name", "SID", "Email", "Total Score", "Max Points", "Status")
 _POSSIBLE = "points possible"
@@ -28,12 +28,12 @@ _FEEDBACK = 4_000
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """A file for a platform.
+    """The files for a platform.
 
     Attributes:
-        files: Name below the folder for results -> content.
-        left_out: Who is not in it, and why; one line each.
-        remark: What else an instructor must know; may be empty.
+        files: Name, relative to the results folder -> content.
+        left_out: Who is missing, and why; one line each.
+        remark: A remark for the instructor; may be empty.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -43,10 +43,10 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class Users:
-    """A table that a platform exported: the people it knows.
+    """A table of users exported from a platform.
 
     Attributes:
-        path: Where it was read from.
+        path: Path of the table.
         header: Its columns.
         rows: Column -> value.
     """
@@ -57,23 +57,23 @@ class Users:
 
 
 def read_users(path: Path) -> Users:
-    """Return a table of people; raises ClassError if it cannot be read."""
+    """Read a table of users; raises ClassError if it cannot be read."""
     header, rows = read_table(path)
     return Users(path, tuple(header), tuple(rows))
 
 
 def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> Export:
-    """Return the scores for Canvas.
+    """Export scores for Canvas.
 
-    Only people with a score are in it, and only this one column: what was changed in Canvas since stays.
+    The file contains only people with a score and only this one column, so that later changes in Canvas are kept.
 
     Args:
-        book: The class.
+        book: The gradebook.
         assignment: Number of the assignment in Canvas, or its title and number in parentheses.
-        gradebook: The gradebook that Canvas exported; None if the roster has Canvas' numbers.
+        gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
 
     Raises:
-        ClassError: The gradebook has no such assignment, or nobody has a number that Canvas knows.
+        ClassError: The gradebook has no such assignment, or nobody has a Canvas id.
     """
     title = _canvas_title(assignment, gradebook)
     rows: list[list[str]] = []
@@ -95,16 +95,16 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> 
 
 
 def export_moodle(book: Gradebook, users: Users) -> Export:
-    """Return grades and feedback for Moodle's grade import, side by side: the one without the other wipes grades.
+    """Export grades and feedback for Moodle's grade import; importing one without the other deletes grades.
 
-    Who is not in the table of users is left out, because one unknown user makes Moodle refuse all.
+    People who are not in the table of users are left out, because Moodle rejects a file with an unknown user.
 
     Args:
-        book: The class.
-        users: The participants or grades that Moodle exported.
+        book: The gradebook.
+        users: The participants or grades exported from Moodle.
 
     Raises:
-        ClassError: The table has no column that Moodle knows people by.
+        ClassError: The table has no column that Moodle can identify people by.
     """
     by_name = {name.strip().casefold(): name for name in users.header}
     column = next((name for name in MOODLE_COLUMNS if name.casefold() in by_name), None)
@@ -126,10 +126,10 @@ def export_moodle(book: Gradebook, users: Users) -> Export:
 
 
 def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
-    """Return one results.json for each submission, as an autograder leaves it, and a table of all scores.
+    """Export a results.json for each submission, as an autograder would write it, and a table of all scores.
 
     Args:
-        book: The class.
+        book: The gradebook.
         results: Name of an entry -> the results.json of its report.
     """
     files: dict[str, str] = {}
@@ -145,9 +145,9 @@ def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
 
 
 def feedback(row: Row) -> str:
-    """Return what a student is told in one line: the score, what was decided, and each lost point with its reason.
+    """Write the feedback for a student in one line: score, decision, and each lost point with its reason.
 
-    The score is the mark, which the platform shows as well; reasons are those that students may see.
+    The score is the final mark, which the platform shows too. Only reasons that students may see are included.
     """
     parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points." if row.report else ""]
     parts.append(_decision(row))
@@ -163,7 +163,7 @@ _NOTHING: ReportData = {"exercises": ()}
 
 
 def _decision(row: Row) -> str:
-    """Say what stands between the raw score and the one that counts; empty if nothing does."""
+    """Explain how the final score differs from the raw one; empty if it does not."""
     adjusted = row.adjusted
     if adjusted.override is not None:
         raw = f" instead of {number(adjusted.raw)}" if adjusted.raw is not None else ""
@@ -182,7 +182,7 @@ def _lost(criterion: Mapping[str, Any]) -> str:
 
 
 def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
-    """Return the rows to export; name everybody else who handed something in."""
+    """Return the rows to export; list everybody else who handed something in."""
     to_export = book.to_export
     chosen = {id(row) for row in to_export}
     for row in book.rows:
@@ -199,7 +199,7 @@ def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
 
 
 def _canvas_title(assignment: str, gradebook: Users | None) -> str:
-    """Return the header of the assignment's column, which Canvas knows by the number in parentheses."""
+    """Return the header of the assignment's column; Canvas identifies it by the number in parentheses."""
     number_ = re.fullmatch(r"(?:.*\()?(\d+)\)?", assignment.strip(), re.DOTALL)
     if number_ is None:
         hint = "open the assignment in Canvas: the number is at the end of its address"
@@ -213,7 +213,7 @@ def _canvas_title(assignment: str, gradebook: Users | None) -> str:
 
 
 def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
-    """Return a row of Canvas' gradebook for somebody; without one, what the roster says of Canvas."""
+    """Return a person's row in the Canvas gradebook, or on the roster if there is no gradebook."""
     if gradebook is not None:
         return _user(row, gradebook)
     person = row.person
@@ -221,7 +221,7 @@ def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
 
 
 def _user(row: Row, users: Users) -> Mapping[str, str] | None:
-    """Return the only row of a table that is of somebody, by what is sure and then by name; None if none is."""
+    """Find the row of a person by unique ids, then by name; None unless exactly one row matches."""
     columns = columns_of(users.header)
     person = row.person
     if person is None:
@@ -239,7 +239,7 @@ def _named(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> froz
 
 
 def _possible(gradebook: Users | None, title: str) -> str:
-    """Return the points that an assignment has in Canvas; empty if that is not known."""
+    """Return the possible points of an assignment in Canvas; empty if unknown."""
     for row in gradebook.rows if gradebook is not None else ():
         if next(iter(row.values())).strip().casefold() == _POSSIBLE:
             return row[title].strip()
@@ -247,7 +247,7 @@ def _possible(gradebook: Users | None, title: str) -> str:
 
 
 def _decided(results: str, row: Row) -> str:
-    """Return a results.json with the score that counts, and the raw one beside it."""
+    """Put the final score into a results.json, and keep the raw one as extra data."""
     data = json.loads(results)
     if row.adjusted.changed:
         data["extra_data"]["raw_score"] = data["score"]

@@ -1,4 +1,4 @@
-"""What a class is graded with, and which of its submissions are graded now."""
+"""A request to grade a class, and the choice of the submissions to grade now."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ from pathlib import Path
 
 from grader.app.request import GradeRequest
 from grader.app.seeds import SeedKey
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.downloads import AUTO
 from grader.classroom.intake import HandedInEntry
 from grader.classroom.outputs import Platforms
-from grader.classroom.store import Kept, State, Store
+from grader.classroom.store import Kept, State, Store, unusable_digest
 from grader.core.errors import GraderError, SubmissionError
 from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission
 
 CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
-#: What `--rerun` takes; each of the others includes what is new or changed.
+#: Values of `--rerun`; each includes new and changed submissions.
 RERUNS = (CHANGED, FAILED, UNDECIDED, ALL)
 
 
 def digest_of(entry: HandedInEntry, scratch: Path) -> str:
-    """Return the digest of a submission; empty if that cannot be known.
+    """Compute the digest of a submission; empty if that is not possible.
 
     Args:
         entry: The submission.
-        scratch: An empty folder, to copy it into.
+        scratch: An empty folder for a copy.
     """
     if entry.problem:
         return unusable_digest(SubmissionError(entry.problem))
@@ -36,16 +35,16 @@ def digest_of(entry: HandedInEntry, scratch: Path) -> str:
     except SubmissionError as error:
         return unusable_digest(error)
     except (GraderError, OSError, MemoryError, RecursionError):
-        return ""  # grading it, in a process of its own, will say why
+        return ""  # grading it in its own process will report why
 
 
 def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, str], rerun: str) -> list[HandedInEntry]:
-    """Return the submissions to grade: where a run was stopped, the same one goes on.
+    """Select the submissions to grade; a stopped run with the same `--rerun` is resumed.
 
     Args:
-        store: The results so far.
+        store: The stored results.
         entries: The submissions.
-        keys: Name -> key of a result made now.
+        keys: Name -> key that a current result has.
         rerun: One of `RERUNS`.
     """
     pending = store.pending(rerun)
@@ -59,11 +58,11 @@ def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, s
 
 
 def is_due(kept: Kept, key: str, rerun: str) -> bool:
-    """Return whether a submission is to be graded.
+    """Whether a submission has to be graded.
 
     Args:
-        kept: What lies in the folder for results.
-        key: The key of a result made now; empty if it is not known.
+        kept: The stored results of the submission.
+        key: The key that a current result has; empty if unknown.
         rerun: One of `RERUNS`.
     """
     result, last = kept.result, kept.last
@@ -81,22 +80,22 @@ _NO_PLATFORMS = Platforms()
 
 @dataclass(frozen=True, slots=True)
 class ClassRequest:
-    """What is to be graded, and how.
+    """What to grade, and how.
 
     Attributes:
         sources: Folders of submissions, or downloads.
-        results: Folder for results.
-        layout: How submissions are named; see `layouts`.
-        pattern: A regular expression for names, instead; empty for none.
-        roster: CSV file of the people; None if there is none.
-        adjustments: YAML file of late days and other scores; None if there is none.
-        grading: As for one submission; its path says nothing.
-        jobs: Submissions at a time; None for one a processor.
-        rerun: See `choosing`.
-        seed_key: The key that seeds are made with; None for the one kept with the results.
-        standalone: Whether each HTML report can be sent away alone.
-        platforms: What else is written for the class.
-        given: What everybody was given, to compare the submissions without it; None to compare none.
+        results: The results folder.
+        layout: How submissions are named; one of `downloads.LAYOUTS`.
+        pattern: A regular expression for names, used instead of the layout; empty for none.
+        roster: CSV file of the class; None if there is none.
+        adjustments: YAML file of late days and changed scores; None if there is none.
+        grading: The request as for one submission; its path is ignored.
+        jobs: Submissions graded in parallel; None for one per processor.
+        rerun: One of `RERUNS`.
+        seed_key: The key that seeds are derived from; None for the one stored with the results.
+        standalone: Whether each HTML report is self-contained.
+        platforms: The platforms to export scores to.
+        given: Code handed out to everyone, ignored when submissions are compared; None to skip the comparison.
     """
 
     sources: tuple[Path, ...]

@@ -1,4 +1,4 @@
-"""The people of a class, from whatever CSV file a platform exports, and which submission is whose."""
+"""Reads the roster of a class from the CSV export of any platform, and matches submissions to people."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from grader.submissions.collected import listed, shown
 MAX_BYTES = 8 << 20
 MAX_ROWS = 20_000
 
-#: What a column holds -> how platforms call it, in lower case.
+#: Content of a column -> its names on platforms, in lower case.
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "name": ("name", "student", "student name", "full name", "fullname"),
     "first": ("first name", "first_name", "firstname", "given name", "given_name"),
@@ -30,7 +30,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "identifier": ("identifier",),
     "folder": ("folder", "submission", "directory"),
 }
-#: Columns that tell one person from another without doubt.
+#: Columns that identify a person uniquely.
 _EXACT = ("folder", "user", "email", "id", "canvas", "identifier")
 # Moodle's grading worksheet writes `Participant 657693`, its download only the number.
 _PARTICIPANT = re.compile(r"\D+ (\d+)")
@@ -41,13 +41,13 @@ class Person:
     """Somebody on the roster.
 
     Attributes:
-        name: As people read it.
+        name: Name for display.
         user: User name on the platform; empty if the roster has none.
-        email: Address; empty if the roster has none.
-        id: Number of the institution; empty if the roster has none.
-        handles: All that tells this person from others, folded.
-        names: Ways to write the name, without spaces and accents.
-        row: Column -> value, as the roster has it.
+        email: Email address; empty if the roster has none.
+        id: Number at the institution; empty if the roster has none.
+        handles: All ids that are unique to this person, normalised by `fold_handle`.
+        names: Spellings of the name, without spaces and accents.
+        row: Column -> value on the roster; None for a person who is not on a roster.
     """
 
     name: str
@@ -60,18 +60,18 @@ class Person:
 
 
 def fold_handle(text: str) -> str:
-    """Return a handle so that the same one is always written in one way."""
+    """Normalise a handle, so that different spellings compare equal."""
     return unicodedata.normalize("NFKC", text).strip().casefold()
 
 
 def fold_name(text: str) -> str:
-    """Return a name as letters and digits only, without accents: `Ada O'Möhr` and `adaomohr` are the same."""
+    """Reduce a name to letters and digits without accents, so that `Ada O'Möhr` and `adaomohr` compare equal."""
     plain = unicodedata.normalize("NFKD", text).casefold()
     return "".join(c for c in plain if c.isalnum())
 
 
 def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Return the header and the rows of a CSV file; commas, semicolons or tabs between the cells.
+    """Read the header and the rows of a CSV file separated by commas, semicolons or tabs.
 
     Raises:
         ClassError: The file cannot be read, or has no header and rows.
@@ -93,10 +93,10 @@ def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
 
 
 def read_roster(path: Path) -> list[Person]:
-    """Return the people of a roster: a CSV file as Canvas, Moodle, GitHub or Classroom 50 export it, or one's own.
+    """Read the people of a roster: a CSV export from Canvas, Moodle, GitHub or Classroom 50, or a custom one.
 
     Raises:
-        ClassError: The file cannot be read, or no column tells who somebody is.
+        ClassError: The file cannot be read, or no column identifies people.
     """
     header, rows = read_table(path)
     columns = columns_of(header)
@@ -104,11 +104,11 @@ def read_roster(path: Path) -> list[Person]:
         known = listed([names[0] for names in COLUMNS.values()])
         found = listed([shown(name, 30) for name in header[:6]], "and")
         raise ClassError(f"{path}:1: expected a column {known}, found {found}", "name the columns in the first line")
-    return [person for row in rows if not _is_noperson_of(row) and (person := person_of(row, columns)).name]
+    return [person for row in rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
 
 
 def columns_of(header: Sequence[str]) -> dict[str, list[str]]:
-    """Return what is known -> the columns that hold it, of those that a header has."""
+    """Return content -> the columns of a header that hold it."""
     by_name = {name.strip().casefold(): name for name in header}
     found = {kind: [by_name[name] for name in names if name in by_name] for kind, names in COLUMNS.items()}
     return {kind: names for kind, names in found.items() if names}
@@ -129,14 +129,14 @@ def _text(path: Path) -> str:
         raise ClassError(f"{path}: expected UTF-8, found another encoding", "save the file as CSV UTF-8") from None
 
 
-def _is_noperson_of(row: Mapping[str, str]) -> bool:
-    """Return whether a row of a Canvas gradebook is about points, or its made-up student."""
+def _is_no_person(row: Mapping[str, str]) -> bool:
+    """Whether a row of a Canvas gradebook holds possible points or the test student."""
     first = next(iter(row.values())).strip().casefold()
     return first in ("points possible", "student, test", "test student")
 
 
 def person_of(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> Person:
-    """Return somebody of whom a row of a table tells."""
+    """Build a person from a row of a table."""
 
     def value(kind: str) -> str:
         return next((row[name].strip() for name in columns.get(kind, ()) if row[name].strip()), "")
@@ -162,7 +162,7 @@ def _in_reading_order(name: str) -> str:
 
 
 def _spellings(name: str) -> Iterator[str]:
-    """Yield a name as platforms put it together: first name first, and last name first."""
+    """Yield all rotations of a name's words, because platforms order first and last names differently."""
     words = name.split()
     for cut in range(len(words)):
         folded = fold_name("".join(words[cut:] + words[:cut]))
@@ -172,13 +172,13 @@ def _spellings(name: str) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class RosterMatch:
-    """What the roster says of the submissions.
+    """How submissions match the roster.
 
     Attributes:
-        people: Name of an entry -> the person, for those that are clear.
-        unmatched: Names of entries that nobody on the roster goes with.
-        ambiguous: Names of entries that several people go with.
-        duplicates: Names of entries, in groups, that are of the same person.
+        people: Name of an entry -> person, for unambiguous matches.
+        unmatched: Names of entries that match nobody on the roster.
+        ambiguous: Names of entries that match several people.
+        duplicates: Groups of names of entries by the same person.
         missing: People without a submission.
     """
 
@@ -190,14 +190,14 @@ class RosterMatch:
 
 
 def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> RosterMatch:
-    """Return who handed in what.
+    """Match submissions to people.
 
-    What identifies without doubt (user name, number, address, the folder's name) goes before names, and nobody is
-    chosen where several could be meant.
+    Unique ids (user name, number, email address, folder) take precedence over names. If several people match, none is
+    chosen.
 
     Args:
         entries: The submissions.
-        roster: The people; None if there is no roster, then everybody goes by what the submission is called.
+        roster: The people; None if there is no roster, and then people are named after their submissions.
     """
     if roster is None:
         people = {entry.name: _unknown(entry) for entry in entries}
@@ -218,7 +218,7 @@ def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> 
 
 
 def _unknown(entry: HandedInEntry) -> Person:
-    """Return a person of whom only the submission tells."""
+    """Build a person from a submission alone."""
     identity = entry.identity
     name = identity.get("name") or identity.get("user") or identity.get("email") or entry.label
     names = frozenset({fold_name(name)} - {""})
@@ -226,7 +226,7 @@ def _unknown(entry: HandedInEntry) -> Person:
 
 
 def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:
-    """Return the entries of the same student: of one identity, or of one name as a folder and as an archive."""
+    """Group entries by the same student: of the same identity, or of the same name as a folder and as an archive."""
     by_student: dict[tuple[str, ...], list[str]] = {}
     for entry in entries:
         who = [f"{kind}={fold_handle(text)}" for kind, text in sorted(entry.identity.items())]
@@ -235,7 +235,7 @@ def _twice(entries: Sequence[HandedInEntry]) -> tuple[tuple[str, ...], ...]:
 
 
 def _candidates(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
-    """Return the people that an entry may be of, by the surest sign that says anything."""
+    """Return the indices of the people that match an entry by the most reliable criterion that matches anyone."""
     exact = {fold_handle(text) for kind, text in entry.identity.items() if kind != "name"} | {fold_handle(entry.label)}
     found = [index for index, person in enumerate(roster) if person.handles & exact]
     if found:
@@ -246,7 +246,7 @@ def _candidates(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
 
 
 def _by_ending(entry: HandedInEntry, roster: Sequence[Person]) -> list[int]:
-    """Return the people whose user name a clone's name ends with; of several such names the longest counts."""
+    """Return the people whose user name ends the name of a clone; the longest user name wins."""
     label = fold_handle(entry.label)
     lengths = {
         index: len(person.user)

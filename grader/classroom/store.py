@@ -1,8 +1,9 @@
-"""The folder for results: each result appears whole or not at all, and a good one is never replaced by a worse one."""
+"""The results folder: results are written atomically, and a result is never replaced by a worse one."""
 
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
 import secrets
@@ -15,7 +16,10 @@ from pathlib import Path
 
 import msgspec
 
-from grader.core.errors import ClassError, HarnessError
+from grader.app.spot_checks import is_drawn
+from grader.core.errors import ClassError, GraderError, HarnessError
+from grader.core.exercise import Drawn
+from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.delivery import write_whole
 from grader.reporting.escape import json_value
 
@@ -23,34 +27,34 @@ SCHEMA = "grader/batch-result/v1"
 
 
 class State(str, Enum):
-    """What an attempt at grading a submission came to; only the first two have a report."""
+    """Outcome of an attempt to grade a submission; only the first two have a report."""
 
     GRADED = "graded"
     UNDECIDED = "undecided"  # a criterion was not decided, through no fault of the student
-    REFUSED = "refused"  # the submission cannot be used: the student, or whoever named it, must act
-    FAILED = "failed"  # the grader or the machine failed: never a mark
+    REFUSED = "refused"  # the submission cannot be used; the student must act
+    FAILED = "failed"  # the grader or the machine failed; never counts as a mark
 
     @property
     def worth(self) -> int:
-        """How good a result is: a worse one never replaces a better one."""
+        """Rank of a result; a result never replaces one of a higher rank."""
         return {State.FAILED: 0, State.UNDECIDED: 1, State.REFUSED: 2, State.GRADED: 2}[self]
 
 
 @dataclass(frozen=True, slots=True)
 class ResultStatus:
-    """What became of one submission.
+    """Status of one submission.
 
     Attributes:
         state: See State.
         key: What the result depends on; see `Conditions`.
-        digest: Digest of what was handed in.
-        label: What the source calls the submission.
-        problem: Why there is no report, one line; empty if there is one.
-        hint: One thing to do; may be empty.
+        digest: Digest of the submission.
+        label: Name of the submission in the source.
+        problem: Why there is no report, in one line; empty if there is one.
+        hint: What to do; may be empty.
         score: Points earned.
-        max_score: Points to be had.
-        duration_s: Wall time.
-        usage: What it cost: `processor_s` and `peak_bytes`.
+        max_score: Maximum points.
+        duration_s: Real time.
+        usage: Resources used: `processor_s` and `peak_bytes`.
         schema: Version of this format.
     """
 
@@ -67,22 +71,22 @@ class ResultStatus:
     schema: str = SCHEMA
 
 
-def dump(standing: ResultStatus) -> bytes:
-    """Return a standing as JSON; what is no text in a name becomes a sign for that."""
-    return json.dumps(json_value(asdict(standing)), indent=2).encode() + b"\n"
+def dump(status: ResultStatus) -> bytes:
+    """Encode a status as JSON; invalid text in names is replaced."""
+    return json.dumps(json_value(asdict(status)), indent=2).encode() + b"\n"
 
 
 def load(data: bytes) -> ResultStatus | None:
-    """Return a standing; None if the data is none of this version."""
+    """Decode a status; None for invalid data or another version."""
     try:
-        standing = msgspec.json.decode(data, type=ResultStatus)
+        status = msgspec.json.decode(data, type=ResultStatus)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
         return None
-    return standing if standing.schema == SCHEMA else None
+    return status if status.schema == SCHEMA else None
 
 
 RESULT, ATTEMPT = "result.json", "attempt.json"
-#: The key of the class, which only its owner can read; of all that is handed on, nothing holds it.
+#: The seed key of the class; only its owner can read it, and no exported file contains it.
 SEED_KEY = ".seed.key"
 _FRESH, _OLD = ".new", ".old"
 _PENDING = ".pending.json"
@@ -90,11 +94,11 @@ _PENDING = ".pending.json"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What lies in the folder for one submission.
+    """The stored results of one submission.
 
     Attributes:
         result: The best result so far; None if there is none.
-        attempt: A later attempt that came to less, so that it did not replace the result; None if there was none.
+        attempt: A later, worse attempt that did not replace the result; None if there was none.
     """
 
     result: ResultStatus | None = None
@@ -102,15 +106,15 @@ class Kept:
 
     @property
     def last(self) -> ResultStatus | None:
-        """What was tried last."""
+        """The latest attempt."""
         return self.attempt or self.result
 
 
 class Store:
-    """The results of a class in a folder; at most one process uses it.
+    """The results of a class; only one process at a time uses the folder.
 
     Args:
-        folder: Where they lie.
+        folder: The results folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -122,37 +126,37 @@ class Store:
         return self._students / name
 
     def fresh(self, name: str) -> Path:
-        """Return an empty place for a new result, on the same disk as the old one; it is not there yet."""
+        """Return a new path for a result, on the same disk as the old one; it does not exist yet."""
         return self._students / f".{name}.{secrets.token_hex(4)}{_FRESH}"
 
     def kept(self, name: str) -> Kept:
-        """Return what lies there for a submission."""
+        """Read the stored results of a submission."""
         return Kept(_read(self.place(name) / RESULT), _read(self.place(name) / ATTEMPT))
 
     def names(self) -> list[str]:
         """Return the names of all results, in order."""
         return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
 
-    def commit(self, name: str, fresh: Path, standing: ResultStatus) -> bool:
-        """Take in a new result; return whether it is the result now.
+    def commit(self, name: str, fresh: Path, status: ResultStatus) -> bool:
+        """Store a new result; return whether it replaced the old one.
 
         Args:
             name: Name of the submission.
-            fresh: Folder that holds the new result, complete but for `standing`; it is gone afterwards.
-            standing: What the attempt came to.
+            fresh: Folder with the files of the new result; it is moved or deleted.
+            status: Status of the attempt, written to the folder.
 
         Raises:
-            HarnessError: It cannot be written; what was there before still is.
+            HarnessError: The result cannot be written; the old one is kept.
         """
         place = self.place(name)
         try:
             before = self.kept(name).result
-            if before is not None and before.state.worth > standing.state.worth:
-                write_whole(place / ATTEMPT, dump(standing))
+            if before is not None and before.state.worth > status.state.worth:
+                write_whole(place / ATTEMPT, dump(status))
                 shutil.rmtree(fresh, ignore_errors=True)
                 return False
             fresh.mkdir(exist_ok=True)
-            write_whole(fresh / RESULT, dump(standing))
+            write_whole(fresh / RESULT, dump(status))
             _sync(fresh)
             self._swap(fresh, place)
         except OSError as error:
@@ -162,7 +166,7 @@ class Store:
         return True
 
     def write(self, name: str, data: bytes) -> Path:
-        """Write a file for the whole class, and return where; raises HarnessError if that cannot be done."""
+        """Write a file for the whole class, and return its path; raises HarnessError if it cannot be written."""
         path = self.folder / name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -172,7 +176,7 @@ class Store:
         return path
 
     def pending(self, rerun: str) -> frozenset[str] | None:
-        """Return the names that a stopped run was still to grade again; None if there was no such run."""
+        """Return the names that a stopped run still had to grade; None if there was no such run."""
         try:
             noted = json.loads((self.folder / _PENDING).read_bytes())
             return frozenset(map(str, noted["names"])) if noted["rerun"] == rerun else None
@@ -180,7 +184,7 @@ class Store:
             return None
 
     def note_pending(self, rerun: str, names: Iterable[str]) -> None:
-        """Note what a run is still to grade again, so that the same command goes on where it was stopped."""
+        """Store what a run still has to grade, so that the same command resumes it."""
         left = sorted(names)
         if left:
             self.write(_PENDING, json.dumps({"rerun": rerun, "names": left}).encode())
@@ -188,7 +192,7 @@ class Store:
             (self.folder / _PENDING).unlink(missing_ok=True)
 
     def _swap(self, fresh: Path, place: Path) -> None:
-        """Put a folder in the place of another; whenever the machine stops, one of the two is found again."""
+        """Replace a folder by another; if the machine stops, one of the two can always be recovered."""
         old = self._students / f".{place.name}{_OLD}"
         if place.exists():
             shutil.rmtree(old, ignore_errors=True)
@@ -198,7 +202,7 @@ class Store:
         shutil.rmtree(old, ignore_errors=True)
 
     def recover(self) -> None:
-        """Mend what a killed run left behind: put back results that were being replaced, remove unfinished ones."""
+        """Clean up after a killed run: restore results that were being replaced, and remove unfinished ones."""
         for path in self._students.glob(f".*{_OLD}"):
             place = self.place(path.name.removeprefix(".").removesuffix(_OLD))
             if (place / RESULT).is_file():
@@ -211,16 +215,16 @@ class Store:
 
     @property
     def free_bytes(self) -> int:
-        """Room that is left for results."""
+        """Free disk space for results."""
         return shutil.disk_usage(self.folder).free
 
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open the folder for results, and keep others from writing into it.
+    """Open the results folder, and lock it against other processes.
 
     Raises:
-        ClassError: It cannot be used, or another process grades into it.
+        ClassError: The folder cannot be used, or another process uses it.
     """
     store = Store(folder)
     try:
@@ -238,7 +242,7 @@ def open_store(folder: Path) -> Iterator[Store]:
         yield store
         store.recover()
     except BaseException:
-        with suppress(OSError):  # what stopped the run says more
+        with suppress(OSError):  # the error that stopped the run is more useful
             store.recover()
         raise
     finally:
@@ -252,15 +256,58 @@ def _read(path: Path) -> ResultStatus | None:
 
 
 def _sync(folder: Path) -> None:
-    """Make the names in a folder, and below it, survive a power failure."""
+    """Sync a folder and all folders below it, so that new names survive a power failure."""
     for root, _, _ in os.walk(folder):
         _sync_one(root)
 
 
 def _sync_one(folder: Path | str) -> None:
-    """Make the names in one folder survive, without those below: in the folder of all students they are many."""
+    """Sync one folder without those below, of which the students' folder has many."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Everything that a result depends on besides the submission.
+
+    Attributes:
+        grader: Version of the grader.
+        rubrics: Exercise id and digest of its rubric, in grading order.
+        recording: Digest of the /odom recording; empty if none is played.
+        seed: Seed of all drawn values; None for a whole class in which each submission has its own.
+        clock: The requested clock.
+        isolation: The requested sandbox.
+        every: Whether only exercises count that the submission has a file for.
+        variants: The student's variant values; None if nothing varies.
+        time_budget_s: Real time that all recordings of a submission may take together.
+        spot_checks: Share of the class that is checked on the wall clock, from 0 to 1.
+    """
+
+    grader: str
+    rubrics: tuple[tuple[str, str], ...]
+    recording: str
+    seed: int | None
+    clock: str
+    isolation: str
+    every: bool = False
+    variants: Drawn | None = None
+    time_budget_s: float = TIME_BUDGET_S
+    spot_checks: float = 0.0
+
+    def key(self, submission: str) -> str:
+        """Return the cache key of a result, given the digest of the submission."""
+        depends_on = {**asdict(self), "submission": submission}
+        # A changed share affects only submissions that are drawn with one share and not with the other.
+        if is_drawn(depends_on.pop("spot_checks"), self.seed or 0, submission):
+            depends_on["spot_check"] = True
+        text = json.dumps(depends_on, sort_keys=True)
+        return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def unusable_digest(error: GraderError) -> str:
+    """Return a substitute digest for an unusable submission; it changes when the reason changes."""
+    return f"unusable:{hashlib.sha256(error.message.encode('utf-8', 'surrogatepass')).hexdigest()}"

@@ -1,4 +1,4 @@
-"""What a person watches while a class is graded: a live line on a terminal, plain lines elsewhere."""
+"""Shows the progress of a class: a live bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _NAME = 30
 
 
 class Watcher:
-    """Hears, from any thread, how a class gets on, and writes one line for each submission that is done.
+    """Tracks the progress of a class from any thread, and writes a line for each finished submission.
 
     Args:
-        write: Takes a line.
-        clock: Seconds, ever growing.
+        write: Writes a line.
+        clock: A monotonic clock, in seconds.
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
@@ -36,26 +36,26 @@ class Watcher:
         self._running: set[str] = set()
 
     def begin(self, total: int, kept: int) -> None:
-        """Take note that so many are to be graded, and so many are done already."""
+        """Start, with the numbers of submissions to grade and of those that already have results."""
         self._total, self._started_s = total, self._clock()
         self._write(f"to grade: {total}" + (f", done before: {kept}" if kept else ""))
 
     def step(self, name: str, step: str) -> None:  # noqa: ARG002  steps are not shown
-        """Take note of the step of a submission that begins."""
+        """Record that a step of a submission begins."""
         with self._lock:
             self._running.add(name)
             self._draw()
 
-    def done(self, name: str, standing: ResultStatus) -> None:
-        """Take note of what came of a submission."""
+    def done(self, name: str, status: ResultStatus) -> None:
+        """Record the status of a finished submission."""
         with self._lock:
             self._count += 1
             self._running.discard(name)
-            self._tell(f"{shown(name, limit=60)}: {outcome_words(standing)} in {standing.duration_s:.1f} s")
+            self._write_done(f"{shown(name, limit=60)}: {outcome_words(status)} in {status.duration_s:.1f} s")
             self._draw()
 
     def pace(self) -> str:
-        """Say the rate, the time left and what is running."""
+        """Format the rate, the time left and the running submissions."""
         names = [shown(name, limit=_NAME) for name in sorted(self._running)]
         more = f" and {len(names) - _NAMES} more" if len(names) > _NAMES else ""
         running = f"; running: {', '.join(names[:_NAMES])}{more}" if names else ""
@@ -64,16 +64,16 @@ class Watcher:
         left = clock_time((self._total - self._count) / rate) if rate else "?"
         return f"{60 * rate:.1f}/min, {left} left{running}"
 
-    def _tell(self, line: str) -> None:
-        """Write what came of a submission."""
+    def _write_done(self, line: str) -> None:
+        """Write a line about a finished submission."""
         self._write(f"[{self._count:{len(str(self._total))}}/{self._total}] {line} ({self.pace()})")
 
     def _draw(self) -> None:
-        """Show how far the class is; lines say it already."""
+        """Redraw the progress; nothing to do here, because the lines contain it."""
 
 
 class LiveWatcher(Watcher):
-    """Draws a bar with what is running beside it, and writes the lines above it."""
+    """Draws a progress bar with the running submissions, and writes lines above it."""
 
     def __init__(self, progress: Progress) -> None:
         super().__init__(lambda line: progress.console.print(line, markup=False, highlight=False))
@@ -86,7 +86,7 @@ class LiveWatcher(Watcher):
         if kept:
             self._write(f"done before: {kept}")
 
-    def _tell(self, line: str) -> None:
+    def _write_done(self, line: str) -> None:
         self._write(line)
 
     def _draw(self) -> None:
@@ -95,23 +95,23 @@ class LiveWatcher(Watcher):
 
 
 def clock_time(seconds: float) -> str:
-    """Return a duration as `4:05` or `1:02:03`."""
+    """Format a duration as `4:05` or `1:02:03`."""
     whole = round(seconds)
     hours, minutes = divmod(whole // 60, 60)
     return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"
 
 
-def outcome_words(standing: ResultStatus) -> str:
-    """Say what came of a submission."""
-    if standing.state in (State.GRADED, State.UNDECIDED):
-        points = f"{standing.score:g}/{standing.max_score:g}"
-        return points if standing.state is State.GRADED else f"{points}, undecided"
-    return f"{standing.state.value}: {shown(standing.problem, limit=160)}"
+def outcome_words(status: ResultStatus) -> str:
+    """Describe the outcome of a submission."""
+    if status.state in (State.GRADED, State.UNDECIDED):
+        points = f"{status.score:g}/{status.max_score:g}"
+        return points if status.state is State.GRADED else f"{points}, undecided"
+    return f"{status.state.value}: {shown(status.problem, limit=160)}"
 
 
 @contextmanager
 def shown_watcher(*, wanted: bool) -> Iterator[Watcher]:
-    """Show on standard error how a class gets on."""
+    """Show the progress of a class on standard error."""
     if not wanted or sys.stderr is None:
         yield Watcher(lambda _: None)
         return

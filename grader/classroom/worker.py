@@ -1,4 +1,4 @@
-"""The process that grades one submission of a class: reads a task, leaves results in a folder, says how it ended."""
+"""The process that grades one submission of a class: reads a task, writes the result files, and reports its status."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ from typing import Any
 
 import msgspec
 
-from grader.app.evidence_writer import Keeper
+from grader.app.evidence_writer import EvidenceWriter
 from grader.app.grade import Progress, grade
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions, unusable_digest
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State, unusable_digest
 from grader.core.errors import GraderError, SubmissionError
 from grader.core.report import Report, Reproduction
 from grader.reporting.audience import for_student
@@ -34,41 +33,41 @@ from grader.reporting.platforms.gradescope import render_gradescope
 from grader.rubrics.variants import Recorded
 
 REPORT, PAGE, EVIDENCE = "report.json", "report.html", "evidence"
-#: What students may be given: what the rubric lets them see on the day of grading.
+#: Files for students, with what the rubric lets them see on the day of grading.
 HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE = "feedback.json", "feedback.html", "gradescope.json"
-#: All that a result consists of.
+#: All files and folders of a result.
 PARTS = (REPORT, PAGE, EVIDENCE, HANDED_BACK, HANDED_BACK_PAGE, GRADESCOPE)
-#: Where a page in `students/NAME/` finds the files that all pages share.
+#: Shared files of all pages, relative to a page in `students/NAME/`.
 ASSETS = "../../assets"
 _SET_PARENT_DEATH_SIGNAL = 1  # linux/prctl.h
 
 
 def main() -> None:
-    """Grade the task on standard input; one JSON object a line on standard output tells steps, the last one the end."""
+    """Grade the task from standard input; write steps and finally the status as JSON lines to standard output."""
     ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
     request = json.loads(sys.stdin.buffer.readline())
-    if os.getppid() != request["parent"]:  # it ended before the system was asked to tell
+    if os.getppid() != request["parent"]:  # the parent died before the signal was set
         return
     os.chdir(request["folder"])
     task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
-    standing = attempt(task, _step)
-    _say({"done": json.loads(kept.dump(standing))})
+    status = attempt(task, _step)
+    _send({"done": json.loads(kept.dump(status))})
 
 
 def attempt(task: Task, progress: Progress) -> ResultStatus:
-    """Grade a submission, write what came of it, and return how it stands; never raises for anything in it."""
+    """Grade a submission, write the result, and return its status; never raises because of the submission."""
     started = time.perf_counter()
     try:
-        standing = _graded(task, progress)
+        status = _graded(task, progress)
     except SubmissionError as error:
-        standing = _without_report(task, State.REFUSED, error.message, error.hint, unusable_digest(error))
+        status = _without_report(task, State.REFUSED, error.message, error.hint, unusable_digest(error))
     except GraderError as error:
-        standing = _without_report(task, State.FAILED, error.message, error.hint)
+        status = _without_report(task, State.FAILED, error.message, error.hint)
     except OSError as error:
-        standing = _without_report(task, State.FAILED, f"the result cannot be written: {error.strerror}")
-    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
-        standing = _without_report(task, State.FAILED, f"the grader failed: {type(error).__name__}: {error}")
-    return replace(standing, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
+        status = _without_report(task, State.FAILED, f"the result cannot be written: {error.strerror}")
+    except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
+        status = _without_report(task, State.FAILED, f"the grader failed: {type(error).__name__}: {error}")
+    return replace(status, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
 
 
 def _graded(task: Task, progress: Progress) -> ResultStatus:
@@ -91,13 +90,13 @@ def _graded(task: Task, progress: Progress) -> ResultStatus:
         draw=Recorded(own) if own is not None else None,
     )
     task.into.mkdir()
-    keeper = Keeper([task.into / EVIDENCE], request)
-    report = grade(request, progress, keeper.hear)
+    writer = EvidenceWriter([task.into / EVIDENCE], request)
+    report = grade(request, progress, writer.remember)
     progress("writing the results")
-    today = date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+    today = date.today().isoformat()  # noqa: DTZ011  the local date where it is graded
     for name, text in _files(report, task, today).items():
         write_whole(task.into / name, text.encode())
-    keeper.write(report)
+    writer.write(report)
     key = _used(conditions, report.reproduce).key(report.digest)
     return ResultStatus(
         state=State.GRADED if report.final else State.UNDECIDED,
@@ -110,7 +109,7 @@ def _graded(task: Task, progress: Progress) -> ResultStatus:
 
 
 def _used(conditions: Conditions, given: Reproduction) -> Conditions:
-    """Return the conditions with what was really read; of what a submission has no file of, as it was found before."""
+    """Return the conditions with the digests that were read; those of skipped exercises are kept as they were."""
     if not conditions.every:
         return replace(conditions, rubrics=given.rubrics, recording=given.recording)
     read = dict(given.rubrics)
@@ -135,7 +134,7 @@ def _without_report(task: Task, state: State, problem: str, hint: str = "", dige
 
 
 def _usage() -> dict[str, float]:
-    """Return what this process and all that it started have cost so far."""
+    """Return the resources used so far by this process and its children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return {
         "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
@@ -144,10 +143,10 @@ def _usage() -> dict[str, float]:
 
 
 def _step(step: str) -> None:
-    _say({"step": step})
+    _send({"step": step})
 
 
-def _say(message: Mapping[str, Any]) -> None:
+def _send(message: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
 

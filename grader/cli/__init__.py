@@ -1,1 +1,1 @@
-"""Subcommands of `grade`, each with an attribute `command`."""
+"""The command line of `grade`."""

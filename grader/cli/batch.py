@@ -1,4 +1,4 @@
-"""The command `grade batch`: grade a whole class."""
+"""The command `grade batch`: grades a whole class."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from grader.reporting.escape import encoded, shown
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
-    from grader.classroom.summary import Graded
+    from grader.classroom.outputs import Graded
 
 _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "canvas")
 _RERUNS = ("changed", "failed", "undecided", "all")
@@ -150,7 +150,7 @@ def command(  # noqa: PLR0913  one parameter an option
         given=read_given(templates or (shipped_templates(),)) if similarity else None,
     )
     try:
-        with _graders(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
             graded = grade_class(course, watcher, _warn, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
@@ -159,8 +159,8 @@ def command(  # noqa: PLR0913  one parameter an option
     return _code(graded)
 
 
-def _graders(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
-    """Return what grades: this machine, or a cluster for as long as it is needed."""
+def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
+    """Return a scheduler factory for this machine, or for a cluster, which stays connected in the context."""
     if scheduler is None:
         from grader.classroom.local import LocalScheduler  # noqa: PLC0415  as above
 
@@ -171,7 +171,7 @@ def _graders(scheduler: str | None, jobs: int | None) -> AbstractContextManager[
 
 
 def _print(graded: Graded, *, as_json: bool) -> None:
-    from grader.classroom.summary import render_summary, summary_json  # noqa: PLC0415  as above
+    from grader.classroom.outputs import render_summary, summary_json  # noqa: PLC0415  as above
 
     text = summary_json(graded) if as_json else render_summary(graded)
     sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))
@@ -179,7 +179,7 @@ def _print(graded: Graded, *, as_json: bool) -> None:
 
 
 def _code(graded: Graded) -> int:
-    """Return the exit code: what is ours or the machine's comes first, then what a student must mend."""
+    """Return the exit code: failures of the grader or the machine take precedence over unusable submissions."""
     from grader.classroom.gradebook import Status  # noqa: PLC0415  as above
 
     if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):

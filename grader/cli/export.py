@@ -1,4 +1,4 @@
-"""The command `grade export`: pack the grader for a platform that runs it itself."""
+"""The command `grade export`: packs the grader for platforms that run it themselves."""
 
 from __future__ import annotations
 

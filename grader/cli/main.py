@@ -1,4 +1,4 @@
-"""The command line: what is asked for, what is printed where, and the exit code."""
+"""The command line: subcommands, output and exit codes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ import click
 
 import grader
 from grader.app.exit_codes import ALL_MET, INTERRUPTED, UNDECIDED, UNUSABLE, exit_code
-from grader.app.progress import shown_progress
-from grader.cli import batch, doctor, explain, export, rejudge, rubric, selftest
+from grader.cli import batch, export, rejudge, rubric
 from grader.cli.options import (
     EVIDENCE,
     PATH,
@@ -26,12 +25,13 @@ from grader.cli.options import (
     parse_percent,
     parse_share,
     readers,
+    shown_progress,
     time_budget_option,
 )
 from grader.core.checkup import TIERS, missing
 from grader.core.errors import GraderError, HarnessError, RubricError
 from grader.core.releases import TRIED
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.reporting.delivery import Output, deliver, early_delivery, prepared, show
 from grader.reporting.escape import encoded, shown
 from grader.reporting.formats import FORMATS
 
@@ -40,12 +40,12 @@ _EPILOG = (
     "given cannot be used, 3 undecided through no fault of the student, 130 interrupted."
 )
 _TIERS = ("auto", *TIERS)
-# The name of the command that runs when no subcommand is named; no argument of a process can hold a NUL.
+# Internal name of the default command; it cannot clash, because a process argument cannot contain a NUL.
 _DEFAULT = "\0"
 
 
 class CommandLine(click.Group):
-    """Subcommands, and a default command that runs when the first argument names none of them."""
+    """Subcommands, and a default command that runs if the first argument is none of them."""
 
     def __init__(self, default: click.Command, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -53,11 +53,11 @@ class CommandLine(click.Group):
         self.add_command(default, _DEFAULT)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Name the default command unless a subcommand is named."""
+        """Insert the default command unless the first argument is a subcommand."""
         return super().parse_args(ctx, args if args and args[0] in self.commands else [_DEFAULT, *args])
 
     def invoke(self, ctx: click.Context) -> None:
-        """Run the command and leave with its exit code; every problem becomes a line on standard error."""
+        """Run the command and exit with its code; errors are printed on standard error."""
         ctx.exit(_guarded(lambda: super(CommandLine, self).invoke(ctx)))
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -180,10 +180,10 @@ def _grade(  # noqa: PLR0913  one parameter an option
         draw=drawn_by(student, variant_key),
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
-    keeper = evidence_writer.Keeper(folders, request)
+    writer = evidence_writer.EvidenceWriter(folders, request)
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
-        report = grade.grade(request, progress, keeper.hear, early_delivery(wanted, for_whom), pictures=pictures)
+        report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
         _warn(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
@@ -193,7 +193,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     if folders and seen is not report:
         _warn("the evidence is not kept: it holds what the rubric withholds from students")
     else:
-        keeper.write(report)
+        writer.write(report)
     return exit_code(seen, min_score)
 
 
@@ -223,17 +223,57 @@ def _observe(  # noqa: PLR0913  one parameter an option
     return ALL_MET
 
 
+@click.command(name="doctor")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+def _doctor(*, as_json: bool) -> int:
+    """Say what this machine can do: ROS, an exchange of messages, sandboxes, limits, and what mends each lack.
+
+    Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
+    """
+    from grader.app.doctor import examine  # noqa: PLC0415  the rest of the grader, which --help does not need
+    from grader.reporting.doctor import checkup_to_json, render_checkup  # noqa: PLC0415
+
+    with shown_progress(wanted=True) as progress:
+        checkup = examine(progress)
+    if as_json:
+        show(lambda _: checkup_to_json(checkup), for_people=False)
+    else:
+        show(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour), for_people=True)
+    return ALL_MET if checkup.safe else UNUSABLE
+
+
+@click.command(name="explain")
+@click.argument("name", metavar="CRITERION")
+@click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Look in this rubric; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
+    """Explain a CRITERION, or a check by its name.
+
+    Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
+    for it.
+    """
+    from grader.app.explain import explain  # noqa: PLC0415  the rest of the grader, which --help does not need
+    from grader.reporting.explained import explanations_to_json, render_explanations  # noqa: PLC0415
+
+    found = explain(name, rubrics)
+    if as_json:
+        show(lambda _: explanations_to_json(found), for_people=False)
+    else:
+        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+    return ALL_MET
+
+
 #: The command `grade`; further subcommands are added to it.
 app = CommandLine(_grade, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
 _grade.context_settings = app.context_settings
 app.add_command(_observe)
 app.add_command(rejudge.command)
 app.add_command(batch.command)
-app.add_command(explain.command)
-app.add_command(doctor.command)
+app.add_command(_explain)
+app.add_command(_doctor)
 app.add_command(export.command)
 app.add_command(rubric.command)
-app.add_command(selftest.command)
+app.add_command(rubric.selftest_command)
 
 
 def main() -> None:
@@ -242,7 +282,7 @@ def main() -> None:
 
 
 def _guarded(run: Callable[[], object]) -> int:
-    """Return the exit code of a command, whatever becomes of it."""
+    """Run a command and return its exit code, whether it succeeds or raises."""
     try:
         code = run()
     except click.exceptions.Exit:
@@ -251,14 +291,14 @@ def _guarded(run: Callable[[], object]) -> int:
         _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
-        # A rubric may have several mistakes, one a line; in any other message a line break comes from a hostile name.
+        # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.
         lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
         _complain(*lines, hint=error.hint)
         return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: no report was made", err=True)
         return INTERRUPTED
-    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+    except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
             traceback.print_exc()
         _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")

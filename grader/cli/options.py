@@ -1,10 +1,12 @@
-"""What the commands of the command line share: how options are read, and which files they name."""
+"""Options and helpers that several commands share."""
 
 from __future__ import annotations
 
 import difflib
 import importlib.util
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
@@ -17,13 +19,15 @@ from grader.core.exercise import Audience
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.audience import Readers
 from grader.reporting.delivery import Output
+from grader.reporting.escape import shown
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
-    from grader.app.seeds import SeedKey
-    from grader.app.variants import ByKey
+    from grader.app.grade import Progress
+    from grader.app.seeds import ByKey, SeedKey
 
-#: What `-o` calls the folder of recordings that a report rests on.
+
+#: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -42,7 +46,7 @@ time_budget_option = click.option(
 
 
 def audience_options(command: _Command) -> _Command:
-    """Add the options that say who reads the reports, and when."""
+    """Add the options `--audience` and `--as-of`."""
     day = click.option(
         "--as-of",
         metavar="DATE",
@@ -58,12 +62,12 @@ def audience_options(command: _Command) -> _Command:
 
 
 def readers(audience: str | None, day: str) -> Readers:
-    """Return who reads the reports, as the options of `audience_options` say."""
+    """Return the readers of the reports, from the values of `--audience` and `--as-of`."""
     return Readers(None if audience is None else Audience(audience), day)
 
 
 def drawn_by(student: str, key: Path | None) -> ByKey | None:
-    """Return what draws a student's variants; None if neither option is given.
+    """Return the source of a student's variant values; None if neither option is given.
 
     Raises:
         GraderError: The key or the id cannot be used.
@@ -72,13 +76,13 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
         return None
     if key is None or not student:
         raise click.BadParameter("--student and --variant-key need each other")
-    from grader.app.variants import by_key  # noqa: PLC0415  reading, which --help does not need
+    from grader.app.seeds import by_key  # noqa: PLC0415  reading, which --help does not need
 
     return by_key(key, student)
 
 
 def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
-    """Return the key that drawn values follow from; None if none is given, or a seed that needs none.
+    """Return the seed key from `--seed-key` or the environment; None if neither has one.
 
     Raises:
         KeyFileError: The key cannot be used.
@@ -91,7 +95,7 @@ def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
 
 
 def require(what: str, library: str, extra: str) -> None:
-    """Make sure that the library of an optional extra is installed; raises EnvironmentFault with what to install."""
+    """Raise EnvironmentFault, with the command to install it, if the library of an optional extra is missing."""
     if importlib.util.find_spec(library) is None:
         message = f"{what}: expected the package {library}, found none"
         raise EnvironmentFault(message, f"pip install 'rclpy-grader[{extra}]'")
@@ -100,7 +104,7 @@ def require(what: str, library: str, extra: str) -> None:
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
     del ctx, param
     if value is None:
-        return date.today().isoformat()  # noqa: DTZ011  the calendar on the wall where it is graded
+        return date.today().isoformat()  # noqa: DTZ011  the local date where it is graded
     try:
         if date.fromisoformat(value).isoformat() == value:
             return value
@@ -110,7 +114,7 @@ def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) ->
 
 
 def parse_outputs(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[Output, ...]:
-    """Return what `-o FORMAT=PATH` asks for; for click."""
+    """Parse the values of `-o FORMAT=PATH`; a click callback."""
     del ctx, param
     return tuple(_parse_output(value) for value in values)
 
@@ -127,7 +131,7 @@ def _parse_output(value: str) -> Output:
 
 
 def parse_percent(ctx: click.Context, param: click.Parameter, value: float | None) -> Fraction | None:
-    """Return what `--min-score P` asks for; for click."""
+    """Parse the value of `--min-score P`; a click callback."""
     del ctx, param
     if value is None:
         return None
@@ -137,7 +141,7 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
 
 
 def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
-    """Return what `--spot-checks 5%` asks for, from 0 to 1; for click."""
+    """Parse the value of `--spot-checks P%` to a share from 0 to 1; a click callback."""
     del ctx, param
     try:
         percent = float(value.removesuffix("%"))
@@ -149,6 +153,23 @@ def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float
 
 
 def nearest(found: str, known: Sequence[str]) -> str:
-    """Return the end of a sentence that names what was probably meant, or all there is."""
+    """End a message with the closest known name, or with all known names."""
     near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+
+
+@contextmanager
+def shown_progress(*, wanted: bool) -> Iterator[Progress]:
+    """Show the current step on a terminal, and erase it at the end."""
+    if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
+        yield _ignore
+        return
+    from rich.console import Console  # noqa: PLC0415  only for a terminal
+    from rich.text import Text  # noqa: PLC0415
+
+    with Console(stderr=True).status("starting") as status:
+        yield lambda step: status.update(Text(shown(step)))
+
+
+def _ignore(step: str) -> None:
+    del step

@@ -1,4 +1,4 @@
-"""The command `grade rejudge`: judge kept evidence again, without running anything."""
+"""The command `grade rejudge`: judges kept evidence again without running anything."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def command(  # noqa: PLR0913  one parameter an option
 
 
 def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
-    """Deliver the report of one submission as grading does."""
+    """Judge one submission, and deliver its report as grading does."""
     from grader.app import rejudge  # noqa: PLC0415  as above
     from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
     from grader.reporting.audience import told  # noqa: PLC0415
@@ -106,7 +106,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
 
 
 def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None) -> int:
-    """Print what became of every submission, and write one file for each of them and each format."""
+    """Judge many submissions, print their results, and write one file for each submission and format."""
     from grader.app import rejudge  # noqa: PLC0415  as above
     from grader.reporting.rejudged import render_changes, render_results, results_to_json  # noqa: PLC0415  as above
 

@@ -2,106 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import signal
-import socket
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
-from typing import Any
 
-from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
-from grader.core.trace import LogRecord, Observation, OutputLine
-from grader.execution.console import Logged, last_traceback, read_console, thread_tracebacks
+from grader.core.trace import Observation, OutputLine
+from grader.execution.console import Logged, read_console, thread_tracebacks
 from grader.execution.ending import reported_fault
 from grader.execution.observer import Observer
 from grader.execution.plan import Plan
-from grader.execution.sandbox.protocol import Command
 from grader.execution.student_process import NodeProcess
 from grader.execution.wall_runner import LOOK_S, WallRunner
-
-#: Name of the sandbox process, which starts the student's.
-SANDBOX = "bwrap"
-#: Maximum number of sandbox processes around the student's.
-DEEP = 8
-INTERRUPTED = 128 + signal.SIGINT
-
-
-class BareProcess(NodeProcess):
-    """A process without a connection to the grader: it runs at once, is watched, and is stopped by a signal."""
-
-    @classmethod
-    def begin(cls, name: str, root: str, command: Command, limits: Limits) -> BareProcess:
-        """Start the process."""
-        ours, unused_end = socket.socketpair()
-        student = cls.start(name, root, command, ours, limits)
-        assert isinstance(student, cls)
-        student.unused_end = unused_end
-        return student
-
-    #: The other end of the socket pair, which no process uses.
-    unused_end: socket.socket | None = None
-    _told_end = False
-
-    def tell(self, answer: Mapping[str, Any]) -> None:
-        """Send SIGINT if the answer is to stop; drop any other answer, since no host would read it."""
-        if answer.get("stop") and not self._has_ended():
-            with contextlib.suppress(OSError):
-                os.kill(self._program(), signal.SIGINT)
-
-    def reports(self) -> list[dict[str, Any] | None]:
-        """Report the end of the process once; None stands for an end by a signal or a limit."""
-        if self._told_end or not self._has_ended():
-            return []
-        self._told_end = True
-        self.drain()
-        code = self.process.returncode
-        if self.stopped or not (0 <= code <= 128 or code in (INTERRUPTED, -signal.SIGINT)):
-            return [None]
-        report: dict[str, Any] = {"kind": "exited", "code": INTERRUPTED if code == -signal.SIGINT else code}
-        fault = last_traceback(self._last.decode("utf-8", "backslashreplace"), self.root) if code == 1 else None
-        return [{**report, "fault": fault} if fault else report]
-
-    def close(self) -> None:
-        """Close the file descriptors of a process that has ended."""
-        super().close()
-        if self.unused_end is not None:
-            self.unused_end.close()
-
-    def _has_ended(self) -> bool:
-        return self.process.poll() is not None
-
-    def _parsed(self, t_ns: int, stream: str, text: str) -> list[LogRecord | OutputLine]:
-        """Return the output as lines; log records are parsed from them at the end of the run."""
-        return [*self._lines(t_ns, stream, text)]
-
-    def _program(self) -> int:
-        """Return the pid of the student's program, inside of the sandbox's own processes."""
-        pid = self.process.pid
-        for _ in range(DEEP):
-            children = _children(pid)
-            if _name(pid) != SANDBOX or not children:
-                break
-            pid = children[0]
-        return pid
-
-
-def _children(pid: int) -> list[int]:
-    try:
-        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
-    except (OSError, ValueError):
-        return []
-
-
-def _name(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/comm").read_text(encoding="utf-8", errors="replace").strip()
-    except OSError:
-        return ""
-
 
 #: How long, in real time, to wait for the first node.
 FIRST_NODE_NS = 15 * NS_PER_S

@@ -21,8 +21,7 @@ from grader.core.errors import HarnessError
 from grader.core.limits import Limits
 from grader.core.quantities import GIB, MIB, NS_PER_S, duration
 from grader.core.trace import ClockKind, Fault, FaultKind, Mark, Trace
-from grader.execution.bare_runner import BareProcess
-from grader.execution.bare_start import bare_arguments
+from grader.execution.bare_start import BareProcess, bare_arguments
 from grader.execution.codec import from_json, trace_to_json
 from grader.execution.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
 from grader.execution.notes import Places

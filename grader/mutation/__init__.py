@@ -1,1 +1,1 @@
-"""Grades a rubric: mutates its reference solution as students err, and tells which criterion notices."""
+"""Tests a rubric: mutates its reference solution with typical mistakes, and finds out which criteria detect them."""

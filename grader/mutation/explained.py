@@ -1,4 +1,4 @@
-"""What an author says about a rubric's self-test in a file beside it: folders, baseline, why something survives."""
+"""Reads an author's notes on the self-test of a rubric: folders, baseline, and why mutants survive."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, ma
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One sentence of the author's about some mutants or variants.
+    """An author's note on some mutants or variants.
 
     Attributes:
-        pattern: What it is about: ids, with `*` for anything.
-        because: The sentence; empty where only criteria are named.
-        criteria: Which of these should notice such a mutant; empty where a sentence is given.
-        where: Place in the file, for messages.
+        pattern: Pattern for their ids, with `*` for anything.
+        because: The explanation; empty if the note names criteria.
+        criteria: Criteria that should detect such a mutant; empty if the note has an explanation.
+        where: Position in the file, for messages.
     """
 
     pattern: str
@@ -39,22 +39,22 @@ class Explanation:
     where: str = ""
 
     def fits(self, id_: str) -> bool:
-        """Whether it is about this mutant or variant."""
+        """Whether the pattern matches a mutant or variant."""
         return fnmatchcase(id_, self.pattern)
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """All that the author says.
+    """All notes of an author.
 
     Attributes:
-        reference: Folder of the reference solution; None if none is named.
-        template: Folder of the template; None if none is named.
-        template_score: What the template is worth; None if nothing is said.
+        reference: Folder of the reference solution; None if not given.
+        template: Folder of the template; None if not given.
+        template_score: Expected score of the template; None if not given.
         survivors: Why some mutants survive.
-        expected: Which criteria should notice others.
+        expected: Which criteria should detect other mutants.
         variants: Why some correct variants lose points.
-        criteria: Criterion id -> why no mutant turns it.
+        criteria: Criterion id -> why it detects no mutant.
     """
 
     reference: Path | None = None
@@ -102,15 +102,15 @@ class _File(_Shape):
 
 
 def beside(rubric: Path) -> Path:
-    """Return where the notes on a rubric's self-test lie: `NAME.selftest.yaml` beside `NAME.yaml`."""
+    """Return the path of the notes on a rubric: `NAME.selftest.yaml` beside `NAME.yaml`."""
     return rubric.with_name(f"{rubric.stem}.selftest.yaml")
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:
-    """Return what a file says about the self-test of an exercise; a file that is not there says nothing.
+    """Read the notes on the self-test of an exercise; a missing file counts as empty.
 
     Raises:
-        RubricError: It cannot be read, or has mistakes; one line each, in the order of the file.
+        RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
     """
     if not path.exists():
         return Explained()
@@ -126,7 +126,7 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
 
 
 def idle(explanations: Iterable[Explanation], needed: Callable[[Explanation], bool]) -> tuple[str, ...]:
-    """Return what explains nothing, each with its place."""
+    """Return the unused patterns with their positions."""
     return tuple(f"{e.where}: `{shown(e.pattern)}` explains nothing" for e in explanations if not needed(e))
 
 

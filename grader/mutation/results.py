@@ -1,4 +1,4 @@
-"""What came of testing a rubric: of each mutant, of each correct variant, of the reference and the template."""
+"""The results of testing a rubric: reference, template, mutants and correct variants."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from fractions import Fraction
 from grader.core.exercise import Outcome
 from grader.core.report import ExerciseReport
 
-#: Outcomes by which a criterion shows that something is wrong, and not only that something else was.
+#: Outcomes with which a criterion itself detects a mistake, rather than being blocked by another one.
 _TURNED = (Outcome.NOT_MET, Outcome.PARTLY)
 
 
 class Fate(str, Enum):
-    """What became of a mutant."""
+    """The fate of a mutant."""
 
     KILLED = "killed"
     SURVIVED = "survived"
-    UNDECIDED = "undecided"  # the grader or the machine failed: it says nothing about the rubric
+    UNDECIDED = "undecided"  # the grader or the machine failed, which says nothing about the rubric
 
 
 @dataclass(frozen=True, slots=True)
 class ResultRank:
-    """What a program is worth under a rubric.
+    """The result of grading a program by a rubric.
 
     Attributes:
         score: Points earned.
-        max_score: Points to be had.
+        max_score: Maximum points.
         outcomes: Criterion id -> outcome, in rubric order.
-        reasons: Criterion id -> reason, of those that are not met in full.
+        reasons: Criterion id -> reason, of criteria that are not fully met.
     """
 
     score: Fraction
@@ -46,24 +46,24 @@ class ResultRank:
 
     @property
     def decided(self) -> bool:
-        """Whether nothing is undecided."""
+        """Whether no criterion is undecided."""
         return Outcome.UNDECIDED not in self.outcomes.values()
 
     @property
     def turned(self) -> tuple[str, ...]:
-        """The criteria that are not met, or partly, by themselves."""
+        """The criteria that are not met or partly met, without blocked ones."""
         return tuple(id_ for id_, outcome in self.outcomes.items() if outcome in _TURNED)
 
     @property
     def fate(self) -> Fate:
-        """What becomes of a mutant that is worth this."""
+        """The fate of a mutant with this result."""
         if any(outcome in (*_TURNED, Outcome.BLOCKED) for outcome in self.outcomes.values()):
             return Fate.KILLED
         return Fate.SURVIVED if self.decided else Fate.UNDECIDED
 
 
 def standing_of(report: ExerciseReport) -> ResultRank:
-    """Return what a report says a program is worth."""
+    """Extract the result of a program from its report."""
     return ResultRank(
         score=report.score,
         max_score=report.max_score,
@@ -74,16 +74,16 @@ def standing_of(report: ExerciseReport) -> ResultRank:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One mutant, or one correct variant, that was run.
+    """A mutant or correct variant that was run.
 
     Attributes:
-        id: Stable and readable: `FILE:LINE:operator:detail`, of a variant `FILE:variant`.
-        file: Name of the file that was changed.
-        operator: What changed it.
+        id: Stable, readable id: `FILE:LINE:operator:detail`, or `FILE:variant` for a variant.
+        file: Name of the changed file.
+        operator: The operator that changed it.
         change: The change in one line.
-        standing: What it is worth.
-        expected: Criteria of which one should notice it, as the author says; empty if nothing is said.
-        because: Why it may do what it does, as the author says: survive, or as a variant lose points.
+        standing: The result of grading it.
+        expected: Criteria one of which should detect it, according to the notes; empty if not given.
+        because: The explanation in the notes of why a mutant survives or a variant loses points.
     """
 
     id: str
@@ -96,32 +96,32 @@ class Trial:
 
     @property
     def fate(self) -> Fate:
-        """What became of it."""
+        """The fate of the mutant."""
         return self.standing.fate
 
     @property
     def as_expected(self) -> bool:
-        """Whether a criterion noticed it that should, if anything is said about that."""
+        """Whether an expected criterion detected it; any criterion if none are expected."""
         return self.fate is Fate.KILLED and (not self.expected or bool(set(self.expected) & set(self.standing.turned)))
 
 
 @dataclass(frozen=True, slots=True)
 class SelftestResult:
-    """What came of testing one rubric.
+    """The result of testing one rubric.
 
     Attributes:
-        rubric: Path of its file, as named.
+        rubric: Path of its file, as given.
         exercise: Exercise id.
         criteria: Criterion ids, in rubric order.
-        reference: What the reference solution is worth.
-        template: What the template is worth; None if there is none.
-        baseline: What the template should be worth; None if nobody said.
-        mutants: In order of files, operators and lines.
-        variants: Correct programs, in order.
-        whole: Whether every mutant ran, and not only some.
-        idle: Patterns of the author's that explain nothing, with their places.
-        unturned: Criterion id -> why no mutant turns it, as the author says.
-        recordings: How many scenarios were recorded.
+        reference: Result of the reference solution.
+        template: Result of the template; None if there is none.
+        baseline: Expected score of the template; None if not given.
+        mutants: The mutants, ordered by file, operator and line.
+        variants: The correct variants, in order.
+        whole: Whether all mutants were run.
+        idle: Unused patterns of the notes, with their positions.
+        unturned: Criterion id -> why it detects no mutant, according to the notes.
+        recordings: Number of recorded scenarios.
         duration_s: Real time.
     """
 
@@ -141,22 +141,22 @@ class SelftestResult:
 
     @property
     def survivors(self) -> tuple[Trial, ...]:
-        """Mutants that nobody noticed, and that nobody explained."""
+        """Mutants that no criterion detected, and that the notes do not explain."""
         return tuple(trial for trial in self.mutants if trial.fate is Fate.SURVIVED and not trial.because)
 
     @property
     def marked_down(self) -> tuple[Trial, ...]:
-        """Correct variants that lose points, and nobody explained why."""
+        """Correct variants that lose points without an explanation in the notes."""
         return tuple(v for v in self.variants if v.fate is Fate.KILLED and not v.because)
 
     @property
     def undecided(self) -> tuple[Trial, ...]:
-        """Mutants and variants that say nothing, for the grader or the machine failed."""
+        """Mutants and variants without a result, because the grader or the machine failed."""
         return tuple(trial for trial in (*self.mutants, *self.variants) if trial.fate is Fate.UNDECIDED)
 
     @property
     def never_turned(self) -> tuple[str, ...]:
-        """Criteria that noticed no mutant at all, and nobody explained why; nothing is said if only some ran."""
+        """Criteria that detected no mutant, without an explanation; empty if only some mutants were run."""
         turned = {id_ for trial in self.mutants for id_ in trial.standing.turned}
         return (
             tuple(id_ for id_ in self.criteria if id_ not in turned and id_ not in self.unturned) if self.whole else ()
@@ -164,18 +164,18 @@ class SelftestResult:
 
     @property
     def template_fits(self) -> bool:
-        """Whether the template is worth what it should be, as far as anybody said."""
+        """Whether the template has its expected score, if one is given."""
         return self.template is None or self.baseline is None or self.template.score == self.baseline
 
     @property
     def passed(self) -> bool:
-        """Whether the rubric has no hole that is known."""
+        """Whether the test found no hole in the rubric."""
         faults = (self.survivors, self.marked_down, self.never_turned)
         return self.reference.full and self.template_fits and not any(faults)
 
 
 def one_line_change(before: str, after: str) -> str:
-    """Return what differs between two sources as `old lines => new lines`, without indentation."""
+    """Describe the difference of two sources as `old lines => new lines`, without indentation."""
     old, new = before.splitlines(), after.splitlines()
     removed, added = [], []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():

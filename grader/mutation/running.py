@@ -1,4 +1,4 @@
-"""Tests rubrics: tries reference, template, mutants and correct variants, side by side."""
+"""Tests rubrics: runs reference, template, mutants and correct variants in parallel."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial, one
 from grader.submissions.sources import read_sources
 from grader.submissions.submission import stage_submission
 
-#: So many programs for each worker are recorded before any is judged: traces are large.
+#: Programs per worker that are recorded before they are judged; limited because traces are large.
 _AT_ONCE = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A changed file that is to be run, and what is known of it."""
+    """A changed file to run."""
 
     id: str
     file: str
@@ -49,7 +49,7 @@ class Candidate:
 
 @dataclass(slots=True)
 class TrialRunner:
-    """What the programs of one rubric are tried with."""
+    """Grades the programs of one rubric."""
 
     session: RecordingSession
     workers: int
@@ -64,12 +64,12 @@ class TrialRunner:
     recordings: int = 0
 
     def measure_reference(self) -> ResultRank:
-        """Return what the reference solution is worth, and keep what was recorded of it."""
+        """Grade the reference solution, and keep its traces."""
         standing, self.traces = self._recorded(self.reference)
         return standing
 
     def standing(self, submission: Submission) -> ResultRank:
-        """Return what a whole submission is worth."""
+        """Grade a complete submission."""
         return self._recorded(submission)[0]
 
     def _recorded(self, submission: Submission) -> tuple[ResultRank, dict[str, Trace]]:
@@ -81,7 +81,7 @@ class TrialRunner:
         return standing_of(judge_exercise(self.exercise, traces, submission, sources)), traces
 
     def standings(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, ResultRank]]:
-        """Yield what each changed program is worth; scenarios without the changed file are those of the reference."""
+        """Grade changed programs; scenarios without the changed file reuse the traces of the reference."""
         done, waiting = 0, iter(candidates)
         at_once = _AT_ONCE * self.workers
         while chunk := list(islice(waiting, at_once)):
@@ -116,21 +116,21 @@ class TrialRunner:
         return replace(self.reference, root=root)
 
 
-#: A sample holds a variant for so many mutants.
+#: A sample has one variant for this many mutants.
 _MUTANTS_A_VARIANT = 4
 
 
 @dataclass(frozen=True, slots=True)
 class SelftestOptions:
-    """How rubrics are tested.
+    """How to test rubrics.
 
     Attributes:
-        reference: Folder of reference solutions; None for what the notes beside a rubric name.
-        template: Folder of templates; None likewise.
-        jobs: Scenarios recorded side by side; None leaves it to the machine.
-        only: Ids to run, with `*` for anything; empty for all.
+        reference: Folder of reference solutions; None for the one in the notes beside a rubric.
+        template: Folder of templates; None for the one in the notes.
+        jobs: Scenarios recorded in parallel; None for a number that suits the machine.
+        only: Pattern for the ids to run, with `*` for anything; empty for all.
         sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
-        seed: Of the sample, and of every drawn value; None derives the values from the reference solution.
+        seed: Seed of the sample and of all drawn values; None derives the values from the reference solution.
         clock: `virtual`, `wall` or `auto`.
         isolation: `auto`, `none` or the name of a tier.
     """
@@ -146,15 +146,15 @@ class SelftestOptions:
 
 
 def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progress) -> Iterator[SelftestResult]:
-    """Test rubrics, and yield what came of each as soon as it is there.
+    """Test rubrics, and yield the result of each as it is ready.
 
     Args:
-        rubrics: Their files.
-        options: How they are tested.
-        progress: Hears which step begins.
+        rubrics: Rubric files.
+        options: How to test them.
+        progress: Called at the start of each step.
 
     Raises:
-        GraderError: Something that the test needs cannot be used; its class says who must act.
+        GraderError: Something that the test needs cannot be used; the class of the error tells who must act.
     """
     prepared = [_prepared(path, options) for path in rubrics]
     workers = options.jobs or len(os.sched_getaffinity(0))
@@ -174,7 +174,7 @@ def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Exp
     return path, exercise, explained
 
 
-def _bench(  # noqa: PLR0913  each comes from another stage
+def _bench(  # noqa: PLR0913  each comes from a different stage
     path: Path,
     exercise: Exercise,
     explained: Explained,
@@ -206,7 +206,7 @@ def _staged(folder: Path | None, exercise: Exercise, session: RecordingSession, 
 
 
 def _sources(reference: Submission, exercise: Exercise) -> dict[str, str]:
-    """Return the text of every file of the reference solution; raises RubricError if one cannot be used."""
+    """Read the files of the reference solution; raises RubricError if one cannot be used."""
     sources = read_sources(reference)
     for name in exercise.files:
         if name not in sources:
@@ -227,7 +227,7 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
     template = None
     if explained.template is not None:
         template = bench.standing(_staged(explained.template, exercise, bench.session, "template"))
-    # Without a right program nothing can be said about wrong ones.
+    # Without a correct program, results of wrong ones are meaningless.
     tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
     correct = tuple(_variants(bench, explained, options)) if reference.full else ()
     whole = reference.full and not options.only and options.sample is None
@@ -249,7 +249,7 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
 
 
 def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
-    """Yield the mutants that were asked for, tried."""
+    """Run the selected mutants."""
     found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
     wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
     for candidate, standing in bench.standings(
@@ -262,7 +262,7 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
 
 
 def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
-    """Yield the correct variants that were asked for, tried."""
+    """Run the selected correct variants."""
     found = [variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name)]
     wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
@@ -283,10 +283,10 @@ def _wanted(id_: str, options: SelftestOptions) -> bool:
 
 
 def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> list[Candidate]:
-    """Return at most so many, spread over the operators, in the same order; the draw repeats."""
+    """Draw a reproducible sample, spread over the operators, in the original order."""
     if most is None:
         return list(candidates)
-    draw = random.Random(f"{seed}")  # noqa: S311  it has to repeat
+    draw = random.Random(f"{seed}")  # noqa: S311  must be reproducible
     groups: dict[str, list[Candidate]] = {}
     for candidate in draw.sample(candidates, len(candidates)):
         groups.setdefault(candidate.operator, []).append(candidate)
@@ -301,7 +301,7 @@ def _first(explanations: Iterable[Explanation], id_: str) -> Explanation | None:
 
 
 def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Trial]) -> tuple[str, ...]:
-    """Return what the author explains and nothing needs."""
+    """Return the explanations in the notes that nothing needs."""
     survived = [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]
     lost = [trial.id for trial in variants if trial.fate is Fate.KILLED]
     every = [trial.id for trial in mutants]

@@ -1,4 +1,4 @@
-"""Shows what came of a self-test: tables for people, JSON for programs."""
+"""Renders the results of a self-test: tables for people, JSON for programs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
 def render_results(results: Sequence[SelftestResult], *, width: int, colour: bool) -> str:
-    """Return what came of some rubrics as text.
+    """Render the results of rubrics as text.
 
     Args:
-        results: What came of each.
-        width: Columns of the page; at least 80 are used.
-        colour: Whether to colour with ANSI sequences; without, the text is the same.
+        results: The results, one for each rubric.
+        width: Width of the page in columns; at least 80 are used.
+        colour: Whether to add ANSI colours; the text is the same without them.
     """
     out = StringIO()
     console = Console(
@@ -91,7 +91,7 @@ def _count(result: SelftestResult) -> str:
 
 
 def _operators(result: SelftestResult) -> Table:
-    """Return a row an operator."""
+    """Build the table with a row for each operator."""
     table = _table("operator", "made", "killed", "as said", "by other", "excused", "undecided", "SURVIVED")
     for name in dict.fromkeys(trial.operator for trial in result.mutants):
         own = [trial for trial in result.mutants if trial.operator == name]
@@ -113,7 +113,7 @@ def _operators(result: SelftestResult) -> Table:
 
 
 def _criteria(result: SelftestResult) -> Table:
-    """Return a row a criterion."""
+    """Build the table with a row for each criterion."""
     table = _table("criterion", "turned by", "alone", "expected", "of these turned", "")
     for id_ in result.criteria:
         turned = [trial for trial in result.mutants if id_ in trial.standing.turned]
@@ -173,7 +173,7 @@ def _undecided(trials: Sequence[Trial]) -> int:
 
 
 def results_to_json(results: Sequence[SelftestResult]) -> str:
-    """Return what came of some rubrics as JSON text; selftest.schema.json describes it."""
+    """Render the results of rubrics as JSON, as described by selftest.schema.json."""
     data = {"schema": SCHEMA, "passed": all(r.passed for r in results), "rubrics": [_as_data(r) for r in results]}
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
 

@@ -1,1 +1,1 @@
-"""Submissions that are alike once what everybody was given, and what everybody writes, is taken out."""
+"""Finds similar submissions, ignoring handed-out code and code that many students write."""

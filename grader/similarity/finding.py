@@ -1,4 +1,4 @@
-"""Finds submissions that are alike, after taking out what was given and what everybody writes."""
+"""Finds similar submissions, ignoring handed-out code and code that many students write."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from grader.similarity.library import (
 from grader.submissions.collected import Collected
 from grader.submissions.submission import collect_submission
 
-#: A larger file is not one that somebody wrote for an exercise; all of a submission together may be twice that.
+#: Largest file that is compared, since nobody writes more for an exercise, and most bytes of a submission.
 MAX_BYTES = 64 << 10
 MAX_ALL_BYTES = 2 * MAX_BYTES
 
 
 def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
-    """Return the Python files of a submission, and what cannot be compared and why; it never raises for a student.
+    """Read the Python files of a submission, and list those that cannot be compared; never raises for a bad submission.
 
     Args:
         path: A folder, an archive or one file.
@@ -49,7 +49,7 @@ def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, .
 
 
 def read_given(folders: Iterable[Path]) -> tuple[ComparedProgram, ...]:
-    """Return the Python files that everybody was given; raises ClassError for a folder without any."""
+    """Read the Python files that were handed out; raises ClassError for a folder without any."""
     given: list[ComparedProgram] = []
     for folder in folders:
         programs, _ = read_programs(folder)
@@ -60,22 +60,22 @@ def read_given(folders: Iterable[Path]) -> tuple[ComparedProgram, ...]:
 
 
 def programs_of(collected: Collected) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
-    """Return what of the files that were read can be compared, and what cannot and why."""
-    programs, passed_over, room = [], [], MAX_ALL_BYTES
+    """Split collected files into programs to compare, and sentences about those that cannot be compared."""
+    programs, passed_over, left = [], [], MAX_ALL_BYTES
     for name, content in sorted(collected.files):
         if not name.casefold().endswith(".py"):
             continue
-        why = _objection(content, room)
+        why = _objection(content, left)
         if why:
             passed_over.append(f"{name}: {why}")
             continue
-        room -= len(content)
+        left -= len(content)
         programs.append(ComparedProgram(name, text_of(content), hashlib.sha256(content).hexdigest()))
     return tuple(programs), tuple(passed_over)
 
 
 def text_of(content: bytes) -> str:
-    """Return the text of a Python file in its own encoding; what is wrong in it becomes U+FFFD."""
+    """Decode a Python file in its declared encoding; invalid bytes become U+FFFD."""
     try:
         encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
         text = content.decode(encoding, "replace")
@@ -84,26 +84,26 @@ def text_of(content: bytes) -> str:
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _objection(content: bytes, room: int) -> str:
+def _objection(content: bytes, left: int) -> str:
     if len(content) > MAX_BYTES:
         return f"more than {MAX_BYTES >> 10} KiB"
-    if len(content) > room:
+    if len(content) > left:
         return f"the submission has more than {MAX_ALL_BYTES >> 10} KiB of Python"
     return "not text" if b"\0" in content else ""
 
 
-#: Two files are listed if this share of one's own code is in the other, at least the second share of the other's own
-#: code is in the first, and they have so many signs in common. Tried on programs written independently and on disguised
-#: copies of them; the documentation for instructors has the figures. Two who fill the gaps of the first exercise's
-#: template in the obvious way have 134 signs in common, and could hardly do it otherwise.
+#: Two files are listed if the first share of one file's own code is in the other, at least the second share of the
+#: other's own code is in the first, and they have at least this many characters in common. Chosen with independently
+#: written programs and disguised copies of them; the documentation for instructors has the figures. Two obvious
+#: solutions for the gaps of the first exercise's template have 134 characters in common.
 THRESHOLD, LEAST_SHARE, LEAST_OVERLAP = 0.65, 0.4, 140
-#: What more than this share of the class writes is common; a few friends are no class, however small it is.
+#: Code is common if more than this share of the class, and more than this number of students, have it.
 COMMON_SHARE, COMMON_LEAST = 0.1, 4
 
 
 @dataclass(slots=True)
 class _File:
-    """One file that takes part: whose it is, and what stands for it."""
+    """A file that is compared, with its owner and its fingerprint."""
 
     owner: int
     program: ComparedProgram
@@ -111,17 +111,17 @@ class _File:
 
 
 def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> Similar:
-    """Return which submissions of a class are alike.
+    """Find the similar submissions of a class.
 
     Args:
         handed: The submissions.
-        given: The files that everybody was given.
+        given: The files that were handed out.
     """
     as_given = {program.digest for program in given}
     kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
     files, kept = _prints(kept)
     common_from = max(COMMON_LEAST, int(COMMON_SHARE * len(handed)))
-    _take_out(files, given, common_from)
+    _remove_common_pieces(files, given, common_from)
     return Similar(
         handed=tuple(kept),
         pairs=tuple(_pairs(kept, files)),
@@ -135,8 +135,8 @@ def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> 
 
 
 def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
-    """Return the files that take part, and the submissions with a word on each that cannot."""
-    files, told = [], []
+    """Return the files to compare, and the submissions with a sentence on each file that cannot be compared."""
+    files, noted = [], []
     for owner, one in enumerate(handed):
         slow = []
         for program in one.programs:
@@ -145,8 +145,8 @@ def _prints(handed: Sequence[Handed]) -> tuple[list[_File], list[Handed]]:
                 slow.append(f"{program.name}: reading its tokens takes too long")
             else:
                 files.append(_File(owner, program, made))
-        told.append(replace(one, passed_over=(*one.passed_over, *slow)))
-    return files, told
+        noted.append(replace(one, passed_over=(*one.passed_over, *slow)))
+    return files, noted
 
 
 def _print(program: ComparedProgram) -> Print | None:
@@ -156,8 +156,8 @@ def _print(program: ComparedProgram) -> Print | None:
         return None
 
 
-def _take_out(files: Sequence[_File], given: Sequence[ComparedProgram], common_from: int) -> None:
-    """Leave each file its own pieces: those that were not given, and that only few others have."""
+def _remove_common_pieces(files: Sequence[_File], given: Sequence[ComparedProgram], common_from: int) -> None:
+    """Keep only each file's own pieces: not handed out, and shared by few others."""
     owners: dict[int, set[int]] = defaultdict(set)
     for file in files:
         for piece in file.print.pieces:
@@ -183,7 +183,7 @@ def _pairs(handed: Sequence[Handed], files: Sequence[_File]) -> list[Pair]:
 
 
 def _best(likenesses: Sequence[Likeness]) -> Iterator[Likeness]:
-    """Yield the most alike files first, each file once: its own two files may be alike as well."""
+    """Yield the most similar files first, each file only once, since files of one submission may be similar too."""
     left: set[str] = set()
     right: set[str] = set()
     for one in sorted(likenesses, key=lambda one: (-one.share, -one.overlap)):
@@ -194,7 +194,7 @@ def _best(likenesses: Sequence[Likeness]) -> Iterator[Likeness]:
 
 
 def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tuple[_File, _File]]:
-    """Yield the files of different people that have enough pieces in common to be compared."""
+    """Yield pairs of files by different people with enough pieces in common to be compared."""
     holders: dict[int, list[int]] = defaultdict(list)
     for index, file in enumerate(files):
         for piece in file.print.fingerprint.hashes:
@@ -211,7 +211,7 @@ def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tu
 
 
 def _same(handed: Sequence[Handed]) -> list[SameText]:
-    """Return files that several people handed in byte for byte; empty ones say nothing."""
+    """Return the files that several people handed in byte for byte, without empty ones."""
     holders: dict[str, list[tuple[Handed, ComparedProgram]]] = defaultdict(list)
     for one in handed:
         for digest, program in {program.digest: program for program in one.programs}.items():

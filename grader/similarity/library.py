@@ -1,4 +1,4 @@
-"""Compares programs by k-grams of their tokens; the only module that knows the library which does it."""
+"""Compares programs by k-grams of their tokens; the only module that uses the copydetect library."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-#: Line numbers, from 1 on, in order.
+#: Line numbers, starting at 1, in order.
 Lines = tuple[int, ...]
 
 
@@ -21,8 +21,8 @@ class ComparedProgram:
 
     Attributes:
         name: Path inside the submission.
-        text: Its text, lines ended by a line feed alone.
-        digest: Of its bytes as they were handed in.
+        text: Its text, with line feeds as line ends.
+        digest: Digest of its original bytes.
     """
 
     name: str
@@ -35,12 +35,12 @@ class Handed:
     """The programs of one submission.
 
     Attributes:
-        name: Name of the submission, different from all others.
-        label: Who it is, for people.
+        name: Unique name of the submission.
+        label: Name for display.
         programs: Its Python files that can be compared.
-        passed_over: What cannot be compared, and why; one sentence each.
-        own: Names of other submissions of the same person, which are not compared with it.
-        reported: Whether there is a report of it to look at.
+        passed_over: Files that cannot be compared, and why; one sentence each.
+        own: Names of other submissions by the same person, which are not compared with it.
+        reported: Whether it has a report to link to.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Side:
         program: The file.
         share: How much of its own code is in the other file too, 0 to 1; own is what is left without the given code and
             the common code.
-        alike: Lines whose code is in the other file too.
+        alike: Lines whose code is also in the other file.
     """
 
     program: ComparedProgram
@@ -69,12 +69,12 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """Two files that are alike.
+    """Two similar files.
 
     Attributes:
         left: The file of the first submission.
         right: The file of the second.
-        overlap: Signs that both have, with all names cut to one sign.
+        overlap: Number of common characters, with all names shortened to one.
     """
 
     left: Side
@@ -83,13 +83,13 @@ class Likeness:
 
     @property
     def share(self) -> float:
-        """The larger of the two shares: a copy that something was added to is one."""
+        """The larger of the two shares, so that a copy with additions is found."""
         return max(self.left.share, self.right.share)
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two submissions that are alike; `likenesses` has the most alike files first, and at least one."""
+    """Two similar submissions; `likenesses` is not empty and starts with the most similar files."""
 
     left: Handed
     right: Handed
@@ -97,23 +97,23 @@ class Pair:
 
     @property
     def share(self) -> float:
-        """The share of the files most alike."""
+        """The share of the most similar files."""
         return self.likenesses[0].share
 
     @property
     def overlap(self) -> int:
-        """What all its files have in common."""
+        """Common characters of all its files."""
         return sum(likeness.overlap for likeness in self.likenesses)
 
 
 @dataclass(frozen=True, slots=True)
 class SameText:
-    """Submissions that hold the same file, byte for byte.
+    """Submissions with the same file, byte for byte.
 
     Attributes:
         file: A name of the file.
         holders: The submissions, in their order.
-        whole: Whether they hold the same files altogether.
+        whole: Whether all of their files are the same.
     """
 
     file: str
@@ -123,17 +123,17 @@ class SameText:
 
 @dataclass(frozen=True, slots=True)
 class Similar:
-    """What was found in a class.
+    """The similar submissions of a class.
 
     Attributes:
         handed: All submissions, in their order.
-        pairs: The most alike first.
-        same: Files handed in more than once, the most often first.
-        given: Submission and name of each file that is given code as it is.
-        common_from: In more submissions than this, code counts as what everybody writes.
-        threshold: Share of one file from which on two files are listed.
-        least_share: The share of the other that it takes besides.
-        given_files: Names of the files of given code.
+        pairs: Similar pairs, the most similar first.
+        same: Files handed in more than once, the most frequent first.
+        given: Submission and name of each unchanged handed-out file.
+        common_from: Code in more submissions than this is ignored as common.
+        threshold: Smallest share of one file's own code for two files to be listed.
+        least_share: Smallest share of the other file's own code.
+        given_files: Names of the handed-out files.
     """
 
     handed: Sequence[Handed]
@@ -146,24 +146,24 @@ class Similar:
     given_files: tuple[str, ...] = ()
 
 
-#: Signs that a piece must have to count, with all names cut to one sign.
+#: Characters of a piece, with all names shortened to one.
 PIECE = 25
-#: Processor time for one file: hundreds of times what a program of a student takes.
+#: Processor time for one file; a student's program takes less than a hundredth of it.
 FILE_LIMIT_S = 5.0
 
 
-class TooSlow(Exception):  # noqa: N818  what it is
-    """A file took longer than any program does."""
+class TooSlow(Exception):  # noqa: N818  reads well in except clauses
+    """Reading a file took longer than for any real program."""
 
 
 @dataclass(slots=True)
 class Print:
-    """What stands for one file in comparisons.
+    """The fingerprint of one file.
 
     Attributes:
-        pieces: Digest of the piece that begins at each sign; equal in this process alone.
-        fingerprint: The library's own value.
-        skipped: Empty lines at the beginning, which the library leaves out.
+        pieces: Hash of the piece that begins at each character; comparable only within this process.
+        fingerprint: The library's fingerprint.
+        skipped: Number of leading empty lines, which the library skips.
     """
 
     pieces: list[int]
@@ -185,7 +185,7 @@ class Print:
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """What two files have in common: signs, the share of each one's own code, and the lines in each."""
+    """The common code of two files: characters, the share of each file's own code, and the lines in each."""
 
     signs: int
     shares: tuple[float, float]
@@ -193,7 +193,7 @@ class Overlap:
 
 
 def make_print(text: str) -> Print:
-    """Return what stands for a program in comparisons; it is read by its tokens and never run.
+    """Make the fingerprint of a program from its tokens; the program is never run.
 
     Raises:
         TooSlow: It takes longer than any program does.
@@ -203,7 +203,7 @@ def make_print(text: str) -> Print:
 
     written = text.lstrip("\n")
     with _limited(FILE_LIMIT_S):
-        # Every piece is kept, not a sample: which ones a sample has depends on the process.
+        # All pieces are kept instead of a sample, because a sample would depend on the process.
         made = CodeFingerprint("program.py", PIECE, 1, language="python", fp=io.StringIO(written))
     pieces = [0] * max(0, len(made.filtered_code) - PIECE + 1)
     for piece, places in made.hash_idx.items():
@@ -216,7 +216,7 @@ def make_print(text: str) -> Print:
 
 
 def overlap_of(left: Print, right: Print) -> Overlap:
-    """Return what two files have in common, of the pieces that both were told to keep."""
+    """Compare two files by the pieces that both keep."""
     from copydetect import compare_files  # noqa: PLC0415  a heavy, optional library
 
     signs, shares, slices = compare_files(left.fingerprint, right.fingerprint)
@@ -227,7 +227,7 @@ def overlap_of(left: Print, right: Print) -> Overlap:
 
 
 def _lines(file: Print, slices: Any) -> Lines:
-    """Return the lines that slices of the text touch; ends may lie in the empty end of a line."""
+    """Return the lines that slices of the text touch; a slice may end at an empty end of a line."""
     text = file.fingerprint.raw_code
     found: set[int] = set()
     for start, stop in zip(slices[0].tolist(), slices[1].tolist(), strict=True):
@@ -241,7 +241,7 @@ def _lines(file: Print, slices: Any) -> Lines:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise TooSlow after so much processor time of this process; only the main thread can be stopped like this."""
+    """Raise TooSlow after some processor time of this process; works only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

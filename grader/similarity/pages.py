@@ -1,4 +1,4 @@
-"""The pages and the table of similar submissions, from templates that escape everything they are given."""
+"""Renders the pages and the CSV table of similar submissions; the templates escape everything."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from jinja2 import Template
 from markupsafe import Markup
@@ -17,9 +16,10 @@ from grader.reporting.escape import csv_cell, shown
 from grader.reporting.html.assets import bundle, page_environment
 from grader.similarity.library import Handed, Pair, Side, Similar
 
-#: Pairs beyond these are in the table only.
+#: Most pairs with a page; further pairs appear only in the table.
 MOST_PAGES = 200
-#: A file of more lines is shown around what is alike, and no file with more lines than the second.
+#: A file with more lines than the first number is shown only around its similar lines; no page shows more lines of a
+#: file than the second number.
 WHOLE, MOST_LINES = 400, 1_500
 _AROUND = 3
 _LINE_LIMIT = 400
@@ -32,7 +32,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line as a page shows it; number 0 stands for lines that were left out."""
+    """A line as a page shows it; number 0 marks a gap of omitted lines."""
 
     number: int
     text: str
@@ -40,7 +40,7 @@ class Line:
 
 
 def render_overview(similar: Similar) -> str:
-    """Return the page that lists what was found."""
+    """Render the page that lists all pairs and identical files."""
     return _template("overview.html").render(
         similar=similar,
         pages=[page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))],
@@ -50,7 +50,7 @@ def render_overview(similar: Similar) -> str:
 
 
 def render_pair(similar: Similar, rank: int) -> str:
-    """Return the page that shows a pair side by side; `rank` is its place in the list, from 0 on."""
+    """Render the page that shows a pair side by side; `rank` is its index in the list, starting at 0."""
     last = min(MOST_PAGES, len(similar.pairs)) - 1
     return _template("pair.html").render(
         pair=similar.pairs[rank],
@@ -63,12 +63,12 @@ def render_pair(similar: Similar, rank: int) -> str:
 
 
 def page_name(rank: int) -> str:
-    """Return the file name of the page of a pair."""
+    """Return the file name of a pair's page."""
     return f"pair-{rank + 1:03}.html"
 
 
 def render_table(similar: Similar) -> str:
-    """Return everything that was found as CSV: a row for each two files."""
+    """Render all findings as CSV, with one row for each pair of files."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(COLUMNS)
@@ -94,7 +94,7 @@ def _cells(handed: Handed, file: str, share: float) -> tuple[str, str, str, str]
 
 
 def lines_of(side: Side) -> Sequence[Line]:
-    """Return a file line by line, with what is alike marked; long files around that alone."""
+    """Return the lines of a file with the similar ones marked; of a long file, only the lines near those."""
     texts = side.program.text.expandtabs(4).rstrip("\n").split("\n")
     alike = frozenset(side.alike)
     wanted = set(range(1, len(texts) + 1))
@@ -117,10 +117,9 @@ def _gap(count: int) -> Line:
 @cache
 def _template(name: str) -> Template:
     templates = page_environment("grader.similarity")
-    own = files(__package__).joinpath("templates/similarity.css").read_text(encoding="utf-8")
     templates.filters |= {"percent": _percent}
     templates.globals |= {
-        "style": Markup(f"{bundle().style}\n{own}"),  # noqa: S704  our own
+        "style": Markup(bundle().style),  # noqa: S704  part of this package
         "lines_of": lines_of,
         "report_of": report_of,
     }
@@ -128,11 +127,11 @@ def _template(name: str) -> Template:
 
 
 def report_of(handed: Handed) -> str:
-    """Return the link from a page to the report of a submission; empty if there is none."""
+    """Return the link from a page to a submission's report; empty if it has no report."""
     link = result_link(handed.name, REPORT_PAGE) if handed.reported else ""
     return f"../{link}" if link else ""
 
 
 def _percent(share: float) -> str:
-    # Rounded down: what is not all is never shown as all.
+    # Rounded down, so that only complete copies show 100 %.
     return f"{int(100 * share)} %"

@@ -1,7 +1,7 @@
-"""The autograder of a Classroom 50 assignment: grades the checkout it is started in, and writes what the runner reads.
+"""The autograder of a Classroom 50 assignment: grades the current checkout, and writes the files that the runner reads.
 
-Beside it lie, as `grade export classroom50` puts them there: the grader as a wheel, `prepare`, `constraints.txt`,
-`settings.json` and rubrics of the course's own. It leaves `result.json`, `release-body.md`, `grading-report.html` and
+`grade export classroom50` puts the following files beside it: the grader as a wheel, `prepare`, `constraints.txt`,
+`settings.json` and the course's own rubrics. It writes `result.json`, `release-body.md`, `grading-report.html` and
 `grading-evidence.zip`. The exit code is 0 if the submission was graded; with any other one, Classroom 50 records an
 error and no mark.
 """
@@ -20,14 +20,14 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ALL_MET, NOT_ALL_MET, UNDECIDED = 0, 1, 3
-#: All of the job's environment that the grader gets to see: no token is among it.
+#: The variables of the job's environment that the grader gets; none of them is a token.
 PASSED_ON = (
     *("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE", "GITHUB_EVENT_PATH"),
     *("CLASSROOM", "ASSIGNMENT", "ASSIGNMENT_TYPE", "OWNER", "USERNAME", "SUBMISSION_TAG"),
     *("COMMIT_URL", "RELEASE_URL", "REVIEW_URL"),
-    "GRADER_SEED_KEY",  # the grader keeps it to itself
+    "GRADER_SEED_KEY",  # the grader passes it to no other process
 )
-#: What is left in the checkout, by its name while grading.
+#: Files written to the checkout, by their names while grading.
 LEFT = {
     "result.json": "result.json",
     "summary.md": "release-body.md",
@@ -40,20 +40,20 @@ def main() -> int:
     """Grade the checkout."""
     checkout = Path.cwd()
     for name in LEFT.values():
-        remove(checkout / name)  # a student may have handed in a file of that name, or a link to some other
+        remove(checkout / name)  # a student may have submitted a file or a link of this name
     folder = Path(tempfile.mkdtemp(prefix="grading-", dir=os.environ.get("RUNNER_TEMP")))
     code = graded(program(folder), checkout, folder)
     if (folder / "evidence").is_dir():
         shutil.make_archive(str(folder / "evidence"), "zip", folder / "evidence")
     for name, place in LEFT.items():
-        # A result that is not final is no mark; without one, the runner says that there was an error.
+        # A result that is not final is not a mark; without a result, the runner reports an error.
         if (folder / name).exists() and not (code == UNDECIDED and place == "result.json"):
             shutil.copyfile(folder / name, checkout / place)
     return 0 if code in (ALL_MET, NOT_ALL_MET) else 1
 
 
 def program(folder: Path) -> str:
-    """Return the grader, set up from the wheel beside this file; without one, the command of this machine."""
+    """Install the grader from the wheel beside this file, and return it; without a wheel, use the installed command."""
     wheels = sorted(HERE.glob("rclpy_grader-*.whl"))
     found = shutil.which("grade")
     if not wheels and found:
@@ -66,7 +66,7 @@ def program(folder: Path) -> str:
 
 
 def graded(grade: str, checkout: Path, folder: Path) -> int:
-    """Run the grader, and show what it prints where no line of it is a command to the runner."""
+    """Run the grader, and show its output while workflow commands are disabled."""
     outputs = {"text": "-", "classroom50": folder / "result.json", "markdown": folder / "summary.md"}
     outputs |= {"html": folder / "report.html", "evidence": folder / "evidence"}
     words = [grade, *arguments()]
@@ -84,13 +84,13 @@ def graded(grade: str, checkout: Path, folder: Path) -> int:
             check=False,
         )
     finally:
-        # A line that was left open must not swallow the token.
+        # An unfinished line must not hide the token.
         print(f"\n::{token}::", flush=True)
     return done.returncode
 
 
 def arguments() -> list[str]:
-    """Return what was chosen when this autograder was exported; by default, all exercises."""
+    """Return the settings of the export; the default is all exercises."""
     path = HERE / "settings.json"
     chosen = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     # Students can read the release, its files and the log.
@@ -103,14 +103,14 @@ def arguments() -> list[str]:
 
 
 def surroundings(environment: Mapping[str, str], checkout: Path) -> dict[str, str]:
-    """Return the variables that the grader starts with: few, and when the submission was committed."""
+    """Return the environment of the grader: a few variables, and the time of the commit."""
     few = {name: environment[name] for name in PASSED_ON if name in environment}
     when = environment.get("COMMIT_DATETIME") or committed(environment.get("GITHUB_SHA") or "HEAD", checkout)
     return {**few, "COMMIT_DATETIME": when} if when else few
 
 
 def committed(commit: str, checkout: Path) -> str:
-    """Return the time of a commit, ISO 8601; empty if git does not tell. Regrading has no push that would say it."""
+    """Return the time of a commit, ISO 8601; empty if unknown. When regrading there is no push event with the time."""
     words = ["git", "-c", "safe.directory=*", "-c", "core.fsmonitor=false", "-c", "log.showSignature=false"]
     words += ["show", "--no-patch", "--format=%cI", "--end-of-options", commit]
     try:
@@ -121,7 +121,7 @@ def committed(commit: str, checkout: Path) -> str:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, link or folder, if it is there."""
+    """Remove a file, link or folder if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

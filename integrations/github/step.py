@@ -1,7 +1,7 @@
-"""The step of action.yml that grades: reads the inputs, runs `grade`, writes summary, annotations and outputs.
+"""The grading step of action.yml: reads the inputs, runs `grade`, and writes summary, annotations and outputs.
 
-Nothing that a student wrote reaches the log while the runner listens for commands, and nothing of the job's
-environment but a few names reaches the grader.
+Text of students reaches the log only while workflow commands are disabled, and the grader gets only a few variables of
+the job's environment.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 ALL_MET, UNDECIDED = 0, 3
-#: All of the job's environment that the grader gets to see: no token is among it, and the seed key goes no further.
+#: The variables of the job's environment that the grader gets; none is a token, and it does not pass on the seed key.
 PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "GITHUB_WORKSPACE", "GRADER_SEED_KEY")
-#: What a sourced ROS installation is found by.
+#: Variables that identify a sourced ROS installation.
 OF_ROS = ("ROS_DISTRO", "AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
-#: What an output of GitHub may be made of here: numbers, words, base64, a path of the runner's.
+#: Characters allowed in outputs: numbers, words, base64, paths of the runner.
 _ONE_LINE = re.compile(r"[^\x00-\x1f\x7f]*")
 
 
@@ -42,9 +42,9 @@ def main() -> int:
 
 
 def command(environment: Mapping[str, str], folder: Path) -> list[str]:
-    """Return the command that the inputs ask for; its reports go to a folder that no student can name."""
+    """Build the command for the inputs; its reports go to a folder whose name students cannot know."""
     words = [program(environment), "--no-progress", "--isolation", environment.get("INPUT_ISOLATION") or "auto"]
-    words += ["--audience", "student"]  # summary, annotations, log and artifact are all theirs to read
+    words += ["--audience", "student"]  # students can read summary, annotations, log and artifact
     for exercise in re.split(r"[\s,]+", environment.get("INPUT_EXERCISES", "")):
         words += ["--exercise", exercise] if exercise else []
     for line in environment.get("INPUT_RUBRIC", "").splitlines():
@@ -66,7 +66,7 @@ def command(environment: Mapping[str, str], folder: Path) -> list[str]:
 
 
 def program(environment: Mapping[str, str]) -> str:
-    """Return the grader: the one that this action set up, else the one of the machine."""
+    """Return the grader that this action installed, or else the one of the machine."""
     own = Path(environment["RUNNER_TEMP"], "rclpy-grader", "bin", "grade")
     found = str(own) if own.exists() else shutil.which("grade", path=environment.get("PATH"))
     if found is None:
@@ -77,7 +77,7 @@ def program(environment: Mapping[str, str]) -> str:
 
 
 def graded(words: Sequence[str], checkout: Path, folder: Path) -> int:
-    """Run the grader, show what it prints where no line of it is a command, then its annotations."""
+    """Run the grader, show its output while workflow commands are disabled, then its annotations."""
     names = (*PASSED_ON, *(OF_ROS if os.environ.get("ROS_DISTRO") else ()))
     few = {name: os.environ[name] for name in names if name in os.environ}
     token = secrets.token_hex(16)
@@ -88,7 +88,7 @@ def graded(words: Sequence[str], checkout: Path, folder: Path) -> int:
         said = (folder / "errors.txt").read_text(encoding="utf-8", errors="replace")
         print(said, end="", flush=True)
     finally:
-        # A line that was left open must not swallow the token.
+        # An unfinished line must not hide the token.
         print(f"\n::{token}::", flush=True)
     annotations = folder / "annotations.txt"
     if annotations.exists():
@@ -99,7 +99,7 @@ def graded(words: Sequence[str], checkout: Path, folder: Path) -> int:
 
 
 def read_outputs(folder: Path, code: int) -> dict[str, str]:
-    """Return the outputs of the step; those of a report are empty where there is none."""
+    """Return the outputs of the step; those from the report are empty if there is none."""
     path, result = folder / "report.json", folder / "result.b64"
     report = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     return {
@@ -114,17 +114,17 @@ def read_outputs(folder: Path, code: int) -> dict[str, str]:
 
 
 def single(value: str) -> bool:
-    """Return whether a value is one line, as an output has to be."""
+    """Whether a value is a single line, as outputs have to be."""
     return _ONE_LINE.fullmatch(value) is not None
 
 
 def escaped(text: str) -> str:
-    """Return text as the message of a workflow command."""
+    """Escape text for the message of a workflow command."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def append(variable: str, text: str) -> None:
-    """Add text to one of the files by which a step talks to its runner."""
+    """Append text to one of the files that a step passes to its runner."""
     with Path(os.environ[variable]).open("a", encoding="utf-8") as file:
         file.write(text)
 

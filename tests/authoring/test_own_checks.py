@@ -18,10 +18,10 @@ from ruamel.yaml import YAML
 
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest
-from grader.classroom.cache_key import Conditions
-from grader.classroom.cluster.jobs import lay_out
+from grader.classroom.cluster.jobs import write_task
 from grader.classroom.cluster.sending import checks_of
 from grader.classroom.messages import GradingJob, Terms
+from grader.classroom.store import Conditions
 from grader.cli import main
 from grader.core.errors import RubricError
 from grader.core.exercise import Outcome
@@ -239,7 +239,7 @@ def test_it_travels_to_a_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert checks == ((b"course/pump_checks.py", CHECKS_FILE.encode()),)
     conditions = Conditions("0", (), "", None, "auto", "auto")
     terms = Terms(conditions, (), ((b"course/pump.yaml", RUBRIC.encode()),), b"", (), False, 1.0, checks)
-    task = lay_out(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
+    task = write_task(terms, GradingJob("ada", b"ada", b"class/ada", b""), tmp_path / "there")
     (found,) = (tmp_path / "there").rglob("pump.yaml")
     assert (task.rubrics, read_rubric(found).digest) == ((rubric,), before)
 

@@ -13,7 +13,7 @@ import class_reports
 from class_samples import course
 
 from grader.classroom.class_run import grade_class
-from grader.classroom.local import Attempt, Hear, Task
+from grader.classroom.local import Attempt, OnStep, Task
 from grader.classroom.store import ResultStatus, State
 from grader.classroom.watching import Watcher
 from grader.reporting.html.render import render_html
@@ -51,11 +51,11 @@ class MadeUp:
     def prepare(self, isolation: str) -> list[str]:
         return []
 
-    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         for number, task in enumerate(tasks):
-            yield Attempt(task, self.standing(task, number))
+            yield Attempt(task, self.status(task, number))
 
-    def standing(self, task: Task, number: int) -> ResultStatus:
+    def status(self, task: Task, number: int) -> ResultStatus:
         with tempfile.TemporaryDirectory() as staged:
             digest = stage_submission(str(task.submission), (), Path(staged)).digest
         key = task.conditions.key(digest)

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.app.request import GradeRequest
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
+from grader.classroom.outputs import Graded
 from grader.classroom.request import ClassRequest
-from grader.classroom.store import ResultStatus, State
-from grader.classroom.summary import Graded
+from grader.classroom.store import ResultStatus, State, unusable_digest
 from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError
 from grader.submissions.submission import stage_submission
@@ -46,16 +45,16 @@ class FakeScheduler:
     def prepare(self, isolation: str) -> list[Any]:
         return ["no walls"] if isolation == "none" else []
 
-    def run(self, tasks: Sequence[Task], hear: Callable[..., Any]) -> Generator[Attempt, None, None]:
+    def run(self, tasks: Sequence[Task], on_step: Callable[..., Any]) -> Generator[Attempt, None, None]:
         for task in tasks:
             if len(self.graded) == self.stop_after:
                 raise KeyboardInterrupt
-            hear(task.name, "grading")
+            on_step(task.name, "grading")
             self.graded.append(task.name)
             self.tasks[task.name] = task
-            yield Attempt(task, self.standing(task))
+            yield Attempt(task, self.status(task))
 
-    def standing(self, task: Task) -> ResultStatus:
+    def status(self, task: Task) -> ResultStatus:
         staging = task.into.parent / "staging"
         staging.mkdir()
         try:

@@ -10,10 +10,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from grader.classroom import store as kept
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
 from grader.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 
 CONDITIONS = Conditions("0", (("velocity_publisher", "sha256:1"),), "", None, "auto", "auto")
 ONE, TWO = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
@@ -45,8 +44,8 @@ def graded(
 ) -> JobResult:
     """Return an answer with a result."""
     key = CONDITIONS.key("sha256:2") if key is None else key
-    standing = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
-    return JobResult(machine, kept.dump(standing), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
+    status = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
+    return JobResult(machine, kept.dump(status), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
 
 
 class FakeFuture:

@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 from class_samples import course, grade, hand_in
 
-from grader.classroom.outputs import platforms
-from grader.classroom.summary import Graded
+from grader.classroom.outputs import Graded, platforms
 from grader.core.errors import ClassError
 
 ROSTER = """Student,ID,SIS User ID,SIS Login ID,Section,Email address

@@ -13,8 +13,8 @@ from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
 from grader.app.seeds import SeedKey
 from grader.classroom.gradebook import Status
+from grader.classroom.outputs import Graded
 from grader.classroom.store import SEED_KEY, State, Store, open_store
-from grader.classroom.summary import Graded
 from grader.core.errors import ClassError, HarnessError
 
 

@@ -13,9 +13,8 @@ from typing import Any
 
 import pytest
 
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import LocalScheduler, Task
-from grader.classroom.store import ResultStatus, State, dump
+from grader.classroom.store import Conditions, ResultStatus, State, dump
 
 CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
@@ -56,9 +55,9 @@ def scheduler(jobs: int = 2) -> LocalScheduler:
 
 
 def graded(
-    tasks: Sequence[Task], jobs: int = 2, hear: Callable[..., Any] = lambda name, step: None
+    tasks: Sequence[Task], jobs: int = 2, on_step: Callable[..., Any] = lambda name, step: None
 ) -> dict[str, ResultStatus]:
-    return {a.task.name: a.standing for a in scheduler(jobs).run(tasks, hear)}
+    return {a.task.name: a.status for a in scheduler(jobs).run(tasks, on_step)}
 
 
 def test_one_disaster_touches_nobody_else(tmp_path: Path) -> None:
@@ -86,7 +85,7 @@ def test_what_does_not_end_is_given_up(tmp_path: Path) -> None:
 def test_whoever_listens_hears_what_is_running(tmp_path: Path) -> None:
     """By name and step."""
     heard = []
-    graded([task(tmp_path, "fine")], hear=lambda name, step: heard.append((name, step)))
+    graded([task(tmp_path, "fine")], on_step=lambda name, step: heard.append((name, step)))
     assert heard == [("fine", "starting"), ("fine", "grading")]
 
 
@@ -110,7 +109,7 @@ def test_a_program_that_cannot_be_started_is_a_failure(tmp_path: Path) -> None:
     """Of ours, not of the student's."""
     here = LocalScheduler(1, ("/nothing/there",))
     attempt = next(here.run([task(tmp_path, "fine")], lambda name, step: None))
-    assert attempt.standing.problem == "the grader cannot be started: No such file or directory"
+    assert attempt.status.problem == "the grader cannot be started: No such file or directory"
 
 
 @pytest.mark.parametrize("odd", ["b a", "ö", "-x"])

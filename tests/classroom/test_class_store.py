@@ -14,7 +14,7 @@ from grader.classroom.store import ResultStatus, State, Store, dump, load, open_
 from grader.core.errors import HarnessError
 
 
-def standing(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> ResultStatus:
+def status(state: State = State.GRADED, score: float = 1.0, key: str = "k") -> ResultStatus:
     return ResultStatus(state, key, "sha256:1", "ada", score=score, max_score=10.0)
 
 
@@ -39,8 +39,8 @@ def leftovers(store: Store) -> list[str]:
 def test_a_new_result_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     """Nothing of the old one stays."""
     with open_store(tmp_path) as store:
-        assert commit(store, standing(score=1.0), text="old")
-        assert commit(store, standing(score=2.0), text="new")
+        assert commit(store, status(score=1.0), text="old")
+        assert commit(store, status(score=2.0), text="new")
         assert result_of(store).score == 2.0
         assert (store.place("ada") / "report.json").read_text(encoding="utf-8") == "new"
         assert leftovers(store) == []
@@ -52,7 +52,7 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(
 ) -> None:
     """The machine stops at the n-th change of the disk; the next run finds the old result or the new one, whole."""
     with open_store(tmp_path) as store:
-        commit(store, standing(score=1.0), text="old")
+        commit(store, status(score=1.0), text="old")
         calls = [0]
 
         def stopping(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -68,7 +68,7 @@ def test_whenever_a_replacement_stops_one_of_both_results_is_there(
             for owner, name in ((os, "rename"), (os, "replace"), (os, "fsync"), (os, "rmdir"), (os, "unlink")):
                 patched.setattr(owner, name, stopping(getattr(owner, name)))
             with contextlib.suppress(KeyboardInterrupt):
-                commit(store, standing(score=2.0), text="new")
+                commit(store, status(score=2.0), text="new")
     with open_store(tmp_path) as store:
         found = (result_of(store).score, (store.place("ada") / "report.json").read_text(encoding="utf-8"))
         assert found in [(1.0, "old"), (2.0, "new")]
@@ -102,21 +102,21 @@ def test_a_stopped_run_tidies_up(tmp_path: Path) -> None:
 def test_a_worse_attempt_is_noted_and_a_better_one_forgets_it(tmp_path: Path) -> None:
     """The result stays, what was tried last is known."""
     with open_store(tmp_path) as store:
-        commit(store, standing(score=5.0))
-        assert not commit(store, standing(State.FAILED))
+        commit(store, status(score=5.0))
+        assert not commit(store, status(State.FAILED))
         kept = store.kept("ada")
         assert kept.result is not None
         assert kept.attempt is not None
         assert kept.last is not None
         assert (kept.result.score, kept.attempt.state, kept.last.state) == (5.0, State.FAILED, State.FAILED)
-        assert commit(store, standing(score=6.0))
+        assert commit(store, status(score=6.0))
         assert store.kept("ada").attempt is None
 
 
 def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk is the machine's fault, and says that the same command goes on."""
     with open_store(tmp_path) as store:
-        commit(store, standing(score=5.0), text="old")
+        commit(store, status(score=5.0), text="old")
 
         def full(*arguments: int) -> None:
             raise OSError(28, "No space left on device")
@@ -124,7 +124,7 @@ def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monk
         with monkeypatch.context() as patched:
             patched.setattr(os, "fsync", full)
             with pytest.raises(HarnessError, match="No space left on device") as error:
-                commit(store, standing(score=6.0), text="new")
+                commit(store, status(score=6.0), text="new")
         assert "the same command goes on" in error.value.hint
         assert result_of(store).score == 5.0
 
@@ -145,5 +145,5 @@ def test_a_standing_survives_names_that_are_no_text() -> None:
 
 def test_a_standing_of_another_version_is_none() -> None:
     """It is not guessed at."""
-    assert load(dump(standing())) == standing()
-    assert load(dump(standing()).replace(b"batch-result/v1", b"batch-result/v2")) is None
+    assert load(dump(status())) == status()
+    assert load(dump(status()).replace(b"batch-result/v1", b"batch-result/v2")) is None

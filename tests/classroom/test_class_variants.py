@@ -11,12 +11,11 @@ import pytest
 from class_samples import GRADING, FakeScheduler, course, grade, hand_in
 
 from grader.app.request import GradeRequest
-from grader.app.variants import by_key
+from grader.app.seeds import by_key
 from grader.classroom import worker
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import State
-from grader.classroom.summary import Graded
+from grader.classroom.outputs import Graded
+from grader.classroom.store import Conditions, State
 from grader.core.errors import ClassError, HarnessError, VariantError
 from grader.core.exercise import Drawn
 from grader.rubrics.builtin import builtin_rubrics
@@ -89,7 +88,7 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     """So that it can be anywhere; the line that repeats the run names student and key."""
     heard = []
 
-    def refuse(request: GradeRequest, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    def refuse(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> None:
         heard.append(request)
         raise HarnessError("enough")
 
@@ -97,8 +96,8 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
     conditions = Conditions("0", (), "", None, "auto", "auto", variants=own)
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, conditions, 1, False, 60.0)
-    standing = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
+    status = worker.attempt(replace(task, variant_key=tmp_path / "course.key"), lambda step: None)
     (request,) = heard
     assert isinstance(request.draw, Recorded)
     assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)
-    assert standing.state is State.FAILED
+    assert status.state is State.FAILED

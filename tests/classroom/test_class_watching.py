@@ -21,7 +21,7 @@ class Clock:
         return self.now
 
 
-def standing(state: State = State.GRADED, problem: str = "") -> ResultStatus:
+def status(state: State = State.GRADED, problem: str = "") -> ResultStatus:
     return ResultStatus(state, "", "", "x", problem, score=87.5, max_score=100.0, duration_s=2.06)
 
 
@@ -34,8 +34,8 @@ def test_each_one_is_a_line_with_rate_and_time_left() -> None:
     for name in ("ada", "bob", "cleo"):
         watcher.step(name, "grading")
     clock.now = 30.0
-    watcher.done("ada", standing())
-    watcher.done("bob", standing(State.FAILED, "the \x1b[31mgrader"))
+    watcher.done("ada", status())
+    watcher.done("bob", status(State.FAILED, "the \x1b[31mgrader"))
     assert lines == [
         "to grade: 60, done before: 7",
         "[ 1/60] ada: 87.5/100 in 2.1 s (2.0/min, 29:30 left; running: bob, cleo)",
@@ -62,7 +62,7 @@ def test_a_terminal_shows_a_bar_under_the_lines() -> None:
         watcher.begin(2, 5)
         watcher.step("ada", "grading")
         watcher.step("bob", "grading")
-        watcher.done("ada", standing())
+        watcher.done("ada", status())
     assert out.getvalue().splitlines()[:2] == ["done before: 5", "ada: 87.5/100 in 2.1 s"]
     assert re.fullmatch(r"1/2 \d+\.\d/min, \d+:\d\d left; running: bob", out.getvalue().splitlines()[-1].rstrip())
 
@@ -75,4 +75,4 @@ def test_time_is_written_as_a_clock_does(seconds: float, text: str) -> None:
 
 def test_undecided_is_no_score() -> None:
     """The points so far, and that they are not final."""
-    assert outcome_words(standing(State.UNDECIDED)) == "87.5/100, undecided"
+    assert outcome_words(status(State.UNDECIDED)) == "87.5/100, undecided"

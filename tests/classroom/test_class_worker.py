@@ -12,9 +12,8 @@ import pytest
 
 from grader.app.request import GradeRequest
 from grader.classroom import worker
-from grader.classroom.cache_key import Conditions
 from grader.classroom.local import Task
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import Conditions, ResultStatus, State
 from grader.core.errors import EnvironmentFault, HarnessError, SubmissionError
 from grader.core.exercise import Feedback, Outcome, Shows
 from grader.core.report import Environment, ExerciseReport, Report, Reproduction, Verdict
@@ -26,7 +25,7 @@ CONDITIONS = Conditions("0", (("a", "sha256:1"),), "", None, "auto", "auto")
 def attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any) -> ResultStatus:
     """Return what an attempt comes to in which grading ends with an error."""
 
-    def grade(request: GradeRequest, progress: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    def grade(request: GradeRequest, progress: Callable[..., Any], on_recorded: Callable[..., Any]) -> None:
         raise error
 
     monkeypatch.setattr(worker, "grade", grade)
@@ -51,10 +50,10 @@ def test_an_error_is_told_by_who_must_act(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Any, state: State, problem: str
 ) -> None:
     """Only what is wrong with the submission itself refuses it and has a key; all else is tried again."""
-    standing = attempt(tmp_path, monkeypatch, error)
-    assert (standing.state, standing.problem) == (state, problem)
-    assert bool(standing.key) == (state is State.REFUSED)
-    assert standing.usage["peak_bytes"] > 1 << 20
+    status = attempt(tmp_path, monkeypatch, error)
+    assert (status.state, status.problem) == (state, problem)
+    assert bool(status.key) == (state is State.REFUSED)
+    assert status.usage["peak_bytes"] > 1 << 20
 
 
 def test_the_same_reason_to_refuse_has_the_same_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,11 +76,11 @@ def test_a_result_of_some_exercises_has_the_key_that_is_looked_for(
     digest = "sha256:" + "0" * 64
     given = Reproduction(rubrics=rubrics[1:])
     report = Report("x", "x", digest, environment, 1, (exercise,), 0.1, reproduce=given)
-    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: report)
     task = Task("x", "x", tmp_path, tmp_path / "into", (), (), None, every, 1, False, 60.0)
     assert worker.attempt(task, lambda step: None).key == every.key(digest)
     changed = dataclasses.replace(report, reproduce=Reproduction(rubrics=(("e", "sha256:3"),)))
-    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: changed)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: changed)
     task = dataclasses.replace(task, into=tmp_path / "again")
     assert worker.attempt(task, lambda step: None).key != every.key(digest)
 
@@ -94,7 +93,7 @@ def test_what_is_handed_back_holds_only_what_students_may_see(tmp_path: Path, mo
     )
     environment = Environment("0", "jazzy", "7", "rmw", "3.11", "none")
     report = Report("x", "x", "sha256:" + "0" * 64, environment, 1, (exercise,), 0.1)
-    monkeypatch.setattr(worker, "grade", lambda request, progress, hear: report)
+    monkeypatch.setattr(worker, "grade", lambda request, progress, on_recorded: report)
     into = tmp_path / "into"
     worker.attempt(Task("x", "x", tmp_path, into, (), (), None, CONDITIONS, 1, False, 60.0), lambda step: None)
     found = {path.name for path in into.iterdir() if "hushhush" in path.read_text(encoding="utf-8")}

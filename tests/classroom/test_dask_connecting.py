@@ -32,7 +32,7 @@ def test_a_scheduler_that_does_not_answer_is_waited_for_a_while(address: str) ->
     """Then it is named."""
     with (
         pytest.raises(EnvironmentFault, match=f"--scheduler {address}: expected a Dask scheduler, found none") as error,
-        connected(address, None, lambda line: None, patience_s=0.2),
+        connected(address, None, lambda line: None, timeout_s=0.2),
     ):
         pass
     assert "dask scheduler" in error.value.hint

@@ -11,7 +11,7 @@ import pytest
 from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
 
-from grader.classroom.summary import Graded
+from grader.classroom.outputs import Graded
 from grader.cli.main import app
 
 CORRECT = Path(__file__).resolve().parent.parent / "submissions" / "correct"

@@ -1,1 +1,1 @@
-"""A class graded by the workers of a Dask cluster: what is sent, what is done there, and what comes back."""
+"""Grades a class on the workers of a Dask cluster."""

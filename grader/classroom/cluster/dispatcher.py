@@ -1,4 +1,4 @@
-"""Keeps a Dask cluster busy with the submissions of a class, and settles the result of each once."""
+"""Distributes the submissions of a class over a Dask cluster, and yields the result of each exactly once."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from distributed import Client, Future, KilledWorker, Security
 
 import grader
 from grader.classroom.cluster import jobs as remote
-from grader.classroom.cluster.sending import answer_in, errand_of, failed, files_wanted, taken_in, terms_of
-from grader.classroom.cluster.worker_pool import WorkerPool, lost
-from grader.classroom.local import Attempt, Hear, MakeScheduler, Task
+from grader.classroom.cluster.sending import answer_in, failed, files_wanted, job_for, store_result, terms_of
+from grader.classroom.cluster.worker_pool import WorkerPool, scheduler_lost
+from grader.classroom.local import Attempt, MakeScheduler, OnStep, Task
 from grader.classroom.messages import Terms, pack
 from grader.core.errors import EnvironmentFault, HarnessError
 
-#: Larger parcels are laid down on a worker instead of travelling through the scheduler with what is to be done.
+#: Larger payloads are scattered to a worker instead of passing through the scheduler with the task.
 SCATTERED_BYTES = 1 << 20
-#: Most times that a submission is sent because of what is neither its own nor its worker's death.
+#: Most attempts for a submission after failures that neither it nor the death of its worker caused.
 TRIES = 3
 _POLL_S = 0.5
 _CLUSTER = "cluster"
@@ -35,43 +35,43 @@ _CLUSTER = "cluster"
 
 @dataclass(slots=True)
 class _Sending:
-    """One submission on its way.
+    """A submission that is being graded on the cluster.
 
     Attributes:
-        task: Which one.
+        task: The task.
         tries: How often it was sent.
-        only: The workers it may go to; empty if any will do.
-        future: What will be its answer.
-        parcels: What it needs and what must not be dropped before.
+        only: Workers that may grade it; empty for any worker.
+        future: Future of its answer.
+        payloads: Its scattered data; kept alive until the answer arrives.
     """
 
     task: Task
     tries: int = 0
     only: tuple[str, ...] = ()
     future: Future[bytes] | None = None
-    parcels: list[object] = field(default_factory=list)
+    payloads: list[object] = field(default_factory=list)
 
 
 class Dispatcher:
     """Grades one batch.
 
     Args:
-        client: Speaks to the cluster.
-        worker_pool: Its workers.
-        jobs: Submissions at a time; None for as many as the workers have threads.
+        client: Client of the cluster.
+        worker_pool: The workers of the cluster.
+        jobs: Submissions graded in parallel; None for as many as the workers have threads.
         terms: What the class is graded with.
-        hear: Hears which step of which submission begins.
-        topic: A name that nobody else on the cluster uses.
+        on_step: Called when a step of a submission begins.
+        topic: Dask topic for progress events; unique on the cluster.
     """
 
     def __init__(  # noqa: PLR0913  each is needed for as long as the batch runs
-        self, client: Client, worker_pool: WorkerPool, jobs: int | None, terms: Terms, hear: Hear, topic: str
+        self, client: Client, worker_pool: WorkerPool, jobs: int | None, terms: Terms, on_step: OnStep, topic: str
     ) -> None:
         self._client = client
         self._worker_pool = worker_pool
         self._jobs = jobs
         self._terms = pack(terms)
-        self._hear = hear
+        self._on_step = on_step
         self._topic = topic
         self._waiting: deque[_Sending] = deque()
         self._under_way: dict[str, _Sending] = {}
@@ -80,21 +80,21 @@ class Dispatcher:
         self._lock = threading.Lock()
         self._names: set[str] = set()
 
-    def serve(self, tasks: Sequence[Task]) -> Generator[Attempt, None, None]:
-        """Yield what comes of each task, once; raises HarnessError if the scheduler is gone."""
-        self._client.subscribe_topic(self._topic, self._heard)
+    def run(self, tasks: Sequence[Task]) -> Generator[Attempt, None, None]:
+        """Yield the attempt for each task exactly once; raises HarnessError if the scheduler is gone."""
+        self._client.subscribe_topic(self._topic, self._on_event)
         self._waiting.extend(map(_Sending, tasks))
         wanted = files_wanted(tasks[0]) if tasks else ()
         while self._waiting or self._under_way:
             yield from self._send_due(wanted)
             key = self._next()
             if key is not None and key in self._under_way:
-                attempt = self._settled(key)
+                attempt = self._finish(key)
                 if attempt is not None:
-                    yield from self._handed_over(attempt, wanted)
+                    yield from self._pass_on(attempt, wanted)
 
-    def _handed_over(self, attempt: Attempt, wanted: Sequence[str]) -> Generator[Attempt, None, None]:
-        """Yield what came of a submission when others are on their way: no worker waits for the disk here."""
+    def _pass_on(self, attempt: Attempt, wanted: Sequence[str]) -> Generator[Attempt, None, None]:
+        """Send further submissions before yielding an attempt, so that no worker waits for the disk here."""
         try:
             yield from self._send_due(wanted)
         except HarnessError:
@@ -103,7 +103,7 @@ class Dispatcher:
         yield attempt
 
     def close(self) -> None:
-        """Give up what is under way."""
+        """Cancel all submissions that are being graded."""
         with self._lock:
             self._names.clear()
         futures = [sending.future for sending in self._under_way.values() if sending.future is not None]
@@ -114,23 +114,23 @@ class Dispatcher:
                 self._client.cancel(futures, force=True)
 
     def _next(self) -> str | None:
-        """Return the key of an answer that is there, or None after a while."""
+        """Wait briefly for an answer, and return its key; None if none arrived."""
         try:
             key = self._arrived.get(timeout=_POLL_S)
         except queue.Empty:
             key = None
         if self._client.status != "running":
-            raise lost()
+            raise scheduler_lost()
         return key
 
     def _send_due(self, wanted: Sequence[str]) -> Generator[Attempt, None, None]:
-        """Send what the workers have room for; yield what comes at once of submissions that cannot be sent."""
-        fit = self._worker_pool.look()
-        self._call_back_stranded(fit.keys())
+        """Send as many submissions as the workers have capacity for; yield attempts for those that cannot be sent."""
+        fit = self._worker_pool.usable()
+        self._take_back_orphaned(fit.keys())
         most = self._jobs or max(1, sum(fit.values()))
         while self._waiting and len(self._under_way) < most:
             sending = self._waiting.popleft()
-            job = errand_of(sending.task, wanted)
+            job = job_for(sending.task, wanted)
             if isinstance(job, Attempt):
                 yield job
             else:
@@ -138,16 +138,16 @@ class Dispatcher:
 
     def _send(self, sending: _Sending, job: bytes, only: tuple[str, ...], *, near: bool) -> None:
         self._count += 1
-        key = f"{self._topic}-{self._count}"  # never used twice: nothing is taken for a result of something else
+        key = f"{self._topic}-{self._count}"  # never reused, so that an answer cannot be mistaken for another one
         sending.tries += 1
         sending.only = only
         with self._lock:
             self._names.add(sending.task.name)
-        sending.parcels = [self._parcel(data, near=near) for data in (self._terms, job)]
+        sending.payloads = [self._payload(data, near=near) for data in (self._terms, job)]
         sending.future = self._client.submit(
             remote.grade,
             grader.__version__,
-            *sending.parcels,
+            *sending.payloads,
             self._topic,
             key=key,
             pure=False,
@@ -156,30 +156,30 @@ class Dispatcher:
         self._under_way[key] = sending
         sending.future.add_done_callback(lambda future: self._arrived.put(str(future.key)))
 
-    def _parcel(self, data: bytes, *, near: bool) -> Any:
-        """Return bytes as they are given to the cluster: large ones go to a worker first, if there is one."""
+    def _payload(self, data: bytes, *, near: bool) -> Any:
+        """Scatter large data to a worker if there is one; return the data or its future."""
         if not near or len(data) <= SCATTERED_BYTES:
             return data
         try:
             return self._client.scatter(data, hash=False)
-        except (OSError, TimeoutError):  # the worker that it was meant for has just ended: let it travel
+        except (OSError, TimeoutError):  # the target worker has just ended: send the data with the task
             return data
 
-    def _call_back_stranded(self, alive: Any) -> None:
-        """Take back submissions all of whose workers are gone: nobody would ever take them."""
+    def _take_back_orphaned(self, alive: Any) -> None:
+        """Queue submissions again whose allowed workers are all gone: no other worker would take them."""
         for key, sending in list(self._under_way.items()):
             if sending.only and not set(sending.only) & set(alive) and sending.future is not None:
                 del self._under_way[key]
                 self._client.cancel([sending.future], force=True)
                 self._waiting.appendleft(sending)
 
-    def _settled(self, key: str) -> Attempt | None:
-        """Return what came of a submission that was answered, or None if it is to be sent once more."""
+    def _finish(self, key: str) -> Attempt | None:
+        """Return the attempt for an answered submission, or None after queueing it again."""
         sending = self._under_way.pop(key)
         future, sending.future = sending.future, None
         assert future is not None
         attempt = self._outcome(sending, future)
-        sending.parcels.clear()
+        sending.payloads.clear()
         future.release()
         with self._lock:
             self._names.discard(sending.task.name)
@@ -197,7 +197,7 @@ class Dispatcher:
     def _answered(self, sending: _Sending, data: object) -> Attempt | None:
         answer = answer_in(data, _CLUSTER)
         if not answer.unfit:
-            return taken_in(sending.task, answer)
+            return store_result(sending.task, answer)
         self._worker_pool.rule_out(answer.machine, answer.unfit, answer.hint)
         return self._once_more(sending, f"{answer.machine}: {answer.unfit}", answer.hint)
 
@@ -205,32 +205,32 @@ class Dispatcher:
         if isinstance(error, KilledWorker):
             problem = f"{error.allowed_failures + 1} workers of the cluster ended while they graded it"
             return failed(sending.task, problem, "look at what ended them, such as a limit of memory")
-        self._worker_pool.forget(self._worker_pool.look())  # one of them may have become unable to grade
+        self._worker_pool.forget(self._worker_pool.usable())  # one of them may have become unable to grade
         return self._once_more(sending, f"{_CLUSTER}: {type(error).__name__}")
 
     def _once_more(self, sending: _Sending, problem: str, hint: str = "") -> Attempt | None:
-        if sending.tries < TRIES and self._worker_pool.look():
+        if sending.tries < TRIES and self._worker_pool.usable():
             return None
         return failed(sending.task, problem, *filter(None, [hint]))
 
-    def _heard(self, event: tuple[float, Any]) -> None:
-        """Pass on a step, unless it is told late."""
+    def _on_event(self, event: tuple[float, Any]) -> None:
+        """Report a step, unless its submission is already finished."""
         said = event[1]
         if not isinstance(said, dict):
             return
         name, step = str(said.get(remote.NAME)), str(said.get(remote.STEP))[:200]
         with self._lock:
             if name in self._names:
-                self._hear(name, step)
+                self._on_step(name, step)
 
 
 class ClusterScheduler:
     """Grades on the workers of a cluster.
 
     Args:
-        client: Speaks to the scheduler of the cluster; stays open.
-        jobs: Submissions at a time; None for as many as the workers have threads.
-        warn: Hears why a worker that joined later is not used.
+        client: Client of the cluster; not closed.
+        jobs: Submissions graded in parallel; None for as many as the workers have threads.
+        warn: Called with the reason if a worker that joined later is not used.
     """
 
     def __init__(self, client: Client, jobs: int | None, warn: Callable[[str], None]) -> None:
@@ -239,62 +239,61 @@ class ClusterScheduler:
         self._worker_pool = WorkerPool(client, grader.__version__, warn)
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Ask every worker whether it can grade; see `Scheduler`."""
+        """Ask every worker whether it can grade; see `ClassScheduler`."""
         return self._worker_pool.inspect(isolation)
 
-    def run(self, tasks: Sequence[Task], hear: Hear) -> Generator[Attempt, None, None]:
-        """Yield what comes of each task; see `Scheduler`."""
+    def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
+        """Yield an attempt for each task; see `ClassScheduler`."""
         if not tasks:
             return
         dispatcher = Dispatcher(
-            self._client, self._worker_pool, self._jobs, terms_of(tasks[0]), hear, f"grade-{secrets.token_hex(8)}"
+            self._client, self._worker_pool, self._jobs, terms_of(tasks[0]), on_step, f"grade-{secrets.token_hex(8)}"
         )
         try:
-            yield from dispatcher.serve(tasks)
+            yield from dispatcher.run(tasks)
         finally:
             dispatcher.close()
 
 
-#: Longest wait for a scheduler to answer, and for it to say goodbye.
+#: Longest wait for the connection to the scheduler, and for closing it.
 CONNECT_S = 15.0
-_GOODBYE_S = 5.0
+_CLOSE_S = 5.0
 _LOGGERS = ("distributed", "distributed.client")
 
 
 @contextmanager
 def connected(
-    place: str, jobs: int | None, warn: Callable[[str], None], *, patience_s: float = CONNECT_S
+    place: str, jobs: int | None, warn: Callable[[str], None], *, timeout_s: float = CONNECT_S
 ) -> Iterator[MakeScheduler]:
-    """Connect to a cluster, and let go of it afterwards.
+    """Connect to a cluster, and disconnect at the end.
 
     Args:
         place: Address of the scheduler, such as `tcp://host:8786`, or a scheduler file.
-        jobs: Submissions at a time; None for as many as the cluster has threads.
-        warn: Hears why a worker that joined later is not used.
-        patience_s: Longest wait for an answer.
+        jobs: Submissions graded in parallel; None for as many as the cluster has threads.
+        warn: Called with the reason if a worker that joined later is not used.
+        timeout_s: Longest wait for the scheduler.
 
     Raises:
-        EnvironmentFault: There is no scheduler.
+        EnvironmentFault: No scheduler answers.
     """
     address = address_of(place)
     if os.environ.get("GRADER_DEBUG") != "1":
         for name in _LOGGERS:
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what an instructor must know, we say ourselves
-    client = _client(address, patience_s)
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # the grader reports errors itself
+    client = _client(address, timeout_s)
     try:
         yield lambda _: ClusterScheduler(client, jobs, warn)
     finally:
-        client.close(timeout=_GOODBYE_S)
+        client.close(timeout=_CLOSE_S)
 
 
 def address_of(place: str) -> str:
-    """Return the address of a scheduler that was named by it or by its file; raises EnvironmentFault."""
+    """Return the scheduler's address, given as such or in a scheduler file; raises EnvironmentFault."""
     path = Path(place)
     if ":" in place and not path.is_file():
         return place
     try:
-        said = json.loads(path.read_bytes())
-        return str(said["address"])
+        return str(json.loads(path.read_bytes())["address"])
     except OSError as error:
         message = f"--scheduler {place}: expected an address or a scheduler file, found: {error.strerror}"
         raise EnvironmentFault(message, "an address looks like tcp://host:8786") from None
@@ -303,12 +302,12 @@ def address_of(place: str) -> str:
         raise EnvironmentFault(message, "name the address, such as tcp://host:8786") from None
 
 
-def _client(address: str, patience_s: float) -> Client:
+def _client(address: str, timeout_s: float) -> Client:
     if address.startswith("tls://") and Security().get_connection_args("client").get("ssl_context") is None:
         message = f"--scheduler {address}: expected certificates in Dask's configuration, found none"
         raise EnvironmentFault(message, "name them under distributed.comm.tls: ca-file, client.cert, client.key")
     try:
-        return Client(address, timeout=patience_s, set_as_default=False, name="grade-batch")
+        return Client(address, timeout=timeout_s, set_as_default=False, name="grade-batch")
     except (OSError, TimeoutError):
         message = f"--scheduler {address}: expected a Dask scheduler, found none that answers"
         raise EnvironmentFault(

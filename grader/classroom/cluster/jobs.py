@@ -1,4 +1,4 @@
-"""What a machine of a cluster does: grades a submission as if it lay there, and answers in bytes."""
+"""Runs on the workers of a cluster: grades a submission sent as bytes, and answers in bytes."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _AGAIN = "run the same command again"
 
 
 def fitness(isolation: str, machine: str) -> Fitness:
-    """Return whether this machine can grade in the sandbox that was asked for.
+    """Find out whether this machine can grade in the requested sandbox.
 
     Args:
         isolation: As for one submission.
-        machine: What to call this machine.
+        machine: Name of this machine in messages.
     """
     try:
         choice = choose_isolation(isolation, find_ros())
@@ -56,14 +56,14 @@ def fitness(isolation: str, machine: str) -> Fitness:
     return Fitness(machine, remarks=tuple(remarks))
 
 
-def fulfil(terms: Terms, job: GradingJob, machine: str, hear: Callable[[str], None]) -> JobResult:
-    """Grade a submission, in a process of its own and by this machine's own choice of sandbox.
+def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[str], None]) -> JobResult:
+    """Grade a submission in its own process, in a sandbox chosen on this machine.
 
     Args:
         terms: What the class is graded with.
         job: The submission.
-        machine: What to call this machine.
-        hear: Hears which step begins; whatever it raises ends the grading.
+        machine: Name of this machine in messages.
+        on_step: Called when a step begins; an exception from it aborts the grading.
     """
     try:
         choice = choose_isolation(terms.conditions.isolation, find_ros())
@@ -71,44 +71,44 @@ def fulfil(terms: Terms, job: GradingJob, machine: str, hear: Callable[[str], No
         return JobResult(machine, unfit=fault.message, hint=fault.hint)
     try:
         with _alone() if _one_at_a_time(choice) else nullcontext(), scratch_folder() as scratch:
-            return _graded(terms, job, scratch, machine, hear)
+            return _graded(terms, job, scratch, machine, on_step)
     except GraderError as error:
         return failure(machine, error.message, error.hint)
     except OSError as error:
         return failure(machine, f"the submission cannot be laid out or read back: {error.strerror}")
 
 
-def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, hear: Callable[[str], None]) -> JobResult:
-    task = lay_out(terms, job, scratch)
+def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, on_step: Callable[[str], None]) -> JobResult:
+    task = write_task(terms, job, scratch)
     here = LocalScheduler(1, folder=_start(terms, scratch))
-    with closing(here.run([task], lambda _, step: hear(step))) as attempts:
+    with closing(here.run([task], lambda _, step: on_step(step))) as attempts:
         attempt = next(attempts)
     files = files_below(task.into) if task.into.is_dir() else ()
     if sum(len(content) for _, content in files) > MAX_ANSWER_BYTES:
         return failure(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")
-    return JobResult(machine, kept.dump(_placed(attempt, machine)), files)
+    return JobResult(machine, kept.dump(_status_with_machine(attempt, machine)), files)
 
 
-def _placed(attempt: Attempt, machine: str) -> ResultStatus:
-    """Return how a submission stands; of a failure, with the machine that it happened on."""
-    standing = attempt.standing
-    if standing.state is not State.FAILED:
-        return standing
-    return replace(standing, problem=f"{machine}: {standing.problem}")
+def _status_with_machine(attempt: Attempt, machine: str) -> ResultStatus:
+    """Return the status of an attempt; the problem of a failure names the machine."""
+    status = attempt.status
+    if status.state is not State.FAILED:
+        return status
+    return replace(status, problem=f"{machine}: {status.problem}")
 
 
 def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
-    """Return the answer that this machine failed, which is never a mark."""
+    """Build the answer for a failure of this machine, which never counts as a mark."""
     return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
 
-def lay_out(terms: Terms, job: GradingJob, scratch: Path) -> Task:
-    """Write what was sent into an empty folder, and return the task to grade it.
+def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
+    """Write the received files into an empty folder, and return the task to grade them.
 
-    Files get the relative paths that they have where the class is graded, so that reports call them the same.
+    Files keep the relative paths of the sending machine, so that reports name them the same.
 
     Raises:
-        HarnessError: A path leads out of the folder.
+        HarnessError: A path points outside of the folder.
     """
     start = _start(terms, scratch)
     start.mkdir(parents=True)
@@ -128,7 +128,7 @@ def lay_out(terms: Terms, job: GradingJob, scratch: Path) -> Task:
         rubrics=tuple(Path(os.fsdecode(name)) for name, _ in terms.rubrics),
         odom_bag=Path(bag) if bag else None,
         conditions=replace(terms.conditions, variants=job.variants, seed=job.seed),
-        # A cluster is kept busy by submissions, one a thread.
+        # The parallelism of a cluster is one submission per thread.
         workers=1,
         standalone=terms.standalone,
         deadline_s=terms.deadline_s,
@@ -157,7 +157,7 @@ def _one_at_a_time(choice: TierChoice) -> bool:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    """Wait until no other worker of this user grades in the network of this one."""
+    """Wait until no other worker of this user grades in the same network namespace."""
     network = Path("/proc/self/ns/net").stat().st_ino
     place = Path(tempfile.gettempdir()) / f"grade-network-{os.geteuid()}-{network}.lock"
     lock = os.open(place, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
@@ -168,33 +168,33 @@ def _alone() -> Iterator[None]:
         os.close(lock)
 
 
-#: What an event about a submission holds.
+#: Keys of a progress event.
 NAME, STEP = "name", "step"
 _UNWANTED = ("cancelled", "released", "forgotten")
 
 
 class _UnwantedError(Exception):
-    """Nobody waits for this submission any more."""
+    """The result of this submission is no longer wanted."""
 
 
 async def inspect(isolation: str, dask_worker: Worker) -> bytes:
-    """Return whether this worker can grade.
+    """Report whether this worker can grade, as a packed `Fitness`.
 
     Args:
-        isolation: The sandbox that was asked for.
-        dask_worker: This worker; Dask fills it in by this name.
+        isolation: The requested sandbox.
+        dask_worker: This worker; Dask supplies it because of the parameter's name.
     """
     return pack(await asyncio.to_thread(_fitness, isolation, _machine(dask_worker)))
 
 
 def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
-    """Grade a submission.
+    """Grade a submission, and return a packed `JobResult`.
 
     Args:
-        version: Version of the grader that asks.
-        terms: What the class is graded with.
-        job: The submission.
-        topic: Where steps are told.
+        version: The grader's version on the requesting machine.
+        terms: Packed `Terms` of the class.
+        job: Packed `GradingJob`.
+        topic: Topic for progress events.
     """
     worker = get_worker()
     machine = _machine(worker)
@@ -202,7 +202,7 @@ def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
         return pack(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
     key = worker.get_current_task()
 
-    def hear(step: str) -> None:
+    def on_step(step: str) -> None:
         task = worker.state.tasks.get(key)
         if task is None or task.state in _UNWANTED:
             raise _UnwantedError
@@ -210,29 +210,29 @@ def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
 
     try:
         what = unpack(job, GradingJob)
-        return pack(fulfil(unpack(terms, Terms), what, machine, hear))
+        return pack(grade_job(unpack(terms, Terms), what, machine, on_step))
     except _UnwantedError:
         return b""
     except HarnessError as error:
         return pack(JobResult(machine, unfit=error.message, hint=error.hint))
-    except Exception as error:  # the last line of defence: a mistake of ours must not look like a low score
+    except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         return pack(failure(machine, f"the grader failed: {type(error).__name__}: {error}"))
 
 
 def other_version(wanted: str, found: str) -> str:
-    """Return what to say of a machine with another version of the grader, or none."""
+    """Describe the problem of a machine that lacks this version of the grader."""
     return f"expected rclpy-grader {wanted}, found {found or 'none'}"
 
 
 def remedy(version: str) -> str:
-    """Return what mends that."""
+    """Return the hint that fixes a wrong version."""
     return f"install it there: pip install 'rclpy-grader[dask]=={version}'"
 
 
 def _fitness(isolation: str, machine: str) -> Fitness:
     try:
         return fitness(isolation, machine)
-    except Exception as error:  # whatever it is, this machine is no good, and the others need not suffer for it
+    except Exception as error:  # any failure makes this machine unfit, but not the others
         return Fitness(machine, f"the grader failed: {type(error).__name__}: {error}")
 
 

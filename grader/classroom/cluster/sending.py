@@ -1,4 +1,4 @@
-"""Packs what a cluster is to grade, and takes in what it answers; knows nothing of how bytes travel."""
+"""Packs submissions for a cluster, and stores its answers; does not depend on the transport."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pathlib import Path
 from grader.app.grade import read_exercises, wanted_files
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.cache_key import unusable_digest
 from grader.classroom.local import Attempt, Task
 from grader.classroom.messages import (
     Files,
@@ -24,7 +23,7 @@ from grader.classroom.messages import (
     unpack,
     write_answer,
 )
-from grader.classroom.store import ResultStatus, State
+from grader.classroom.store import ResultStatus, State, unusable_digest
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.rubrics.loader import own_check_files
@@ -36,9 +35,9 @@ _PARTS = frozenset(PARTS)
 
 
 def terms_of(task: Task) -> Terms:
-    """Return what a class is graded with, of which this is one submission; raises GraderError for a lost file."""
+    """Collect what the class of a task is graded with; raises GraderError if a file cannot be read."""
     return Terms(
-        conditions=replace(task.conditions, seed=None),  # each submission comes with its own
+        conditions=replace(task.conditions, seed=None),  # each job has its own seed
         exercises=task.exercises,
         rubrics=tuple((travelling_name(path), _content(path)) for path in task.rubrics),
         checks=tuple(checks_of(task.rubrics)),
@@ -50,24 +49,24 @@ def terms_of(task: Task) -> Terms:
 
 
 def checks_of(rubrics: Sequence[Path]) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the files of checks that rubrics bring with them; they were looked at when the rubrics were read."""
+    """Yield the rubrics' own check files, which were validated when the rubrics were read."""
     for path in rubrics:
         for file in own_check_files(path):
             yield travelling_name(file.path), file.content
 
 
 def files_wanted(task: Task) -> Sequence[str]:
-    """Return the names of the files that a class is asked for, of which this is one submission."""
+    """Return the names of the files that the class of a task has to hand in."""
     asked = GradeRequest("", exercises=task.exercises, every=task.conditions.every, rubrics=task.rubrics, draw=First())
     return wanted_files(read_exercises(asked))
 
 
-def errand_of(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
-    """Return a submission as it travels, or at once what comes of it if it cannot be used.
+def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
+    """Pack a submission for the cluster, or return an attempt at once if it cannot be used.
 
     Args:
         task: The submission.
-        wanted: Names of the files that are asked for.
+        wanted: Names of the required files.
     """
     try:
         with tempfile.TemporaryDirectory() as nowhere:
@@ -88,14 +87,14 @@ def errand_of(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
     )
 
 
-def taken_in(task: Task, answer: JobResult) -> Attempt:
-    """Write down what a machine answers, in the folder that the task names."""
-    standing = kept.load(answer.standing)
-    if standing is None:
+def store_result(task: Task, answer: JobResult) -> Attempt:
+    """Write the result from an answer into the task's folder."""
+    status = kept.load(answer.status)
+    if status is None:
         return failed(task, f"{answer.machine}: expected a result, found something else")
     conditions = task.conditions
-    has_report = standing.state in (State.GRADED, State.UNDECIDED)
-    if has_report and standing.key != conditions.key(standing.digest):
+    has_report = status.state in (State.GRADED, State.UNDECIDED)
+    if has_report and status.key != conditions.key(status.digest):
         return failed(task, f"{answer.machine}: graded by other rubrics or another recording than those here")
     try:
         if has_report:
@@ -104,11 +103,11 @@ def taken_in(task: Task, answer: JobResult) -> Attempt:
         return failed(task, f"{answer.machine}: {error.message}")
     except OSError as error:
         return failed(task, f"the result cannot be written: {error.strerror}")
-    return Attempt(task, replace(standing, label=task.label))
+    return Attempt(task, replace(status, label=task.label))
 
 
 def answer_in(data: object, machine: str) -> JobResult:
-    """Return the answer that a cluster hands over; one that is none says so itself."""
+    """Unpack an answer from the cluster; invalid data becomes an empty result, which counts as a failure."""
     try:
         if isinstance(data, bytes):
             return unpack(data, JobResult)
@@ -118,7 +117,7 @@ def answer_in(data: object, machine: str) -> JobResult:
 
 
 def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
-    """Return that grading failed through no fault of the student."""
+    """Build a failed attempt, which is never the student's fault."""
     return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))
 
 

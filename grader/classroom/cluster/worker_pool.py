@@ -1,4 +1,4 @@
-"""The workers of a cluster: who can grade, who cannot and why, and how many gradings they can do at a time."""
+"""Tracks the workers of a cluster: which ones can grade, why others cannot, and how many threads they have."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ PACKAGE = "rclpy-grader"
 
 
 class WorkerPool:
-    """Knows which workers can grade; each is asked once, when it is seen first.
+    """Knows which workers can grade; asks each worker once, when it first appears.
 
     Args:
-        client: Speaks to the cluster.
+        client: Client of the cluster.
         version: Version of the grader that workers must have.
-        warn: Hears why a worker that joined later is not used.
+        warn: Called with the reason if a worker that joined later is not used.
     """
 
     def __init__(self, client: Client, version: str, warn: Callable[[str], None]) -> None:
@@ -32,13 +32,13 @@ class WorkerPool:
         self._isolation = ""
 
     def inspect(self, isolation: str) -> Sequence[str]:
-        """Ask all workers that are there, and return what an instructor must know.
+        """Ask all present workers whether they can grade, and return warnings for the instructor.
 
         Args:
-            isolation: The sandbox that was asked for.
+            isolation: The requested sandbox.
 
         Raises:
-            EnvironmentFault: The scheduler lacks the package, or there are workers and none of them can grade.
+            EnvironmentFault: The scheduler lacks the package, or there are workers but none of them can grade.
         """
         self._isolation = isolation
         self._check_scheduler()
@@ -49,42 +49,43 @@ class WorkerPool:
         if found and len(unfit) == len(found):
             first = unfit[0]
             raise EnvironmentFault(
-                f"cluster: expected a worker that can grade, found none among {len(found)} ({_told(first)})", first.hint
+                f"cluster: expected a worker that can grade, found none among {len(found)} ({_problem(first)})",
+                first.hint,
             )
         if not threads:
             return ("cluster: there is no worker yet, grading begins when one joins",)
         remarks = dict.fromkeys(f"{fitness.machine}: {remark}" for fitness in found for remark in fitness.remarks)
-        return (*(f"{_told(fitness)}; it is not used" for fitness in unfit), *remarks)
+        return (*(f"{_problem(fitness)}; it is not used" for fitness in unfit), *remarks)
 
-    def look(self) -> Mapping[str, int]:
-        """Return the workers that can grade now, and how many threads each has; newcomers are asked first."""
+    def usable(self) -> Mapping[str, int]:
+        """Return the workers that can grade and their thread counts; asks new workers first."""
         threads = self._threads()
         newcomers = [address for address in threads if address not in self._known]
         if newcomers:
             self._ask(newcomers)
             for fitness in (self._known.get(address) for address in newcomers):
                 if fitness is not None and fitness.unfit:
-                    self._warn(f"{_told(fitness)}; it is not used")
+                    self._warn(f"{_problem(fitness)}; it is not used")
         return {address: count for address, count in threads.items() if self._fit(address)}
 
     def only(self, fit: Collection[str]) -> tuple[str, ...]:
-        """Return the workers that a submission must go to; empty if any will do.
+        """Return the workers that a submission is restricted to; empty if every worker can grade.
 
         Args:
-            fit: Those that can grade now.
+            fit: The workers that can grade.
         """
         unfit = any(fitness.unfit for fitness in self._known.values())
         return tuple(sorted(fit)) if unfit else ()
 
     def rule_out(self, machine: str, problem: str, hint: str) -> None:
-        """Take note that a worker turned out to be unable to grade."""
+        """Stop using a worker that turned out to be unable to grade."""
         for address in self._threads():
             if f" {address} " in machine and self._fit(address):
                 self._known[address] = fitness = Fitness(machine, problem, hint)
-                self._warn(f"{_told(fitness)}; it is not used")
+                self._warn(f"{_problem(fitness)}; it is not used")
 
     def forget(self, addresses: Collection[str]) -> None:
-        """Ask these workers again when they are seen next."""
+        """Ask these workers again the next time."""
         for address in addresses:
             self._known.pop(address, None)
 
@@ -97,12 +98,12 @@ class WorkerPool:
             return dict(self._client.nthreads())
         except (OSError, TimeoutError):
             if tries == 1 or self._client.status != "running":
-                raise lost() from None
-        # One connection of several was closed, perhaps with what a worker that ended had to do with it.
+                raise scheduler_lost() from None
+        # One of several connections was closed, perhaps because a worker ended.
         return self._threads(tries - 1)
 
     def _check_scheduler(self) -> None:
-        """Make sure that the scheduler can read what it is sent: it looks into it before it hands it on."""
+        """Check the scheduler's version of the grader: it deserialises tasks before it forwards them."""
         try:
             found = str(self._client.run_on_scheduler(importlib.metadata.version, PACKAGE))
         except importlib.metadata.PackageNotFoundError:
@@ -112,7 +113,7 @@ class WorkerPool:
             raise EnvironmentFault(f"scheduler of the cluster: {problem}", jobs.remedy(self._version))
 
     def _ask(self, addresses: Collection[str]) -> None:
-        """Ask workers for their version, which needs no grader there, and those with the right one for the rest."""
+        """Ask workers for their version, which works without the grader; then inspect those with the right one."""
         right = []
         for address, found in self._run(importlib.metadata.version, PACKAGE, addresses).items():
             if found == self._version:
@@ -120,11 +121,11 @@ class WorkerPool:
             elif isinstance(found, (str, importlib.metadata.PackageNotFoundError)):
                 problem = jobs.other_version(self._version, found if isinstance(found, str) else "")
                 self._known[address] = Fitness(f"worker {address}", problem, jobs.remedy(self._version))
-        for address, said in self._run(jobs.inspect, self._isolation, right).items():
-            if isinstance(said, bytes):
-                self._known[address] = unpack(said, Fitness)
-            elif not isinstance(said, OSError):  # such a one has left meanwhile
-                self._known[address] = Fitness(f"worker {address}", f"the grader failed: {type(said).__name__}")
+        for address, reply in self._run(jobs.inspect, self._isolation, right).items():
+            if isinstance(reply, bytes):
+                self._known[address] = unpack(reply, Fitness)
+            elif not isinstance(reply, OSError):  # the worker has left in the meantime
+                self._known[address] = Fitness(f"worker {address}", f"the grader failed: {type(reply).__name__}")
 
     def _run(self, function: Callable[..., object], argument: str, addresses: Collection[str]) -> dict[str, Any]:
         if not addresses:
@@ -132,16 +133,16 @@ class WorkerPool:
         try:
             return dict(self._client.run(function, argument, workers=list(addresses), on_error="return"))
         except (OSError, TimeoutError):
-            raise lost() from None
+            raise scheduler_lost() from None
 
 
-def lost() -> HarnessError:
-    """Return what to say when nobody answers any more."""
+def scheduler_lost() -> HarnessError:
+    """Build the error for a scheduler that no longer answers."""
     return HarnessError(
         "cluster: expected the scheduler to answer, found it gone",
         "what was graded is kept; when the scheduler is back, the same command goes on where it was",
     )
 
 
-def _told(fitness: Fitness) -> str:
+def _problem(fitness: Fitness) -> str:
     return f"{fitness.machine}: {fitness.unfit}"

@@ -32,7 +32,7 @@ def lines_of(function: cst.FunctionDef) -> Sequence[Any]:
 
 
 def at_top(function: cst.FunctionDef, text: str) -> tuple[Edit, ...]:
-    """Return the edit that puts a statement before the others of a function; none if that has no block of its own."""
+    """Return the edit that inserts a statement at the start of a function; none if its body is on the same line."""
     lines = lines_of(function)
     return ((lines[0], cst.FlattenSentinel([statement(text), lines[0]])),) if lines else ()
 
@@ -43,7 +43,7 @@ def parameters(function: cst.FunctionDef) -> list[str]:
 
 
 def owner(function: cst.FunctionDef) -> str:
-    """Return where a function can keep something between two calls: `self`, or the function itself."""
+    """Return an object where a function can store state between calls: `self`, or the function itself."""
     names = parameters(function)
     return names[0] if names[:1] == ["self"] else function.name.value
 
@@ -54,7 +54,7 @@ def alone(program: Program, node: cst.CSTNode) -> bool:
     return line is not None and len(line.body) == 1
 
 
-#: Statements that people repeat by accident, where that makes a difference.
+#: Statements that people repeat by accident, and where this changes the behaviour.
 _REPEATED = ("publish", "call_async", "call", *LEVELS)
 
 
@@ -94,7 +94,7 @@ def missing_early_return(program: Program) -> Iterator[Mutation]:
 
 
 def missing_parameter(program: Program) -> Iterator[Mutation]:
-    """A callback that does not take what it is given."""
+    """A callback without the parameter that it is called with."""
     for function in program.callbacks:
         params = function.params.params
         if params:
@@ -104,7 +104,7 @@ def missing_parameter(program: Program) -> Iterator[Mutation]:
 
 
 def callback_called(program: Program) -> Iterator[Mutation]:
-    """A callback that is called where it should be named: `self.tick()` for `self.tick`."""
+    """A callback that is called instead of passed: `self.tick()` for `self.tick`."""
     for call in program.calls(*CREATORS):
         arg = argument(call, "callback")
         if arg is not None and not isinstance(arg.value, (cst.Lambda, cst.Call)):
@@ -122,7 +122,7 @@ def timer_once(program: Program) -> Iterator[Mutation]:
 
 
 def spins_once(program: Program) -> Iterator[Mutation]:
-    """A node that spins once, not until the end."""
+    """A node that spins once instead of until the end."""
     for call in program.calls("spin"):
         if isinstance(call.func, cst.Attribute):
             yield Mutation(call, "spin -> spin_once", ((call.func.attr, cst.Name("spin_once")),))
@@ -160,7 +160,7 @@ def wrong_order(program: Program) -> Iterator[Mutation]:
 
 
 def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode) -> bool:
-    """Whether a line needs the one before it: a name that is set there, a message that is filled, what starts ROS."""
+    """Whether a line depends on the one before it, which sets a name, fills a message, or starts ROS."""
     used = {program.code(node) for node in [*program.all(cst.Name, other), *program.all(cst.Attribute, other)]}
     made = {program.code(target.target) for target in program.all(cst.AssignTarget, one)}
     filled = {
@@ -187,19 +187,19 @@ def exits_later(program: Program) -> Iterator[Mutation]:
 
 
 def crashes_on_third(program: Program) -> Iterator[Mutation]:
-    """An error that comes with the third call of a callback."""
+    """An error at the third call of a callback."""
     for function in program.callbacks:
         yield _after(function, 2, "raise RuntimeError('the third time')", "raises")
 
 
 def stops_later(program: Program) -> Iterator[Mutation]:
-    """A callback that does nothing any more after a while."""
+    """A callback that stops working after a while."""
     for function in program.callbacks:
         yield _after(function, LATER, "return", "does nothing")
 
 
 def frozen_value(program: Program) -> Iterator[Mutation]:
-    """A value or message that is made once and used for ever."""
+    """A value or message that is created once and reused forever."""
     for function in program.callbacks:
         for assign in program.all(cst.Assign, function):
             target, value = assign.targets[0].target, assign.value
@@ -213,7 +213,7 @@ def frozen_value(program: Program) -> Iterator[Mutation]:
 
 
 def first_message_only(program: Program) -> Iterator[Mutation]:
-    """A message received that is kept for ever: only the first one counts."""
+    """A received message that is kept forever: only the first one counts."""
     for function in program.handed_to("create_subscription"):
         parameter = function.params.params[-1].name.value if function.params.params else ""
         if parameter and parameter != "self":
@@ -223,7 +223,7 @@ def first_message_only(program: Program) -> Iterator[Mutation]:
 
 
 def one_behind(program: Program) -> Iterator[Mutation]:
-    """A message that is used when the next one comes: always one behind."""
+    """A message that is used only when the next one arrives: always one behind."""
     for function in program.handed_to("create_subscription"):
         parameter = function.params.params[-1].name.value if function.params.params else ""
         if parameter and parameter != "self":
@@ -244,7 +244,7 @@ def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutat
 
 
 def _kept(program: Program, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
-    """Return the edit by which an expression has the value that it had at first."""
+    """Return the edit that makes an expression keep its first value."""
     own, name = owner(function), f"kept_{program.line(value)}"
     text = f"{own}.__dict__.setdefault('{name}', {program.code(value)})"
     return ((value, cst.parse_expression(text)),)
@@ -263,7 +263,7 @@ _BOUNDARIES: Mapping[type[cst.BaseCompOp], tuple[type[cst.BaseCompOp], ...]] = {
 
 
 def comparison(program: Program) -> Iterator[Mutation]:
-    """A limit that belongs to the wrong side, a comparison the wrong way round, or with the one value only."""
+    """A limit on the wrong side, a reversed comparison, or equality instead of an inequality."""
     for node in program.all(cst.Comparison):
         for target in node.comparisons:
             if _is_guard(program, node):
@@ -274,7 +274,7 @@ def comparison(program: Program) -> Iterator[Mutation]:
 
 
 def swapped_branches(program: Program) -> Iterator[Mutation]:
-    """What belongs to yes and what belongs to no in each other's place."""
+    """The branches of a condition swapped."""
     for node in program.all(cst.IfExp):
         yield Mutation(
             node,
@@ -291,7 +291,7 @@ def swapped_branches(program: Program) -> Iterator[Mutation]:
 
 
 def constant_condition(program: Program) -> Iterator[Mutation]:
-    """A condition that is forgotten, or never true: what it guards happens always, or not at all."""
+    """A condition that is missing or never true: the guarded code runs always or never."""
     tests = [branch.test for branch in program.all(cst.If)]
     tests += [choice.test for choice in program.all(cst.IfExp)]
     tests += [loop.test for loop in program.all(cst.While)]
@@ -302,7 +302,7 @@ def constant_condition(program: Program) -> Iterator[Mutation]:
 
 
 def boolean(program: Program) -> Iterator[Mutation]:
-    """Yes for no, `and` for `or`, a `not` too few."""
+    """True for False, `and` for `or`, a missing `not`."""
     for name in program.all(cst.Name):
         if name.value in ("True", "False"):
             other = "False" if name.value == "True" else "True"
@@ -318,7 +318,7 @@ def boolean(program: Program) -> Iterator[Mutation]:
 
 
 def loop_once(program: Program) -> Iterator[Mutation]:
-    """What should be repeated is tried once: `if` for `while`."""
+    """A loop that runs only once: `if` for `while`."""
     for loop in program.all(cst.While):
         if loop.orelse is None and not _breaks(program, loop):
             after = cst.If(test=loop.test, body=loop.body, whitespace_before_test=cst.SimpleWhitespace(" "))
@@ -338,5 +338,5 @@ def _breaks(program: Program, loop: cst.While) -> bool:
 
 
 def _is_guard(program: Program, node: cst.CSTNode) -> bool:
-    """Whether a test asks if the file is run as a program: the grader runs it either way."""
+    """Whether a condition is the `__main__` guard, which makes no difference to the grader."""
     return "__name__" in program.code(node)

@@ -1,4 +1,4 @@
-"""The mutants of a program: every operator at every place it fits, each distinct source once."""
+"""Makes the mutants of a program: every operator wherever it applies, without duplicates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from grader.mutation.operators import flow, values, words
 from grader.mutation.operators.program import Mutation, Program, short
 
 Operator = Callable[[Program], Iterator[Mutation]]
-#: Operator name -> what imitates the mistake; its docstring says which mistake that is.
+#: Operator name -> operator; its docstring describes the mistake that it imitates.
 OPERATORS: Mapping[str, Operator] = {
     operator.__name__: operator
     for operator in (
@@ -78,15 +78,15 @@ OPERATORS: Mapping[str, Operator] = {
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """A program with one mistake in it.
+    """A program with one mistake.
 
     Attributes:
         file: Name of the file.
         line: Line of the original that was changed, from 1.
         operator: Key of `OPERATORS`.
-        detail: What was changed into what.
-        source: The whole changed program.
-        number: Counts mutants whose file, line, operator and detail are the same, from 1.
+        detail: The change.
+        source: The complete changed program.
+        number: Distinguishes mutants with the same file, line, operator and detail, starting at 1.
     """
 
     file: str
@@ -98,7 +98,7 @@ class Mutant:
 
     @property
     def id(self) -> str:
-        """A name that stays the same as long as the reference solution does."""
+        """An id that stays the same as long as the reference solution does."""
         again = f" #{self.number}" if self.number > 1 else ""
         return f"{self.file}:{self.line}:{self.operator}:{self.detail}{again}"
 
@@ -106,12 +106,12 @@ class Mutant:
 def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERATORS) -> tuple[Mutant, ...]:
     """Return the mutants of a program, in the order of operators and lines.
 
-    A mutant that means the same as the original or as one before it is left out, and so is what is no Python any more.
+    Mutants that are equivalent to the original or to an earlier mutant are skipped, and so are invalid programs.
 
     Args:
         source: The program.
         file: Its name, for the ids.
-        operators: What makes them.
+        operators: The operators to apply.
     """
     program = Program(source)
     seen = {meaning(source)}
@@ -131,7 +131,7 @@ def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERA
 
 
 def meaning(source: str) -> str | None:
-    """Return what two sources have in common that differ in comments and layout only; None for what is no Python."""
+    """Return a form that is equal for sources that differ only in comments and layout; None for invalid Python."""
     try:
         tree = ast.parse(source)
         compile(tree, "mutant", "exec")

@@ -1,4 +1,4 @@
-"""A program as operators see it: its syntax tree with lines, parents and constants, and how a change becomes source."""
+"""A parsed program for operators: its syntax tree with lines, parents and constants, and edits of its source."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from libcst import matchers as m
 from libcst.metadata import CodeRange, MetadataWrapper, ParentNodeProvider, PositionProvider
 
 Node = TypeVar("Node", bound=cst.CSTNode)
-#: A node and what takes its place: another node, several, or nothing.
+#: A node and its replacement: another node, several nodes, or nothing.
 Edit = tuple[cst.CSTNode, cst.CSTNode | cst.FlattenSentinel[Any] | cst.RemovalSentinel]
 
-#: Parameters of what rclpy creates entities with, in order.
+#: Parameters of the methods that create rclpy entities, in order.
 CREATORS: Mapping[str, tuple[str, ...]] = {
     "create_publisher": ("msg_type", "topic", "qos_profile"),
     "create_subscription": ("msg_type", "topic", "callback", "qos_profile"),
@@ -24,7 +24,7 @@ CREATORS: Mapping[str, tuple[str, ...]] = {
     "create_timer": ("timer_period_sec", "callback"),
     "create_rate": ("frequency",),
 }
-#: What a program sleeps with; the period is the first argument.
+#: Functions that sleep; the period is the first argument.
 SLEEPS = ("sleep",)
 #: Methods of an rclpy logger.
 LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
@@ -35,9 +35,9 @@ class Mutation:
     """One way to change a program.
 
     Attributes:
-        at: Where it is; gives the line.
-        detail: What is changed into what, one line.
-        edits: Nodes of the program and what takes their place.
+        at: The node that gives the line.
+        detail: The change, in one line.
+        edits: Nodes of the program and their replacements.
     """
 
     at: cst.CSTNode
@@ -52,7 +52,7 @@ class Program:
         source: Its text.
 
     Raises:
-        libcst.ParserSyntaxError: It is no Python.
+        libcst.ParserSyntaxError: The source is not valid Python.
     """
 
     def __init__(self, source: str) -> None:
@@ -66,7 +66,7 @@ class Program:
         return self.module.code_for_node(node)
 
     def line(self, node: cst.CSTNode) -> int:
-        """Return the line that a node begins in, from 1."""
+        """Return the first line of a node, starting at 1."""
         return self._places[node].start.line
 
     def all(self, kind: type[Node], inside: cst.CSTNode | None = None) -> list[Node]:
@@ -79,7 +79,7 @@ class Program:
         return start.line, start.column
 
     def above(self, node: cst.CSTNode) -> Iterator[cst.CSTNode]:
-        """Yield what a node lies in, inside out."""
+        """Yield the ancestors of a node, from the inside out."""
         while (parent := self._parents.get(node)) is not None:
             yield parent
             node = parent
@@ -89,11 +89,11 @@ class Program:
         return next((above for above in self.above(node) if isinstance(above, kind)), None)
 
     def calls(self, *names: str) -> list[cst.Call]:
-        """Return the calls of functions or methods of these names; all calls without one."""
+        """Return the calls of functions or methods with these names; all calls if no names are given."""
         return [call for call in self.all(cst.Call) if not names or called(call) in names]
 
     def constant(self, expression: cst.BaseExpression | None) -> cst.BaseExpression | None:
-        """Return where the value of an expression is written: itself, or what its name was assigned once."""
+        """Return the expression that defines a value: itself, or the only assignment to its name."""
         if not isinstance(expression, (cst.Name, cst.Attribute)):
             return expression
         values = self._assigned.get(self.code(expression), [])
@@ -109,20 +109,20 @@ class Program:
 
     @cached_property
     def callbacks(self) -> list[cst.FunctionDef]:
-        """The functions that are handed to timers, subscriptions, services and futures."""
+        """The callbacks of timers, subscriptions, services and futures."""
         handed = [argument(call, "callback") for call in self.calls(*CREATORS)]
         handed += [call.args[0] for call in self.calls("add_done_callback") if call.args]
         names = {last_name(arg.value) for arg in handed if arg is not None}
         return [function for function in self.all(cst.FunctionDef) if function.name.value in names]
 
     def handed_to(self, creator: str) -> list[cst.FunctionDef]:
-        """Return the functions that are handed to what creates one kind of entity."""
+        """Return the callbacks passed to the methods that create a kind of entity."""
         handed = (argument(call, "callback") for call in self.calls(creator))
         names = {last_name(arg.value) for arg in handed if arg is not None}
         return [function for function in self.callbacks if function.name.value in names]
 
     def importing(self, line: str) -> tuple[Edit, ...]:
-        """Return the edits that add an import; none if the program has it."""
+        """Return the edits that add an import; none if the program already has it."""
         imports = [
             s for s in self.module.body if m.matches(s, m.SimpleStatementLine(body=[m.Import() | m.ImportFrom()]))
         ]
@@ -132,7 +132,7 @@ class Program:
         return ((imports[-1], cst.FlattenSentinel([added, imports[-1]])),)
 
     def changed(self, edits: Sequence[Edit]) -> str:
-        """Return the source with edits made."""
+        """Return the source after edits."""
         replacements: dict[cst.CSTNode, Any] = {}
         for old, new in edits:
             before = replacements.get(old)
@@ -150,12 +150,12 @@ class _Replacing(cst.CSTTransformer):
 
 
 def _joined(one: Any, other: Any) -> Any:
-    """Return two insertions before the same statement as one."""
+    """Merge two insertions before the same statement."""
     return cst.FlattenSentinel([*list(one)[:-1], *list(other)])
 
 
 def called(call: cst.Call) -> str:
-    """Return the last name of what is called; empty if it has none."""
+    """Return the last part of the called name; empty if there is none."""
     return last_name(call.func)
 
 
@@ -167,7 +167,7 @@ def last_name(expression: cst.BaseExpression) -> str:
 
 
 def argument(call: cst.Call, name: str) -> cst.Arg | None:
-    """Return the argument of a creator that a parameter's name or place gives; None if there is none."""
+    """Return the argument for a parameter of a creating method, by name or position; None if it is not passed."""
     for arg in call.args:
         if arg.keyword is not None and arg.keyword.value == name:
             return arg
@@ -178,12 +178,12 @@ def argument(call: cst.Call, name: str) -> cst.Arg | None:
 
 
 def expression(text: str) -> cst.BaseExpression:
-    """Return an expression from its text."""
+    """Parse an expression."""
     return cst.parse_expression(text)
 
 
 def statement(text: str) -> Any:
-    """Return a statement from its text."""
+    """Parse a statement."""
     return cst.parse_statement(text)
 
 
@@ -201,7 +201,7 @@ def string(text: str) -> cst.SimpleString:
 
 
 def is_docstring(program: Program, node: cst.CSTNode) -> bool:
-    """Whether a string is a statement of its own."""
+    """Whether a string is a statement by itself."""
     return isinstance(next(program.above(node), None), cst.Expr)
 
 
@@ -211,7 +211,7 @@ def number_of(node: cst.CSTNode | None) -> float | int | None:
 
 
 def number(value: float) -> cst.BaseExpression:
-    """Return a literal for a number, without the noise of binary fractions."""
+    """Return a number literal without floating-point noise."""
     text = repr(value) if isinstance(value, int) else repr(float(f"{value:.12g}"))
     return expression(text)
 
@@ -222,6 +222,6 @@ def into(before: str, after: str) -> str:
 
 
 def short(text: str, limit: int = 40) -> str:
-    """Return a text as one short line."""
+    """Shorten a text to one line."""
     line = " ".join(text.split())
     return line if len(line) <= limit else f"{line[: limit - 1]}…"

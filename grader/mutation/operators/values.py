@@ -25,7 +25,7 @@ _LONGER: Mapping[str, str] = {
 
 
 def wrong_field(program: Program) -> Iterator[Mutation]:
-    """The field beside the right one: x for y, linear for angular, orientation for position."""
+    """The wrong one of two similar fields: x for y, linear for angular, orientation for position."""
     for node in program.all(cst.Attribute):
         other = _SIBLINGS.get(node.attr.value)
         if other is not None and not _is_own(node):
@@ -33,7 +33,7 @@ def wrong_field(program: Program) -> Iterator[Mutation]:
 
 
 def wrong_part(program: Program) -> Iterator[Mutation]:
-    """The speed where the position belongs."""
+    """The speed instead of the position."""
     for node in program.all(cst.Attribute):
         text = program.code(node)
         for ending, other in _LONGER.items():
@@ -43,7 +43,7 @@ def wrong_part(program: Program) -> Iterator[Mutation]:
 
 
 def swapped_arguments(program: Program) -> Iterator[Mutation]:
-    """Two neighbouring arguments in each other's place."""
+    """Two neighbouring arguments swapped."""
     for call in program.all(cst.Call):
         for one, other in zip(call.args, call.args[1:], strict=False):
             if one.keyword is None and other.keyword is None and not one.star + other.star:
@@ -52,7 +52,7 @@ def swapped_arguments(program: Program) -> Iterator[Mutation]:
 
 
 def swapped_values(program: Program) -> Iterator[Mutation]:
-    """Two neighbouring values of a text in each other's place."""
+    """Two neighbouring values in a text swapped."""
     for text in program.all(cst.FormattedString):
         values = [part for part in text.parts if isinstance(part, cst.FormattedStringExpression)]
         for one, other in pairwise(values):
@@ -61,7 +61,7 @@ def swapped_values(program: Program) -> Iterator[Mutation]:
 
 
 def missing_keyword(program: Program) -> Iterator[Mutation]:
-    """A field or setting left out: `Float32()` for `Float32(data=speed)`."""
+    """A missing field or setting: `Float32()` for `Float32(data=speed)`."""
     for call in program.all(cst.Call):
         for arg in call.args:
             if arg.keyword is not None:
@@ -71,7 +71,7 @@ def missing_keyword(program: Program) -> Iterator[Mutation]:
 
 
 def stale_field(program: Program) -> Iterator[Mutation]:
-    """A value that goes into a new field by another name: the field of the message stays as it was."""
+    """A value assigned to a misspelt field: the field of the message stays unchanged."""
     for assign in program.all(cst.Assign):
         target = assign.targets[0].target
         if isinstance(target, cst.Attribute) and not _is_own(target):
@@ -81,12 +81,12 @@ def stale_field(program: Program) -> Iterator[Mutation]:
 
 
 def _last(args: tuple[cst.Arg, ...]) -> list[cst.Arg]:
-    """Return arguments without a comma behind the last one."""
+    """Remove the comma after the last argument."""
     return [*args[:-1], args[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)] if args else []
 
 
 def _is_own(node: cst.Attribute) -> bool:
-    """Whether an attribute is the object's own, `self.x`, and no field of a message."""
+    """Whether an attribute belongs to the object, as in `self.x`, and is not a message field."""
     return isinstance(node.value, cst.Name) and node.value.value == "self"
 
 
@@ -99,21 +99,21 @@ _OPERATORS: dict[type[cst.BaseBinaryOp], type[cst.BaseBinaryOp]] = {
 
 
 def constant(program: Program) -> Iterator[Mutation]:
-    """A number that is off: by a tenth, by one where it is whole."""
+    """A number that is off: by a tenth, or by one if it is an integer."""
     for node, value in _numbers(program):
         off = value + 1 if isinstance(value, int) else value * 1.1 or 0.1
         yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
 
 
 def constant_less(program: Program) -> Iterator[Mutation]:
-    """A number that is off the other way."""
+    """A number that is off in the other direction."""
     for node, value in _numbers(program):
         off = value - 1 if isinstance(value, int) else value * 0.9 or -0.1
         yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
 
 
 def sign(program: Program) -> Iterator[Mutation]:
-    """A lost minus, or one too many."""
+    """A missing or superfluous minus sign."""
     for node, value in _numbers(program):
         above = next(program.above(node), None)
         if isinstance(above, cst.UnaryOperation) and isinstance(above.operator, cst.Minus):
@@ -123,7 +123,7 @@ def sign(program: Program) -> Iterator[Mutation]:
 
 
 def whole_number(program: Program) -> Iterator[Mutation]:
-    """A whole number where a message wants a float: `0` for `0.0`."""
+    """An integer where a message needs a float: `0` for `0.0`."""
     for node, value in _numbers(program):
         if isinstance(value, float) and value.is_integer():
             yield Mutation(node, into(program.code(node), str(int(value))), ((node, number(int(value))),))
@@ -147,7 +147,7 @@ def missing_operand(program: Program) -> Iterator[Mutation]:
 
 
 def missing_conversion(program: Program) -> Iterator[Mutation]:
-    """A forgotten conversion or function: `degrees(x)` becomes `x`; or its opposite."""
+    """A forgotten conversion or function: `degrees(x)` becomes `x`; or the inverse function."""
     for call in program.calls("degrees", "radians", "sin", "cos", "round", "abs", "float", "int", "str", "max", "min"):
         if call.args:
             inner = call.args[0].value
@@ -160,7 +160,7 @@ def missing_conversion(program: Program) -> Iterator[Mutation]:
 
 
 def cut_to_whole(program: Program) -> Iterator[Mutation]:
-    """Numbers cut to whole ones before they are compared or sent."""
+    """Numbers truncated to integers before they are compared or sent."""
     for comparison in program.all(cst.Comparison):
         text = program.code(comparison.left)
         if isinstance(
@@ -173,7 +173,7 @@ def cut_to_whole(program: Program) -> Iterator[Mutation]:
 
 
 def counter_step(program: Program) -> Iterator[Mutation]:
-    """A counter that counts in other steps, or backwards."""
+    """A counter with the wrong step, or counting backwards."""
     for node in program.all(cst.AugAssign):
         if isinstance(node.operator, (cst.AddAssign, cst.SubtractAssign)):
             text = program.code(node.value)
@@ -184,7 +184,7 @@ def counter_step(program: Program) -> Iterator[Mutation]:
 
 
 def _numbers(program: Program) -> Iterator[tuple[cst.CSTNode, float | int]]:
-    """Yield the numbers of a program, without queue depths: no student's mark depends on these."""
+    """Yield the numbers of a program, without queue depths, which affect no mark."""
     depths = {
         arg.value
         for call in program.calls("create_publisher", "create_subscription")
@@ -204,7 +204,7 @@ def _of_texts(node: cst.BinaryOperation) -> bool:
 
 
 def _sent(program: Program) -> list[cst.BaseExpression]:
-    """Return what fields of messages are set to, as far as it may be any number: no literal and no text."""
+    """Return the values assigned to message fields that may be numbers, without literals and strings."""
     values = [
         arg.value
         for call in program.all(cst.Call)
@@ -236,12 +236,12 @@ _LATCHED = (
 
 
 def best_effort(program: Program) -> Iterator[Mutation]:
-    """A publisher or subscription for sensor data, where messages may get lost."""
+    """A publisher or subscription with the sensor data profile, which may lose messages."""
     yield from _with_profile(program, "best effort", _SENSOR)
 
 
 def transient_local(program: Program) -> Iterator[Mutation]:
-    """A publisher or subscription that expects late joiners to be served."""
+    """A publisher or subscription with transient local durability."""
     yield from _with_profile(program, "transient local", _LATCHED)
 
 

@@ -1,4 +1,4 @@
-"""Correct variants of a program: the same behaviour with other names, order and style; none may cost a point."""
+"""Makes correct variants of a program: the same behaviour with other names, order and style."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def renamed_methods(program: Program) -> str:
 
 
 def renamed_attributes(program: Program) -> str:
-    """Every attribute of an object of the program's own has another name."""
+    """Every attribute of the program's own objects has another name."""
     targets = [target.target for target in program.all(cst.AssignTarget)]
     names = {t.attr.value for t in targets if isinstance(t, cst.Attribute) and program.code(t.value) == "self"}
     return program.changed(_of_own_objects(program, names, "the_"))
@@ -71,7 +71,7 @@ def renamed_nodes(program: Program) -> str:
 
 
 def reordered_methods(program: Program) -> str:
-    """The methods of each class stand the other way round."""
+    """The methods of each class are in reverse order."""
     edits: list[Edit] = []
     for node in program.all(cst.ClassDef):
         methods = [part for part in node.body.body if isinstance(part, cst.FunctionDef)]
@@ -80,14 +80,14 @@ def reordered_methods(program: Program) -> str:
 
 
 def reordered_constants(program: Program) -> str:
-    """The constants of the file stand the other way round, as far as none needs another."""
+    """The constants of the file are in reverse order, unless one depends on another."""
     lines = [s for s in program.module.body if isinstance(s, cst.SimpleStatementLine)]
     plain = [s for s in lines if isinstance(s.body[0], cst.Assign) and not program.all(cst.Name, s.body[0].value)]
     return program.changed([(old, new) for old, new in zip(plain, reversed(plain), strict=True) if old is not new])
 
 
 def _renamed(program: Program, names: Iterable[str], rename: Callable[[str], str]) -> str:
-    """Return the source with plain names changed: not as keyword, and not as attribute of anything."""
+    """Rename plain names, except as keyword arguments and attributes."""
     wanted = set(names) - _not_ours(program)
     edits: list[Edit] = []
     for node in program.all(cst.Name):
@@ -100,7 +100,7 @@ def _renamed(program: Program, names: Iterable[str], rename: Callable[[str], str
 
 
 def _of_own_objects(program: Program, names: Collection[str], prefix: str) -> list[Edit]:
-    """Return the edits that rename attributes of `self`, and of variables that hold an object of an own class."""
+    """Return the edits that rename attributes of `self` and of objects of the program's own classes."""
     classes = {node.name.value for node in program.all(cst.ClassDef)}
     made = [a for a in program.all(cst.Assign) if isinstance(a.value, cst.Call) and called(a.value) in classes]
     objects = {"self", *(program.code(target.target) for assign in made for target in assign.targets)}
@@ -112,17 +112,17 @@ def _of_own_objects(program: Program, names: Collection[str], prefix: str) -> li
 
 
 def _not_ours(program: Program) -> set[str]:
-    """Return the names that come with an import, or are those of parameters."""
+    """Return the names of imports and parameters."""
     names = {alias.evaluated_alias or alias.evaluated_name.split(".")[0] for alias in program.all(cst.ImportAlias)}
     return names | {parameter.name.value for parameter in program.all(cst.Param)}
 
 
-#: Specifications that mean the same in every style.
+#: Format specifications with the same meaning in every style.
 _PLAIN = re.compile(r"(?:0?\d*(?:\.\d+)?[dfegs])?")
 
 
 def single_quotes(program: Program) -> str:
-    """Texts stand in single quotes."""
+    """Strings have single quotes."""
     doubled = [
         node
         for node in program.all(cst.SimpleString)
@@ -132,18 +132,18 @@ def single_quotes(program: Program) -> str:
 
 
 def windows_lines(program: Program) -> str:
-    """Lines end as on Windows."""
+    """Lines end with CR LF."""
     return program.module.code.replace("\r\n", "\n").replace("\n", "\r\n")
 
 
 def other_topic_form(program: Program) -> str:
-    """Topics and services are relative where they were absolute, and the other way round."""
+    """Absolute names of topics and services are relative, and relative ones absolute."""
     edits = [(node, string(name[1:] if name.startswith("/") else f"/{name}")) for node, name in names(program)]
     return program.changed([(old, new) for old, new in edits if "~" not in new.value])
 
 
 def keyword_arguments(program: Program) -> str:
-    """Publishers, timers and the like are made with named arguments."""
+    """Publishers, timers and so on are created with keyword arguments."""
     edits: list[Edit] = []
     for call in program.calls(*CREATORS):
         args = []
@@ -155,17 +155,17 @@ def keyword_arguments(program: Program) -> str:
 
 
 def percent_format(program: Program) -> str:
-    """Texts are made with `%`, not as f-strings."""
+    """Texts are formatted with `%` instead of f-strings."""
     return _formatted(program, _Style(_percent_field, _percent_text, _percent))
 
 
 def format_method(program: Program) -> str:
-    """Texts are made with `.format`, not as f-strings."""
+    """Texts are formatted with `.format` instead of f-strings."""
     return _formatted(program, _Style(_format_field, str, _format))
 
 
 def qos_object(program: Program) -> str:
-    """The queue depth stands in a QoSProfile."""
+    """The queue depth is given in a QoSProfile."""
     edits: list[Edit] = []
     for call in program.calls("create_publisher", "create_subscription"):
         arg = argument(call, "qos_profile")
@@ -200,7 +200,7 @@ def executor(program: Program) -> str:
 
 
 def loop_in_thread(program: Program) -> str:
-    """A loop that sleeps in place of the timer; a thread spins."""
+    """A loop with a sleep replaces the timer; a thread spins the node."""
     timers = program.calls("create_timer")
     timer = timers[0] if len(timers) == 1 else None
     lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
@@ -221,14 +221,14 @@ def loop_in_thread(program: Program) -> str:
 
 
 def without_guard(program: Program) -> str:
-    """The file ends with its function `main`, as a console script needs it."""
+    """The `__main__` guard is missing, as in a module for a console script."""
     guards = [node for node in program.all(cst.If) if "__name__" in program.code(node.test)]
     has_main = any(node.name.value == "main" for node in program.all(cst.FunctionDef))
     return program.changed([(guard, cst.RemoveFromParent()) for guard in guards]) if has_main else _same(program)
 
 
 def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
-    """Return the name of the node that a line spins; empty if it does nothing of that kind."""
+    """Return the name of the node that a line spins; empty for other lines."""
     small = line.body[0]
     if not isinstance(small, cst.Expr) or not isinstance(small.value, cst.Call):
         return ""
@@ -239,7 +239,7 @@ def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Style:
-    """How a style writes a field with its specification, the text between fields, and the whole with its values."""
+    """How a style formats a field with its specification, the text between fields, and the complete expression."""
 
     field: Callable[[str], str]
     text: Callable[[str], str]
@@ -247,7 +247,7 @@ class _Style:
 
 
 def _formatted(program: Program, style: _Style) -> str:
-    """Return the source with f-strings written another way, where that is possible."""
+    """Rewrite f-strings in another style where possible."""
     edits: list[Edit] = []
     for node in program.all(cst.FormattedString):
         values = [part for part in node.parts if isinstance(part, cst.FormattedStringExpression)]
@@ -264,7 +264,7 @@ def _formatted(program: Program, style: _Style) -> str:
 
 
 def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
-    """Whether every style can write a field."""
+    """Whether every style can format a field."""
     return (
         part.conversion is None and part.equal is None and _PLAIN.fullmatch(_specification(program, part)) is not None
     )
@@ -303,9 +303,9 @@ def _same(program: Program) -> str:
     return program.module.code
 
 
-#: Returns the source of a variant, or the same source where there is nothing to vary.
+#: Returns the source of a variant, or the unchanged source if there is nothing to vary.
 Rewriter = Callable[[Program], str]
-#: Variant name -> what writes it; its docstring says how it differs.
+#: Variant name -> its rewriter; the docstring describes the difference.
 VARIANTS: Mapping[str, Rewriter] = {
     rewriter.__name__: rewriter
     for rewriter in (
@@ -348,7 +348,7 @@ class ProgramVariant:
 
     @property
     def id(self) -> str:
-        """A name that stays the same as long as the reference solution does."""
+        """An id that stays the same as long as the reference solution does."""
         return f"{self.file}:{self.name}"
 
 

@@ -47,7 +47,7 @@ def log_level(program: Program) -> Iterator[Mutation]:
 
 
 def log_every_message(program: Program) -> Iterator[Mutation]:
-    """The report comes with each message, not by the timer."""
+    """A report with each message instead of by a timer."""
     for heard in program.handed_to("create_subscription"):
         for timer in program.handed_to("create_timer"):
             lines = lines_of(heard)
@@ -58,7 +58,7 @@ def log_every_message(program: Program) -> Iterator[Mutation]:
 
 
 def text(program: Program) -> Iterator[Mutation]:
-    """Another text: a word that is misspelt, in a log, an answer or a format."""
+    """A misspelt word in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
         said = text_of(node)
         if said is not None and not is_docstring(program, node) and _is_prose(said) and (word := _WORD.search(said)):
@@ -71,7 +71,7 @@ def text(program: Program) -> Iterator[Mutation]:
 
 
 def rounding(program: Program) -> Iterator[Mutation]:
-    """Digits that are lost in a text: `.0f` for `.3f`."""
+    """Too few digits in a text: `.0f` for `.3f`."""
     for part in program.all(cst.FormattedStringExpression):
         spec = "".join(program.code(piece) for piece in part.format_spec or ())
         if spec.endswith("f") and spec != ".0f":
@@ -85,13 +85,13 @@ def rounding(program: Program) -> Iterator[Mutation]:
 
 
 def missing_value(program: Program) -> Iterator[Mutation]:
-    """A text that does not say the value."""
+    """A text without the value."""
     for part in program.all(cst.FormattedStringExpression):
         yield Mutation(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
 
 
 def _logs(program: Program) -> list[cst.Call]:
-    """Return the calls of a logger; other things have methods of these names, but not with a text first."""
+    """Return the calls of a logger: methods with these names whose first argument is a text."""
     found = [call for call in program.calls(*LEVELS) if isinstance(call.func, cst.Attribute) and call.args]
     return [call for call in found if "log" in program.code(call.func).lower()]
 
@@ -101,7 +101,7 @@ def _plain(arg: cst.Arg) -> cst.Arg:
 
 
 def _is_prose(said: str) -> bool:
-    """Whether a text is for people: names of topics, nodes and files have no blanks."""
+    """Whether a text is for people: names of topics, nodes and files have no spaces."""
     return " " in said.strip()
 
 
@@ -111,7 +111,7 @@ _NAMED = {
     "create_service": "srv_name",
     "create_client": "srv_name",
 }
-#: Message and service types that share the fields people use with others: type -> package, type.
+#: Types that share their commonly used fields with another type: type -> package, type.
 _TWINS: Mapping[str, tuple[str, str]] = {
     "Twist": ("geometry_msgs.msg", "Accel"),
     "Vector3": ("geometry_msgs.msg", "Point"),
@@ -129,7 +129,7 @@ _TWINS: Mapping[str, tuple[str, str]] = {
     "Trigger": ("std_srvs.srv", "SetBool"),
     "SetBool": ("std_srvs.srv", "Trigger"),
 }
-#: Types with a stamped relative -> the member that holds what they hold, and their own fields.
+#: Types with a stamped variant -> the member of the variant that holds them, and their fields.
 _STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "Twist": ("twist", ("linear", "angular")),
     "Pose": ("pose", ("position", "orientation")),
@@ -143,19 +143,19 @@ def topic_typo(program: Program) -> Iterator[Mutation]:
 
 
 def topic_namespace(program: Program) -> Iterator[Mutation]:
-    """A topic or service of another tutorial: the right name inside a namespace, as `/turtle1/cmd_vel`."""
+    """A topic or service from another tutorial: the right name in a namespace, such as `/turtle1/cmd_vel`."""
     for node, name in names(program):
         yield _renamed(node, name, f"/turtle1/{name.lstrip('/')}")
 
 
 def topic_private(program: Program) -> Iterator[Mutation]:
-    """A name that is private to the node, `~/cmd_vel`."""
+    """A private name, `~/cmd_vel`."""
     for node, name in names(program):
         yield _renamed(node, name, f"~/{name.lstrip('/')}")
 
 
 def topic_swapped(program: Program) -> Iterator[Mutation]:
-    """Two topics mistaken for each other: what is published is listened to, and the other way round."""
+    """Two topics swapped: the node subscribes to the topic that it should publish, and the other way round."""
     for (one, name), (other, other_name) in combinations(names(program), 2):
         if name != other_name:
             yield Mutation(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
@@ -172,7 +172,7 @@ def message_type(program: Program) -> Iterator[Mutation]:
 
 
 def stamped_type(program: Program) -> Iterator[Mutation]:
-    """The stamped relative of a type, with the fields where that has them: TwistStamped for Twist."""
+    """The stamped variant of a type, with adapted fields: TwistStamped for Twist."""
     for imported, alias in _imported_types(program, _STAMPED):
         member, parts = _STAMPED[alias]
         stamped = f"{alias}Stamped"
@@ -187,7 +187,7 @@ def stamped_type(program: Program) -> Iterator[Mutation]:
 
 
 def message_type_once(program: Program) -> Iterator[Mutation]:
-    """A type that two ends of the same program disagree about: only one publisher or subscription has another one."""
+    """A wrong type at only one publisher or subscription of a topic."""
     for call in program.calls(*CREATORS):
         arg = argument(call, CREATORS[called(call)][0])
         if arg is None or not isinstance(arg.value, cst.Name) or arg.value.value not in _TWINS:
@@ -198,7 +198,7 @@ def message_type_once(program: Program) -> Iterator[Mutation]:
 
 
 def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
-    """Return where topics and services are named, each place once."""
+    """Return the places that name topics and services, without duplicates."""
     found: dict[cst.SimpleString, str] = {}
     for call in program.calls(*_NAMED):
         arg = argument(call, _NAMED[called(call)])
@@ -234,7 +234,7 @@ def _is_import(program: Program, node: cst.CSTNode) -> bool:
     return any(isinstance(above, (cst.Import, cst.ImportFrom)) for above in program.above(node))
 
 
-#: What people make of a period: a slip of ten, milliseconds, the half, the double, a quarter off.
+#: Typical wrong factors of a period: ten, milliseconds, half, double, a quarter off.
 _FACTORS = ("* 10", "/ 10", "* 1000", "/ 2", "* 2", "* 1.25", "* 0.75")
 
 
@@ -248,7 +248,7 @@ def period(program: Program) -> Iterator[Mutation]:
 
 
 def rate_as_period(program: Program) -> Iterator[Mutation]:
-    """The rate where the period belongs, and the other way round."""
+    """The rate instead of the period, or the other way round."""
     for given in _periods(program):
         before = program.code(given)
         is_inverse = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
@@ -259,20 +259,20 @@ def rate_as_period(program: Program) -> Iterator[Mutation]:
 
 
 def sleeping_callback(program: Program) -> Iterator[Mutation]:
-    """A callback that sleeps, and keeps everything else waiting."""
+    """A callback that sleeps and blocks everything else."""
     for function in program.callbacks:
         edits = (*program.importing("import time"), *at_top(function, "time.sleep(2.0)"))
         yield Mutation(function, f"{function.name.value} sleeps 2 s", edits)
 
 
 def busy_callback(program: Program) -> Iterator[Mutation]:
-    """A callback that loops for ever."""
+    """A callback with an infinite loop."""
     for function in program.callbacks[:1]:
         yield Mutation(function, f"{function.name.value} loops", at_top(function, "while True:\n    pass\n"))
 
 
 def _periods(program: Program) -> list[cst.BaseExpression]:
-    """Return what timers, rates and sleeps are given, where it is written."""
+    """Return the expressions that define the periods of timers, rates and sleeps."""
     given = [arg.value for call in program.calls("create_timer") if (arg := argument(call, "timer_period_sec"))]
     given += [arg.value for call in program.calls("create_rate") if (arg := argument(call, "frequency"))]
     given += [call.args[0].value for call in program.calls(*SLEEPS) if len(call.args) == 1]

@@ -16,7 +16,7 @@ from grader.core.errors import EnvironmentFault, HarnessError
 WALLS = Fitness(f"worker {TWO} on lab", "isolation: expected a sandbox, found none", "apt-get install bubblewrap")
 
 
-def fleet(client: FakeClient) -> tuple[WorkerPool, list[str]]:
+def worker_pool(client: FakeClient) -> tuple[WorkerPool, list[str]]:
     """Return the workers, and what is said of those that join later."""
     said: list[str] = []
     return WorkerPool(cast("Client", client), "0.1.0", said.append), said
@@ -27,17 +27,17 @@ def fleet(client: FakeClient) -> tuple[WorkerPool, list[str]]:
 )
 def test_another_version_is_refused_by_name(found: PackageNotFoundError | str, words: str) -> None:
     """The worker is named with both versions, and submissions go to the others."""
-    workers, _ = fleet(FakeClient(versions={TWO: found}))
+    workers, _ = worker_pool(FakeClient(versions={TWO: found}))
     warnings = workers.inspect("auto")
     assert warnings == (f"worker {TWO}: expected rclpy-grader 0.1.0, found {words}; it is not used",)
-    assert (dict(workers.look()), workers.only(workers.look())) == ({ONE: 1}, (ONE,))
+    assert (dict(workers.usable()), workers.only(workers.usable())) == ({ONE: 1}, (ONE,))
 
 
 def test_a_worker_without_a_sandbox_is_named_with_its_remedy() -> None:
     """It is not used; where there is no other, nothing begins."""
-    workers, _ = fleet(FakeClient(fitness={TWO: WALLS}))
+    workers, _ = worker_pool(FakeClient(fitness={TWO: WALLS}))
     assert workers.inspect("auto") == (f"{WALLS.machine}: {WALLS.unfit}; it is not used",)
-    workers, _ = fleet(FakeClient(threads={TWO: 4}, fitness={TWO: WALLS}))
+    workers, _ = worker_pool(FakeClient(threads={TWO: 4}, fitness={TWO: WALLS}))
     with pytest.raises(EnvironmentFault, match="expected a worker that can grade, found none among 1") as error:
         workers.inspect("auto")
     assert (TWO in error.value.message, error.value.hint) == (True, "apt-get install bubblewrap")
@@ -45,39 +45,39 @@ def test_a_worker_without_a_sandbox_is_named_with_its_remedy() -> None:
 
 def test_all_workers_are_used_where_all_can_grade() -> None:
     """Then nothing says where a submission must go, so that whoever joins takes part."""
-    workers, _ = fleet(FakeClient())
+    workers, _ = worker_pool(FakeClient())
     assert workers.inspect("auto") == ()
-    assert workers.only(workers.look()) == ()
+    assert workers.only(workers.usable()) == ()
 
 
-def test_what_a_sandbox_leaves_open_is_told() -> None:
+def test_what_a_sandbox_leaves_open_is_problem() -> None:
     """Once for each worker."""
     remark = Fitness(f"worker {ONE} on lab", remarks=("sandbox landlock: NOT contained: net_egress",))
-    workers, _ = fleet(FakeClient(fitness={ONE: remark}))
+    workers, _ = worker_pool(FakeClient(fitness={ONE: remark}))
     assert workers.inspect("auto") == (f"worker {ONE} on lab: sandbox landlock: NOT contained: net_egress",)
 
 
 def test_whoever_joins_later_is_asked_too() -> None:
     """One that cannot grade is named and not used."""
     client = FakeClient(threads={ONE: 1}, fitness={TWO: WALLS})
-    workers, said = fleet(client)
+    workers, said = worker_pool(client)
     workers.inspect("auto")
     client.threads = {ONE: 1, TWO: 1}
-    assert dict(workers.look()) == {ONE: 1}
-    assert dict(workers.look()) == {ONE: 1}
+    assert dict(workers.usable()) == {ONE: 1}
+    assert dict(workers.usable()) == {ONE: 1}
     assert said == [f"{WALLS.machine}: {WALLS.unfit}; it is not used"]
 
 
 def test_a_cluster_may_be_empty_at_first() -> None:
     """Grading begins when a worker joins."""
-    workers, _ = fleet(FakeClient(threads={}))
+    workers, _ = worker_pool(FakeClient(threads={}))
     assert workers.inspect("auto") == ("cluster: there is no worker yet, grading begins when one joins",)
 
 
 @pytest.mark.parametrize("found", ["0.0.9", PackageNotFoundError("rclpy-grader")])
 def test_the_scheduler_needs_the_grader_as_well(found: PackageNotFoundError | str) -> None:
     """It reads what it hands on; without the package nothing would arrive."""
-    workers, _ = fleet(FakeClient(scheduler=found))
+    workers, _ = worker_pool(FakeClient(scheduler=found))
     with pytest.raises(EnvironmentFault, match=r"scheduler of the cluster: expected rclpy-grader 0\.1\.0") as error:
         workers.inspect("auto")
     assert error.value.hint == "install it there: pip install 'rclpy-grader[dask]==0.1.0'"
@@ -85,15 +85,15 @@ def test_the_scheduler_needs_the_grader_as_well(found: PackageNotFoundError | st
 
 def test_a_worker_that_leaves_while_it_is_asked_is_no_problem() -> None:
     """Nothing is known of it, and it is asked again should it come back."""
-    workers, _ = fleet(FakeClient(versions={TWO: OSError("gone")}, fitness={ONE: OSError("gone")}))
+    workers, _ = worker_pool(FakeClient(versions={TWO: OSError("gone")}, fitness={ONE: OSError("gone")}))
     assert workers.inspect("auto") == ()
-    assert set(workers.look()) == {ONE, TWO}
+    assert set(workers.usable()) == {ONE, TWO}
 
 
-def test_a_scheduler_that_is_gone_is_told() -> None:
+def test_a_scheduler_that_is_gone_is_problem() -> None:
     """With what to do."""
     client = FakeClient()
     client.status = "connecting"
     with pytest.raises(HarnessError, match="expected the scheduler to answer, found it gone") as error:
-        fleet(client)[0].look()
+        worker_pool(client)[0].usable()
     assert "the same command goes on where it was" in error.value.hint

@@ -34,14 +34,14 @@ def run(
     client: FakeClient,
     jobs: int | None = None,
     names: tuple[str, ...] = NAMES,
-    hear: Callable[..., Any] = lambda name, step: None,
+    on_step: Callable[..., Any] = lambda name, step: None,
 ) -> dict[str, ResultStatus]:
-    """Grade on a cluster, and return name -> standing; each name comes once."""
+    """Grade on a cluster, and return name -> status; each name comes once."""
     here = ClusterScheduler(cast("Client", client), jobs, lambda line: None)
     here.prepare("auto")
-    attempts = list(here.run([task(tmp_path, name) for name in names], hear))
+    attempts = list(here.run([task(tmp_path, name) for name in names], on_step))
     assert Counter(a.task.name for a in attempts) == Counter(names)
-    return {a.task.name: a.standing for a in attempts}
+    return {a.task.name: a.status for a in attempts}
 
 
 def test_everybody_has_a_result_once(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_a_worker_that_cannot_grade_is_used_no_more(tmp_path: Path) -> None:
     assert allowed == [("ada", None), ("bob", None), ("bob", [ONE]), ("cleo", [ONE]), ("dan", [ONE])]
 
 
-def test_where_no_worker_can_grade_any_more_the_remedy_is_told(tmp_path: Path) -> None:
+def test_where_no_worker_can_grade_any_more_the_remedy_is_problem(tmp_path: Path) -> None:
     """As a failure of the machine, never as a mark."""
     wrong = JobResult(f"worker {ONE} on lab", unfit="isolation: found none", hint="apt-get install bubblewrap")
     found = run(tmp_path, FakeClient(answers=lambda name, only: wrong, threads={ONE: 1}))
@@ -171,7 +171,7 @@ def test_large_parcels_are_laid_down_first(tmp_path: Path) -> None:
     one = task(tmp_path, "ada")
     (one.submission / "data.bin").write_bytes(bytes(2 << 20))
     here = ClusterScheduler(cast("Client", client), None, lambda line: None)
-    assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
+    assert [a.status.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
     assert [size >> 20 for size in scattered] == [2]
 
 
@@ -187,7 +187,7 @@ def test_where_nothing_can_be_laid_down_it_travels(tmp_path: Path, trouble: OSEr
     one = task(tmp_path, "ada")
     (one.submission / "data.bin").write_bytes(bytes(2 << 20))
     here = ClusterScheduler(cast("Client", client), None, lambda line: None)
-    assert [a.standing.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
+    assert [a.status.state for a in here.run([one], lambda name, step: None)] == [State.GRADED]
 
 
 def test_steps_are_heard_while_a_submission_is_under_way(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_steps_are_heard_while_a_submission_is_under_way(tmp_path: Path) -> None
         return graded(name)
 
     client.answers = answers
-    run(tmp_path, client, names=("ada",), hear=lambda name, step: heard.append((name, step)))
+    run(tmp_path, client, names=("ada",), on_step=lambda name, step: heard.append((name, step)))
     assert heard == [("ada", "alone")]
     assert client.handler is None
 
@@ -213,6 +213,6 @@ def test_what_cannot_be_used_is_not_sent(tmp_path: Path) -> None:
     tasks = [task(tmp_path, name) for name in ("ada", "bob")]
     (tasks[0].submission / "velocity_publisher.py").unlink()
     here = ClusterScheduler(cast("Client", client), None, lambda line: None)
-    found = {a.task.name: a.standing.state for a in here.run(tasks, lambda name, step: None)}
+    found = {a.task.name: a.status.state for a in here.run(tasks, lambda name, step: None)}
     assert found == {"ada": State.REFUSED, "bob": State.GRADED}
     assert client.sent == ["bob"]

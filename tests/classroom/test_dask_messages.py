@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from dask_samples import CONDITIONS, graded, task
 
-from grader.classroom.cluster.jobs import lay_out
-from grader.classroom.cluster.sending import errand_of, failed, taken_in, terms_of
+from grader.classroom.cluster.jobs import write_task
+from grader.classroom.cluster.sending import failed, job_for, store_result, terms_of
 from grader.classroom.local import Attempt, Task
 from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
 from grader.classroom.store import State
@@ -20,7 +20,7 @@ from grader.submissions.submission import stage_collected, stage_submission
 
 def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Terms, GradingJob]:
     """Return terms and submission as they come out at the other end."""
-    errand = errand_of(one, wanted)
+    errand = job_for(one, wanted)
     assert isinstance(errand, GradingJob), errand
     return unpack(pack(terms_of(one)), Terms), unpack(pack(errand), GradingJob)
 
@@ -65,7 +65,7 @@ def test_files_lie_where_reports_say_they_do(tmp_path: Path, monkeypatch: pytest
     terms, errand = sent(task(tmp_path, rubrics=(Path(place),)))
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    laid = lay_out(terms, errand, scratch)
+    laid = write_task(terms, errand, scratch)
     there = next(scratch.rglob("mine.yaml"))
     assert [str(path) for path in laid.rubrics] == [place]
     assert there.read_text(encoding="utf-8") == "mine"
@@ -79,7 +79,7 @@ def test_nothing_is_laid_out_elsewhere(tmp_path: Path, rubric: bytes, bag: bytes
     """A path that leads out is refused before it is written."""
     terms = Terms(CONDITIONS, (), ((rubric, b"x"),), bag, ((part, b"x"),), standalone=False, deadline_s=1.0)
     with pytest.raises(HarnessError, match="expected paths that stay inside"):
-        lay_out(terms, GradingJob("a", b"a", b"a", b""), tmp_path)
+        write_task(terms, GradingJob("a", b"a", b"a", b""), tmp_path)
 
 
 def test_a_recording_travels_with_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,17 +100,17 @@ def test_what_cannot_be_used_is_refused_here(tmp_path: Path) -> None:
     """With the key that it has when it is graded on this machine: it is looked at once, wherever that is."""
     one = task(tmp_path)
     (one.submission / "velocity_publisher.py").unlink()
-    attempt = errand_of(one, ())
+    attempt = job_for(one, ())
     assert isinstance(attempt, Attempt)
-    assert (attempt.standing.state, attempt.standing.label) == (State.REFUSED, "ada")
-    assert attempt.standing.problem.endswith("expected at least one .py file, found none")
-    assert attempt.standing.key == CONDITIONS.key(attempt.standing.digest)
+    assert (attempt.status.state, attempt.status.label) == (State.REFUSED, "ada")
+    assert attempt.status.problem.endswith("expected at least one .py file, found none")
+    assert attempt.status.key == CONDITIONS.key(attempt.status.digest)
 
 
 def test_a_result_is_written_down(tmp_path: Path) -> None:
     """With its files, and under the name that the source has for the submission."""
-    attempt = taken_in(task(tmp_path, label="Ada L."), graded())
-    assert (attempt.standing.state, attempt.standing.score, attempt.standing.label) == (State.GRADED, 3.0, "Ada L.")
+    attempt = store_result(task(tmp_path, label="Ada L."), graded())
+    assert (attempt.status.state, attempt.status.score, attempt.status.label) == (State.GRADED, 3.0, "Ada L.")
     assert (attempt.task.into / "evidence" / "a.mcap").read_bytes() == b"x"
 
 
@@ -119,18 +119,18 @@ def test_a_result_is_written_down(tmp_path: Path) -> None:
 )
 def test_a_machine_writes_nothing_but_a_result(tmp_path: Path, name: bytes) -> None:
     """Other files, and names that lead elsewhere, make the answer a failure; nothing of it is written."""
-    answer = JobResult("worker", graded().standing, ((b"report.json", b"{}"), (name, b"x")))
-    attempt = taken_in(task(tmp_path), answer)
-    assert (attempt.standing.state, attempt.standing.score) == (State.FAILED, 0.0)
-    assert "expected the files of a result" in attempt.standing.problem
+    answer = JobResult("worker", graded().status, ((b"report.json", b"{}"), (name, b"x")))
+    attempt = store_result(task(tmp_path), answer)
+    assert (attempt.status.state, attempt.status.score) == (State.FAILED, 0.0)
+    assert "expected the files of a result" in attempt.status.problem
     assert not attempt.task.into.exists()
 
 
 def test_another_rubric_is_no_result(tmp_path: Path) -> None:
     """What was graded under other conditions than asked is a failure of ours."""
-    attempt = taken_in(task(tmp_path), graded(key="sha256:other"))
-    assert attempt.standing.state is State.FAILED
-    assert "other rubrics" in attempt.standing.problem
+    attempt = store_result(task(tmp_path), graded(key="sha256:other"))
+    assert attempt.status.state is State.FAILED
+    assert "other rubrics" in attempt.status.problem
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
@@ -138,14 +138,14 @@ def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
     from grader.classroom.cluster.sending import answer_in
 
-    assert taken_in(task(tmp_path), answer_in(data, "cluster")).standing.state is State.FAILED
+    assert store_result(task(tmp_path), answer_in(data, "cluster")).status.state is State.FAILED
 
 
 def test_a_full_disk_is_a_failure(tmp_path: Path) -> None:
     """The result is tried again when there is room."""
     one = task(tmp_path, into=tmp_path / "no" / "such" / "folder")
-    assert taken_in(one, graded()).standing.problem == "the result cannot be written: No such file or directory"
-    assert failed(one, "x").standing.hint == "run the same command again"
+    assert store_result(one, graded()).status.problem == "the result cannot be written: No such file or directory"
+    assert failed(one, "x").status.hint == "run the same command again"
 
 
 def test_too_many_files_are_no_result(tmp_path: Path) -> None:
