@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import py_compile
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from grader.core.errors import EnvironmentFault
 from grader.execution import byte_code as byte_code_module
 from grader.execution.byte_code import _roots, byte_code, compile_command, is_current
 from grader.execution.ros_installation import find_ros
+from grader.execution.sandbox import environment
 from grader.execution.sandbox.environment import PACKAGE
 
 MODE = py_compile.PycInvalidationMode
@@ -101,21 +103,23 @@ def test_the_command_that_is_named_mends_it(source: Path, change: Callable[[Path
 
 
 @pytest.mark.ros
-def test_a_stale_installation_is_told_with_the_command_that_mends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stale_installation_is_told_with_the_command_that_mends_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Of what nodes load, nothing is stale in the environment of the tests; with one file that is, it is named."""
     try:
         ros = find_ros()
     except EnvironmentFault as fault:
         pytest.skip(fault.message)
     assert byte_code(ros.runtime).value == "up to date", "in the environment that .ci/setup made"
+    # A copy of the package: other processes compile this one whenever they like.
+    copy = tmp_path / PACKAGE.name
+    shutil.copytree(PACKAGE, copy)
+    for module in (byte_code_module, environment):
+        monkeypatch.setattr(module, "PACKAGE", copy)
     monkeypatch.setattr(byte_code_module, "compile_own", lambda: None)
-    stale = Path(importlib.util.cache_from_source(str(PACKAGE / "student_host" / "launcher.py")))
-    kept = stale.read_bytes()
-    try:
-        stale.write_bytes(b"")
-        fact = byte_code(ros.runtime)
-    finally:
-        stale.write_bytes(kept)
+    Path(importlib.util.cache_from_source(str(copy / "student_host" / "launcher.py"))).write_bytes(b"")
+    fact = byte_code(ros.runtime)
     assert fact.fits
     assert fact.value.startswith("missing or stale for 1 file:")
-    assert fact.remedy.endswith(f"-m compileall -q -f {PACKAGE}")
+    assert fact.remedy.endswith(f"-m compileall -q -f {copy}")
