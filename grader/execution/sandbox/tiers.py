@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from grader.core.checkup import TIERS
 from grader.core.errors import EnvironmentFault
@@ -30,6 +31,8 @@ from grader.execution.sandbox.starting import (
 FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME = "bubblewrap-flat", "landlock", "none"
 #: The tiers that isolate anything, strongest first.
 ISOLATING = (ROOT_NAME, USER_NAME, FLAT_NAME, LANDLOCK_NAME)
+#: Where a submission is seen: where it lies, because the tiers in this module have no file view of their own.
+IN_PLACE = ""
 #: A worker's own memory file system, which disappears with it.
 SCRATCH = Path("/dev/shm")  # noqa: S108
 
@@ -71,6 +74,10 @@ class FlatBubblewrap:
         outer: The bubblewrap around the worker.
     """
 
+    name: ClassVar[str] = FLAT_NAME
+    shares_network: ClassVar[bool] = False
+    submission_seen_at: ClassVar[str] = IN_PLACE
+    host_seen_at: ClassVar[str] = str(HOST)
     outer: Bubblewrap
 
     @classmethod
@@ -82,26 +89,6 @@ class FlatBubblewrap:
         """
         require_landlock()
         return cls(Bubblewrap.here())
-
-    @property
-    def name(self) -> str:
-        """Short name that reports show."""
-        return FLAT_NAME
-
-    @property
-    def shares_network(self) -> bool:
-        """Each worker has a network of its own."""
-        return False
-
-    @property
-    def submission_seen_at(self) -> str:
-        """Empty: the submission is seen where it lies."""
-        return ""
-
-    @property
-    def host_seen_at(self) -> str:
-        """Where the sandboxed process sees the host package."""
-        return str(HOST)
 
     def worker_command(
         self,
@@ -128,6 +115,10 @@ class Landlock:
         as_root: Whether this process is root; students then run as another user.
     """
 
+    name: ClassVar[str] = LANDLOCK_NAME
+    shares_network: ClassVar[bool] = True
+    submission_seen_at: ClassVar[str] = IN_PLACE
+    host_seen_at: ClassVar[str] = str(HOST)
     as_root: bool
 
     @classmethod
@@ -135,26 +126,6 @@ class Landlock:
         """Return the isolation for this machine; raises EnvironmentFault if its kernel or processor has none."""
         require_landlock()
         return cls(as_root=os.geteuid() == 0)
-
-    @property
-    def name(self) -> str:
-        """Short name that reports show."""
-        return LANDLOCK_NAME
-
-    @property
-    def shares_network(self) -> bool:
-        """The caller's network is used: domains have to be reserved."""
-        return True
-
-    @property
-    def submission_seen_at(self) -> str:
-        """Empty: the submission is seen where it lies."""
-        return ""
-
-    @property
-    def host_seen_at(self) -> str:
-        """Where the sandboxed process sees the host package."""
-        return str(HOST)
 
     def worker_command(
         self,
@@ -189,25 +160,10 @@ class Plain:
     limited, because the kernel would count all processes of the user.
     """
 
-    @property
-    def name(self) -> str:
-        """Short name that reports show."""
-        return PLAIN_NAME
-
-    @property
-    def shares_network(self) -> bool:
-        """The caller's network is used: domains have to be reserved."""
-        return True
-
-    @property
-    def submission_seen_at(self) -> str:
-        """Empty: the submission is seen where it lies."""
-        return ""
-
-    @property
-    def host_seen_at(self) -> str:
-        """Where the sandboxed process sees the host package."""
-        return str(HOST)
+    name: ClassVar[str] = PLAIN_NAME
+    shares_network: ClassVar[bool] = True
+    submission_seen_at: ClassVar[str] = IN_PLACE
+    host_seen_at: ClassVar[str] = str(HOST)
 
     def worker_command(
         self,
