@@ -105,10 +105,6 @@ def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
         yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: is it to be set as well?")
 
 
-#: Shortest duration that is enough to measure rates and to send stimuli.
-SHORTEST_S = 4.0
-
-
 @dataclass(frozen=True, slots=True)
 class Skeleton:
     """The skeleton of a rubric.

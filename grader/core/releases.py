@@ -12,23 +12,26 @@ class Release:
     Attributes:
         name: As in `ROS_DISTRO`.
         fast_dds: Major version of Fast DDS, which decides the names in its profiles.
-        messages: The name of its message types in `rosbags`.
         tried: Whether this project is tested on it; other releases cause a warning.
     """
 
     name: str
     fast_dds: int
-    messages: str
     tried: bool = False
+
+    @property
+    def messages(self) -> str:
+        """The name of its message types in `rosbags`."""
+        return f"ROS2_{self.name.upper()}"
 
 
 RELEASES = {
     release.name: release
     for release in (
-        Release("humble", 2, "ROS2_HUMBLE"),
-        Release("iron", 2, "ROS2_IRON"),
-        Release("jazzy", 2, "ROS2_JAZZY", tried=True),
-        Release("kilted", 3, "ROS2_KILTED", tried=True),
+        Release("humble", 2),
+        Release("iron", 2),
+        Release("jazzy", 2, tried=True),
+        Release("kilted", 3, tried=True),
     )
 }
 #: The release that is available as wheels, and the default.
@@ -37,5 +40,5 @@ TRIED = tuple(release.name for release in RELEASES.values() if release.tried)
 
 
 def release_of(name: str) -> Release:
-    """Return a release by name; an unknown one is assumed to be new, with the message types of the default."""
-    return RELEASES.get(name) or Release(name, 3, DEFAULT.messages)
+    """Return a release by name; an unknown one is assumed to be new."""
+    return RELEASES.get(name) or Release(name, 3)

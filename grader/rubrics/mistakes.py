@@ -29,8 +29,6 @@ _EXPECTED: Mapping[str, str] = {
     "too_short": "a list with at least one entry",
 }
 
-_NO_VALUE = object()
-
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a hint with the known word nearest to an unknown one; empty if none is near."""

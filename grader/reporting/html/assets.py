@@ -46,11 +46,6 @@ class Bundle:
         return policy_digest(self.script)
 
     @property
-    def style_digest(self) -> str:
-        """Digest of the style sheet, as a Content-Security-Policy writes it."""
-        return policy_digest(self.style)
-
-    @property
     def script_name(self) -> str:
         """File name of the script when reports share it; it changes with the content."""
         return f"report-{_short(self.script)}.js"
