@@ -40,7 +40,10 @@ for number in range(1000):
         continue
 behaviours = json.load(open(os.path.join(folder, "behaviours.json")))
 behaviour = behaviours[min(number, len(behaviours) - 1)]
-open(os.path.join(folder, f"start-{number}", "pid"), "w").write(str(os.getpid()))
+# Whoever looks for the file finds it whole.
+started = os.path.join(folder, f"start-{number}")
+open(os.path.join(started, "unfinished"), "w").write(str(os.getpid()))
+os.rename(os.path.join(started, "unfinished"), os.path.join(started, "pid"))
 line = socket.socket(fileno=request["line"])
 plans = 0
 def trace(plan, note):
