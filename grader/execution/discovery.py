@@ -207,6 +207,11 @@ class Discovery:
             if not student.ended and (student.claims or student.told):
                 self._tell_matches(student, claims, graph)
 
+    def retry(self) -> None:
+        """Wait once more for the counterparts that a process has missed, before time goes on."""
+        if self.patience.is_left and any(s.unmatched and not s.ended for s in self._students):
+            self.tell_all()
+
     def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
         """Return whether the graph shows everything that the processes claim."""
         wanted = _wanted(claims)
@@ -271,7 +276,7 @@ class Discovery:
         if student.sees_graph:
             expected["graph"] = {name: [count] for name, count in graph.items()}
         gone = sorted(student.told.get("client", {}).keys() - expected.get("client", {}).keys())
-        if expected == student.told and not (student.renewed and expected):
+        if expected == student.told and not ((student.renewed or student.unmatched) and expected):
             return
         student.told, student.renewed = expected, False
         student.tell({"match": expected, "gone": gone, "wait_s": self.patience.wait_s})
@@ -281,6 +286,7 @@ class Discovery:
             return
         student.nudged = True  # a match is an event that a node may have a callback for
         missing = answer.get("missing")
+        student.unmatched = bool(missing)
         if missing:
             self.patience.lose()
         for name in filter(is_name, missing[:MOST_UNMATCHED] if isinstance(missing, list) else ()):

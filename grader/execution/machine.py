@@ -24,8 +24,8 @@ from grader.execution.sandbox.properties import confined, install_command, setti
 SETTLE_S = 5.0
 #: On a busy machine, time-outs are multiplied by the load per processor, up to this factor.
 MOST_BUSY = 4.0
-#: After this many time-outs, further waits are brief.
-LOSSES, BRIEF_S = 3, 0.05
+#: After this many time-outs, further waits are brief; after `MOST_LOSSES`, nothing is waited for again.
+LOSSES, BRIEF_S, MOST_LOSSES = 3, 0.05, 20
 
 
 def load_per_processor() -> float:
@@ -51,6 +51,11 @@ class Patience:
     def wait_s(self) -> float:
         """Time-out of the next wait, in seconds."""
         return self._full_s if self._losses < LOSSES else BRIEF_S
+
+    @property
+    def is_left(self) -> bool:
+        """Whether it is worth waiting again for something that did not come."""
+        return self._losses < MOST_LOSSES
 
     def wait(self, condition: Callable[[], bool], *, pause_s: float = 0.0003) -> bool:
         """Wait until a condition holds; return whether it did before the time-out."""

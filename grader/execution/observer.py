@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import secrets
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -27,6 +28,7 @@ from grader.core.quantities import MIB, size
 from grader.core.trace import Endpoint, GraphSnapshot
 from grader.execution.console import TEXT_CHARACTERS, Logged
 from grader.execution.interfaces import message_class, plain_fields
+from grader.execution.padding import without_padding
 from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
@@ -41,6 +43,8 @@ MOST_TOPICS, NAME_CHARACTERS = 20, 200
 INFINITE_NS = 9_000_000_000_000_000_000
 #: How long, in real time, to wait for messages of a process that died, and how many polls in a row must find nothing.
 REST_S, QUIET_LOOKS, QUIET_PAUSE_S = 0.5, 4, 0.005
+#: The most real time that one iteration of a wait counts for; on an idle machine each is shorter.
+ITERATION_S = 0.02
 #: rclpy's name for a node whose endpoints are known, but whose name is not known yet or no longer.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: The most participants of the grader, and how long to wait for the name of a new one.
@@ -232,6 +236,7 @@ class Observer:
         quiet = 0
         while quiet < QUIET_LOOKS:
             time.sleep(QUIET_PAUSE_S)
+            wait_until(lambda: not other_threads_run(), REST_S)
             taken = self.take()
             found += taken
             quiet = 0 if taken else quiet + 1
@@ -261,7 +266,8 @@ class Observer:
             self._large[topic] += 1
             return Taken(topic, interface, b"", {})
         try:
-            return Taken(topic, interface, cdr, plain_fields(deserialize_message(cdr, message)))
+            value = plain_fields(deserialize_message(cdr, message))
+            return Taken(topic, interface, without_padding(cdr, message), value)
         except Exception:  # whatever bytes a student's node sends
             self._broken[topic] += 1
             return Taken(topic, interface, cdr, {})
@@ -334,18 +340,39 @@ def unread_bytes() -> int:
     return unread
 
 
+def other_threads_run() -> bool:
+    """Return whether another thread of this process runs or waits for a processor, from /proc/self/task (proc(5)).
+
+    The middleware's threads take messages out of the sockets; while one has work, a message may still be on its way.
+    """
+    own = threading.get_native_id()
+    for task in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):  # the thread has ended
+            state = (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0]
+            if state == "R" and int(task.name) != own:
+                return True
+    return False
+
+
 def size_of(message: Any) -> int:
     """Return the serialized size of a message in bytes."""
     return len(serialize_message(message))
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float = 0.0003) -> bool:
-    """Wait, in real time, until a condition holds; return whether it did before the time-out."""
-    deadline = time.monotonic() + seconds
+    """Wait, in real time, until a condition holds; return whether it did before the time-out.
+
+    An iteration counts for at most `ITERATION_S`: if it took longer, this process had no processor, and the one that
+    it waits for may have had none either.
+    """
+    left_s, before = seconds, time.monotonic()
     while not condition():
-        if time.monotonic() > deadline:
+        if left_s < 0:
             return False
         time.sleep(pause_s)
+        now = time.monotonic()
+        left_s -= min(now - before, ITERATION_S)
+        before = now
     return True
 
 

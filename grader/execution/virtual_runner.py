@@ -75,7 +75,9 @@ class VirtualRunner(Runner):
             self._settle()
             if self._now_ns >= self._end_ns:
                 break
-            self._now_ns = self._next_ns()
+            self._discovery.retry()
+            if self._next_student() is None:  # a match is an event that wakes a process
+                self._now_ns = self._next_ns()
 
     def _shut_down(self) -> None:
         self._now_ns = self._stop_ns

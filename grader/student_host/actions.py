@@ -83,19 +83,17 @@ class Receiver:
 
     def is_ready_within(self, seconds: float, new_wait_set: Callable[..., Any], context: Any) -> bool:
         """Wait, in real time, until something can be taken; return whether it can."""
-        deadline = originals.perf_counter() + seconds
-        while True:
+
+        def is_ready() -> bool:
             with context.handle, self.handle:
                 subscriptions, guards, timers, clients, services = self.handle.get_num_entities()
                 wait_set = new_wait_set(subscriptions, guards, timers, clients, services, 0, context.handle)
                 wait_set.clear_entities()
                 self.handle.add_to_waitset(wait_set)
                 wait_set.wait(0)
-                if self.handle.is_ready(wait_set)[self._number]:
-                    return True
-            if originals.perf_counter() > deadline:
-                return False
-            originals.sleep(0.0005)
+                return bool(self.handle.is_ready(wait_set)[self._number])
+
+        return originals.wait_until(is_ready, seconds)
 
 
 class ActionEnd:

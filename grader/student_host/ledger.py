@@ -27,6 +27,8 @@ BACKGROUND_PARAMETERS = frozenset({"use_sim_time", "start_type_description_servi
 BACKGROUND_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")
 #: How long, in real time, to wait for an announced message before it counts as lost.
 ARRIVAL_S = 1.0
+#: How long one wait of rclpy for such a message takes at most.
+ONE_WAIT_NS = 10_000_000
 #: How long, in real time, to wait until a counterpart has disappeared.
 DEPARTURE_S = 0.5
 #: How long, in real time, contexts may take to shut down at a signal.
@@ -260,10 +262,8 @@ class Ledger:
 
     def await_shutdown(self) -> None:
         """Wait, in real time, until rclpy has shut down its contexts after a signal; some may not be shut down."""
-        deadline = originals.perf_counter() + SHUTDOWN_S
         contexts = [context for reference in self.contexts if (context := reference()) is not None]
-        while any(map(_CONTEXT_OK, contexts)) and originals.perf_counter() < deadline:
-            originals.sleep(0.001)
+        originals.wait_until(lambda: not any(map(_CONTEXT_OK, contexts)), SHUTDOWN_S)
 
     def handles(self) -> dict[int, Any]:
         """Return the receivers by the address of their handles, as a wait set knows them."""
@@ -280,22 +280,12 @@ class Ledger:
             expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any.
             wait_s: Time-out in seconds.
         """
-        deadline = originals.perf_counter() + wait_s
-        missing = self._unmatched(expected)
-        while missing and originals.perf_counter() < deadline:
-            originals.sleep(0.0005)
-            missing = self._unmatched(expected)
-        self._await_departures(expected)
+        matched = originals.wait_until(lambda: not self._unmatched(expected), wait_s)
+        missing = [] if matched else self._unmatched(expected)
+        # Endpoints also have to lose the counterparts that no longer exist.
+        if not originals.wait_until(lambda: not self._surplus(expected), DEPARTURE_S):
+            self._strangers.update(self._surplus(expected))
         return missing
-
-    def _await_departures(self, expected: dict[str, dict[str, list[int]]]) -> None:
-        """Wait, in real time, until endpoints have lost the counterparts that no longer exist."""
-        deadline = originals.perf_counter() + DEPARTURE_S
-        surplus = self._surplus(expected)
-        while surplus and originals.perf_counter() < deadline:
-            originals.sleep(0.0005)
-            surplus = self._surplus(expected)
-        self._strangers.update(surplus)
 
     def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
         """Count the counterparts, by kind and topic, that neither the grader expects nor an earlier wait has found."""
@@ -310,10 +300,8 @@ class Ledger:
 
     def await_absence(self, services: list[str], wait_s: float) -> None:
         """Wait, in real time, until clients see that the servers of some services are gone."""
-        deadline = originals.perf_counter() + wait_s
         clients = [client for client in self.alive("client") if service_name(client) in services]
-        while any(_matches("client", client) for client in clients) and originals.perf_counter() < deadline:
-            originals.sleep(0.0005)
+        originals.wait_until(lambda: not any(_matches("client", client) for client in clients), wait_s)
 
     def _unmatched(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
         missing = []
@@ -453,10 +441,14 @@ def _await_ready(receiver: Any, context: Any) -> bool:
     )
     with context.handle, receiver.handle:
         wait_set = REAL_WAIT_SET(kind == "subscription", 0, 0, kind == "client", kind == "service", 0, context.handle)
-        wait_set.clear_entities()
-        getattr(wait_set, f"add_{kind}")(receiver.handle)
-        wait_set.wait(round(ARRIVAL_S * 1e9))
-        return receiver.handle.pointer in wait_set.get_ready_entities(kind)
+
+        def is_ready() -> bool:
+            wait_set.clear_entities()
+            getattr(wait_set, f"add_{kind}")(receiver.handle)
+            wait_set.wait(ONE_WAIT_NS)
+            return receiver.handle.pointer in wait_set.get_ready_entities(kind)
+
+        return originals.wait_until(is_ready, ARRIVAL_S, pause_s=0)
 
 
 REAL_WAIT_SET: Any = _rclpy.WaitSet

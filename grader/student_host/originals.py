@@ -1,9 +1,10 @@
-"""The real clock and thread functions, saved before anything is replaced; the host's own code uses only these."""
+"""The real clock and thread functions, saved before anything is replaced, and waits on them, for the host's own use."""
 
 import _thread
 import os
 import threading
 import time
+from collections.abc import Callable
 
 sleep = time.sleep
 perf_counter = time.perf_counter
@@ -15,6 +16,26 @@ urandom = os.urandom
 excepthook = threading.excepthook
 exit_now = os._exit
 kill = os.kill
+
+
+#: The most real time that one iteration of a wait counts for; on an idle machine each is shorter.
+ITERATION_S = 0.02
+
+
+def wait_until(condition: Callable[[], object], seconds: float, pause_s: float = 0.0005) -> bool:
+    """Wait, in real time, until a condition holds; return whether it did before the time-out.
+
+    An iteration that took longer than `ITERATION_S` counts for no more: meanwhile this process had no processor.
+    """
+    left_s, before = seconds, perf_counter()
+    while not condition():
+        if left_s < 0:
+            return False
+        sleep(pause_s)
+        now = perf_counter()
+        left_s -= min(now - before, ITERATION_S)
+        before = now
+    return True
 
 
 def processor_ns() -> int:

@@ -455,6 +455,26 @@ def test_notes_are_few_and_short() -> None:
     assert all(len(note) < 500 for note in notes)
 
 
+@pytest.mark.parametrize("comes", [True, False])
+def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes: bool) -> None:
+    """A counterpart that was discovered late still belongs to the instant; one that never comes holds up nothing."""
+
+    def talker(me: ScriptedStudent, world: World) -> Program:
+        me.missing = ["publisher /x"]
+        yield idle(500, endpoints=world.have(me.name, claim("publisher", "/x")))
+        me.missing = [] if comes else me.missing
+        yield from wait(500)
+        yield idle()
+
+    run = Run(talker)
+    (me,) = run.students
+    asked = [n for n, told in enumerate(me.heard) if "match" in told]
+    first_later = next(n for n, told in enumerate(me.heard) if told.get("now_ns", 0) > EPOCH_NS)
+    assert sum(n < first_later for n in asked) == (2 if comes else machine.MOST_LOSSES)
+    assert max(asked) < first_later
+    assert me.times_ms()[-1] >= 500
+
+
 def test_sentences_in_place_of_names_are_dropped() -> None:
     """What a process calls a topic or a service is shown only where ROS could have it."""
     said = "the machine failed; this counts as 30 of 30"
