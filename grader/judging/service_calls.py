@@ -222,15 +222,20 @@ def episodes_of(trace: Trace, process: str, service: str, reading: ResponseReade
     """Return the calls of a student's client, each with the output of the process after it."""
     calls = calls_of(trace, service, "student")
     stops = [*(b.request.t_ns for _, b in pairwise(calls)), trace.stop_ns]
+    responses = [*(b.response for _, b in pairwise(calls)), None]
     outputs = sorted(written(trace, process), key=lambda o: o.t_ns)
     jitter_ns = JITTER_NS[trace.clock]
     found = []
-    for place, (call, stop_ns) in enumerate(zip(calls, stops, strict=False), 1):
+    for place, (call, stop_ns, following) in enumerate(zip(calls, stops, responses, strict=False), 1):
         kind, number, text = _read(call.response, reading)
         asked_ns = call.request.t_ns
         start_ns = asked_ns if call.response is None else call.response.t_ns
         until_ns = stop_ns if place == len(calls) else stop_ns - jitter_ns
-        during = tuple(o for o in outputs if start_ns - jitter_ns <= o.t_ns <= stop_ns + jitter_ns)
+        # the next response causes what is written after it, however long the jitter is
+        last_ns = (
+            stop_ns + jitter_ns if following is None else max(stop_ns, min(stop_ns + jitter_ns, following.t_ns - 1))
+        )
+        during = tuple(o for o in outputs if start_ns - jitter_ns <= o.t_ns <= last_ns)
         before = tuple(o for o in outputs if asked_ns <= o.t_ns < start_ns)
         found.append(Episode(place, kind, number, text, asked_ns, start_ns, stop_ns, until_ns, during, before))
     return tuple(found)

@@ -164,6 +164,14 @@ def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:
     assert "IndexError" in crashed.reason
 
 
+@pytest.mark.parametrize("clock", ClockKind)
+def test_what_is_written_after_a_response_does_not_belong_to_the_one_before(clock: ClockKind) -> None:
+    """Also on the wall clock, whose jitter is longer than the server takes to respond."""
+    rec = asking(chapter, (battery(84.5), UNREADABLE), delay_s=0.04, clock=clock, header="")
+    finding = STILL.judge(rec.crashed(5.55, "ValueError: no number", 40).trace())
+    assert finding.credit == 1, finding.reason
+
+
 def test_an_answer_that_is_not_waited_for_is_no_going_on() -> None:
     """A complaint between a request and its good response: the result was looked at before it was there."""
     rec = asking(lambda a: [], [battery(84.5 - k) for k in range(5)], delay_s=0.1)
