@@ -62,14 +62,14 @@ def most(count: Count) -> int:
 class InOrder:
     """Cases that follow each other as they are written, wherever among others they come."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class SomeOf:
     """A drawn number of cases, each one of several kinds."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
     count: Count
 
 
@@ -77,16 +77,16 @@ class SomeOf:
 class AnyOrder:
     """Cases in an order drawn from the seed, each of them present; those of a SomeOf are scattered among the others."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
 
 
-def cases(items: tuple[Any, ...]) -> tuple[int, int]:
+def cases(items: tuple[object, ...]) -> tuple[int, int]:
     """Return how many cases a list of items comes to, the fewest and the most."""
     each = [_cases(item) for item in items]
     return sum(low for low, _ in each), sum(high for _, high in each)
 
 
-def _cases(item: Any) -> tuple[int, int]:
+def _cases(item: object) -> tuple[int, int]:
     if isinstance(item, SomeOf):
         return fewest(item.count), most(item.count)
     return cases(item.items) if isinstance(item, (InOrder, AnyOrder)) else (1, 1)
