@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
-from typing import Any
 
 from rich.text import Text
 
 from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.json_values import JsonObject
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
 from grader.reporting.escape import json_value, shown
@@ -169,11 +169,11 @@ def checkup_to_json(checkup: Checkup) -> str:
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
-def _facts(facts: Sequence[Fact]) -> list[dict[str, Any]]:
+def _facts(facts: Sequence[Fact]) -> list[JsonObject]:
     return [{"name": f.name, "value": f.value, "fits": f.fits, "remedy": f.remedy or None} for f in facts]
 
 
-def _exchange_json(exchange: Exchange) -> dict[str, Any]:
+def _exchange_json(exchange: Exchange) -> JsonObject:
     return {
         "succeeded": exchange.succeeded,
         "isolation": exchange.tier,
@@ -184,7 +184,7 @@ def _exchange_json(exchange: Exchange) -> dict[str, Any]:
     }
 
 
-def _tier_json(tier: TierReport) -> dict[str, Any]:
+def _tier_json(tier: TierReport) -> JsonObject:
     return {
         "name": tier.name,
         "tier": tier.tier,

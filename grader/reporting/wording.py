@@ -128,6 +128,15 @@ def ending(report: Report) -> list[str]:
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
 
 
+def overview(report: Report) -> list[str]:
+    """Return the whole report but its criteria, for a platform that shows these as tests."""
+    lines = [*opening(report), run_line(report)]
+    for exercise in report.exercises:
+        found = remarks(exercise)
+        lines += ["", exercise_line(exercise), *found] if found else []
+    return [*lines, "", *ending(report)]
+
+
 def _capped(lines: list[str], most: int, what: str) -> list[str]:
     left_out = len(lines) - most
     return [*lines[:most], f"and {left_out} more {what}; all are in the JSON report"] if left_out > 0 else lines
