@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from io import StringIO
-from typing import Any
 
 from rich.console import Console
 from rich.padding import Padding
@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.core.exercise import Outcome
+from grader.core.json_values import JsonObject
 from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial
 from grader.reporting.escape import shown, valid_unicode
 
@@ -164,7 +165,7 @@ def _standing(standing: ResultRank) -> str:
     return f"{_points(standing.score)}/{_points(standing.max_score)}"
 
 
-def _points(points: Any) -> str:
+def _points(points: Fraction) -> str:
     return f"{round(float(points), 3):g}"
 
 
@@ -178,7 +179,7 @@ def results_to_json(results: Sequence[SelftestResult]) -> str:
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
 
 
-def _as_data(result: SelftestResult) -> Mapping[str, Any]:
+def _as_data(result: SelftestResult) -> JsonObject:
     return {
         "rubric": valid_unicode(result.rubric),
         "exercise": result.exercise,
@@ -200,7 +201,7 @@ def _as_data(result: SelftestResult) -> Mapping[str, Any]:
     }
 
 
-def _trial_data(trial: Trial) -> Mapping[str, Any]:
+def _trial_data(trial: Trial) -> JsonObject:
     return {
         "id": valid_unicode(trial.id),
         "file": valid_unicode(trial.file),
@@ -214,7 +215,7 @@ def _trial_data(trial: Trial) -> Mapping[str, Any]:
     }
 
 
-def _standing_data(standing: ResultRank) -> Mapping[str, Any]:
+def _standing_data(standing: ResultRank) -> JsonObject:
     return {
         "score": float(standing.score),
         "max_score": float(standing.max_score),
