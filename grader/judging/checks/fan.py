@@ -6,13 +6,13 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.chart import Chart, Look, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
-from grader.core.trace import ClockKind, Trace
+from grader.core.trace import ClockKind, Endpoint, Trace
 from grader.judging.charts import (
     answer_panel,
     happenings,
@@ -165,7 +165,7 @@ class ThresholdResponse:
                 return answer
         return None if came else during[-1]
 
-    def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, Any]:
+    def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, object]:
         rows = []
         for asked in inputs:
             state = [a.value for a in answers if a.t_ns < asked.stop_ns]
@@ -179,7 +179,7 @@ class ThresholdResponse:
         violations: Sequence[_Violation],
         inputs: Sequence[Held],
         every: Sequence[Reading],
-        evidence: dict[str, Any],
+        evidence: dict[str, object],
     ) -> Finding:
         first = violations[0]
         answers = last_of_instant(every)
@@ -287,7 +287,7 @@ class ThresholdResponse:
         return time_chart(f"response {self.input}", title, about, (upper, lower), happenings(trace))
 
 
-def _deaf(subscriptions: Sequence[Any]) -> str:
+def _deaf(subscriptions: Sequence[Endpoint]) -> str:
     latched = all(e.durability == "transient_local" for e in subscriptions)
     return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
 

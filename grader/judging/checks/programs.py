@@ -147,7 +147,7 @@ class ParameterTakesEffect:
         if not messages:
             return explain_no_message(trace, self.topic)
         stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
-        evidence: dict[str, Any] = {"set": [[seconds(s.t_ns), s.value, s.taken] for s in tries]}
+        evidence: dict[str, object] = {"set": [[seconds(s.t_ns), s.value, s.taken] for s in tries]}
         for one, stop_ns in zip(tries, stops, strict=True):
             flaw, hint = self._flaw(one, stop_ns, messages)
             if flaw:
@@ -317,7 +317,7 @@ class SourceUses:
             return source
         classes = source.deriving(*self.derives_from) if self.derives_from else []
         found = {name: source.calling(name) for name in self.calls}
-        evidence: dict[str, Any] = {
+        evidence: dict[str, object] = {
             "classes": [c.name for c in classes][:20],
             "calls": {name: [c.lineno for c in calls][:20] for name, calls in found.items()},
         }

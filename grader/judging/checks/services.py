@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
-from typing import Any
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
@@ -234,7 +233,7 @@ class ServiceSequence:
         answers = min(orders, key=lambda order: len(self._wrong(order)))
         wrong = self._wrong(answers)
         got = [a.got for a in answers]
-        evidence: dict[str, Any] = {
+        evidence: dict[str, object] = {
             "service": self.service,
             "responses": len(answers),
             "numbers": got[:_MOST_IN_EVIDENCE],
@@ -288,7 +287,7 @@ class ServiceSequence:
         text = text_at(response.value, self.field)
         return None if text is None else number_in(text, self.pattern)
 
-    def _differs(self, answers: Sequence[_Answer], place: int, evidence: dict[str, Any]) -> Finding:
+    def _differs(self, answers: Sequence[_Answer], place: int, evidence: dict[str, object]) -> Finding:
         first = answers[place]
         found = self._found(first)
         before = f" after {number(answers[place - 1].wanted)}" if place else ""

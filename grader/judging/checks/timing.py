@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
@@ -145,7 +145,7 @@ class Latency:
             return _no_input(trace, self.input)
         delays = [self._delay(t_ns, outputs, jitter) for t_ns in inputs]
         late = [(t, d) for t, d in zip(inputs, delays, strict=True) if d is None or d > self.within + jitter]
-        evidence: dict[str, Any] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
+        evidence: dict[str, object] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
         known = [d for d in delays if d is not None]
         evidence["slowest_s"] = seconds(max(known, default=0))
         if len(inputs) - len(late) >= self.share * len(inputs) - 1e-9:
@@ -260,12 +260,12 @@ class ReactionCase:
     copies: Mapping[str, str] = field(default_factory=dict)
     silent: bool = False
 
-    def rules(self, given: Mapping[str, Any]) -> dict[str, RuleOrValue]:
+    def rules(self, given: Mapping[str, object]) -> dict[str, RuleOrValue]:
         """Return the rules for the output after an input."""
         return {**self.then, **{path: _copied(given, source) for path, source in self.copies.items()}}
 
 
-def _copied(given: Mapping[str, Any], source: str) -> RuleOrValue:
+def _copied(given: Mapping[str, object], source: str) -> RuleOrValue:
     try:
         found = at_path(given, source)
     except NoSuchField:
@@ -324,7 +324,7 @@ class Reaction:
         if not outputs and not all(a.case.silent for a in asked):
             return self._silent(trace)
         wrong = [(a, said) for a in asked if (said := self._wrong(trace, a))]
-        evidence = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
+        evidence: dict[str, object] = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
         if wrong:
             return self._explain(trace, wrong, len(asked), evidence)
         return met(f"{self.output}: right after each of {counted(len(asked), 'input')} on {self.input}", evidence)
@@ -373,7 +373,7 @@ class Reaction:
         return f"{moment(output.t_ns)}: {breach(output.value, path, as_rule(rules[path], self.tolerance))}"
 
     def _explain(
-        self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, Any]
+        self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, object]
     ) -> Finding:
         asked, said = wrong[0]
         shown = listed([f"{path} = {_short(asked.given.value, path)}" for path in asked.case.when])
@@ -400,5 +400,5 @@ class Reaction:
         raise HarnessError(f"{self.input}: no input with {case} was published in time")
 
 
-def _short(value: Mapping[str, Any], path: str) -> str:
+def _short(value: Mapping[str, object], path: str) -> str:
     return quote(str(value_at(value, path, "nothing")), 60)
