@@ -216,7 +216,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "not-graded",
         "Not graded",
-        "There is no report. What was refused is for the student to mend; --rerun failed tries again what failed here.",
+        "There is no report. What was refused is for the student to fix; --rerun failed tries again what failed here.",
         tuple(
             PageEntry(f"{row.status.value}{_problem(row, run)}", k)
             for k, row in enumerate(rows)

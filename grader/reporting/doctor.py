@@ -59,7 +59,7 @@ def _head(page: Page, checkup: Checkup) -> None:
     for problem in checkup.problems:
         page.put(shown(problem.value), prefix=f"  {problem.name}: ", indent=4)
         if problem.remedy:
-            page.put(shown(problem.remedy), prefix=Text("    mend: ", style="bold"), indent=6)
+            page.put(shown(problem.remedy), prefix=Text("    fix: ", style="bold"), indent=6)
 
 
 def _title(page: Page, text: str) -> None:
@@ -75,7 +75,7 @@ def _fact(page: Page, fact: Fact) -> None:
 
 
 def _remedy(page: Page, remedy: str, column: int) -> None:
-    page.put(shown(remedy), prefix=f"  {'':{column}}mend: ", indent=6)
+    page.put(shown(remedy), prefix=f"  {'':{column}}fix: ", indent=6)
 
 
 def _exchange(page: Page, exchange: Exchange) -> None:

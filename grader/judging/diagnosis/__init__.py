@@ -125,7 +125,7 @@ class _Reporter:
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:
-    hint = f"this has the same cause as {criterion}: mend that first"
+    hint = f"this has the same cause as {criterion}: fix that first"
     return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
