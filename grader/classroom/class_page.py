@@ -92,7 +92,7 @@ def _warnings(run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[str]:
         yield "This run was stopped before everybody was graded; the same command goes on where it was."
     bare = sum(_isolation(report).startswith("none") for report in reports)
     if bare:
-        yield f"No sandbox: {bare} of {len(reports)} submissions ran without walls around them."
+        yield f"No isolation: {bare} of {len(reports)} submissions ran without a sandbox."
 
 
 def _versions(report: ReportData) -> str:
@@ -106,8 +106,8 @@ def _isolation(report: ReportData) -> str:
 
 
 def _clock(asked: str, reports: Sequence[ReportData]) -> str:
-    walls = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
-    return f"asked for: {asked}; on the wall clock in part or whole: {walls} of {len(reports)}"
+    on_wall = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
+    return f"asked for: {asked}; on the wall clock in part or whole: {on_wall} of {len(reports)}"
 
 
 def _cost(book: Gradebook) -> str:

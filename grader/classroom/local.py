@@ -19,7 +19,7 @@ import msgspec
 
 from grader.classroom import store as kept
 from grader.classroom.store import Conditions, ResultStatus, State
-from grader.core.checkup import NO_WALLS, missing
+from grader.core.checkup import NO_SANDBOX, missing
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation
 
@@ -129,7 +129,7 @@ class LocalScheduler:
         choice = choose_isolation(isolation, find_ros())
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
-        if choice.isolation.shares_network and name != NO_WALLS and self._jobs > 1:
+        if choice.isolation.shares_network and name != NO_SANDBOX and self._jobs > 1:
             self._jobs = 1
             warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
         return warnings

@@ -8,7 +8,7 @@ from dataclasses import fields
 
 from rich.text import Text
 
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
 from grader.core.json_values import JsonObject
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
@@ -80,7 +80,7 @@ def _remedy(page: Page, remedy: str, column: int) -> None:
 
 def _exchange(page: Page, exchange: Exchange) -> None:
     outcome = Text("works" if exchange.succeeded else "FAILS", style=_GOOD if exchange.succeeded else _BAD)
-    where = "without a sandbox" if exchange.tier == NO_WALLS else f"in {exchange.tier}"
+    where = "without a sandbox" if exchange.tier == NO_SANDBOX else f"in {exchange.tier}"
     found = f"{exchange.arrived} of {exchange.expected} messages of a trial node {where} arrived, "
     page.put(f"{found}{exchange.took_s:.1f} s with all preparations", prefix=Text("  ").append(outcome).append("  "))
     if exchange.problem:
@@ -93,7 +93,7 @@ def _tier(page: Page, tier: TierReport, *, used: bool) -> None:
         page.put("holds; grading uses it", prefix=head, style=_GOOD)
     elif tier.usable:
         page.put("holds", prefix=head)
-    elif tier.name == NO_WALLS:
+    elif tier.name == NO_SANDBOX:
         page.put("no sandbox at all; only with --isolation none", prefix=head, style=_QUIET)
     else:
         page.put(f"not here: {_why(tier)}", prefix=head)
@@ -121,7 +121,7 @@ def _matrix(page: Page, checkup: Checkup) -> None:
         by = _mechanism(tried, checkup.used, name)
         page.put(Text(meaning).append(f" ({shown(by)})" if by else "", style=_QUIET), prefix=row, indent=6)
     for tier in tried:
-        if tier.name != NO_WALLS:
+        if tier.name != NO_SANDBOX:
             for found in _open(tier):
                 page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
 

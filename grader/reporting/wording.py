@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import floor
 
-from grader.core.checkup import NO_WALLS, summarised
+from grader.core.checkup import NO_SANDBOX, summarised
 from grader.core.exercise import Outcome, exercise_name
 from grader.core.quantities import seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
@@ -175,11 +175,11 @@ def versions(report: Report) -> str:
 
 def clock(report: Report) -> str:
     """Return which clock the nodes ran on."""
-    walls = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
-    if not walls:
+    on_wall = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
+    if not on_wall:
         return "virtual"
-    first = exercise_name(walls[0]).replace("Exercise", "exercise", 1)
-    return f"virtual, but the wall clock in {', '.join([first, *walls[1:]])}"
+    first = exercise_name(on_wall[0]).replace("Exercise", "exercise", 1)
+    return f"virtual, but the wall clock in {', '.join([first, *on_wall[1:]])}"
 
 
 def isolation(report: Report) -> str:
@@ -189,7 +189,7 @@ def isolation(report: Report) -> str:
 
 def ran_without_sandbox(report: Report) -> bool:
     """Return whether the student's code ran without a sandbox."""
-    return report.environment.isolation == NO_WALLS
+    return report.environment.isolation == NO_SANDBOX
 
 
 def run_line(report: Report) -> str:
