@@ -203,10 +203,11 @@ def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriter
         yield DraftCriterion(f"{name}_values", title, "field_values", asked, hint, needs, comment)
     words = _constant_texts([message.value for message in seen.driven.messages(topic.name)])
     if words:
-        said = {"topic": topic.name, "fields": words}
+        equal = {"topic": topic.name, "fields": words}
         comment = f"seen: the same in {counted(len(rows), 'message')}; decide: does the task ask for them?"
         hint = f"the texts of every message on {topic.name} are the same"
-        yield DraftCriterion(f"{name}_texts", f"Right texts on {topic.name}", "field_equal", said, hint, needs, comment)
+        title = f"Right texts on {topic.name}"
+        yield DraftCriterion(f"{name}_texts", title, "field_equal", equal, hint, needs, comment)
     for path, (low, high) in list(varying.items())[:_MOST_FIELDS]:
         yield from _varying(topic, path, low, high, needs)
 

@@ -276,14 +276,14 @@ def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
     for exercise in exercises_of(row.report):
         for criterion in exercise["criteria"]:
             if criterion["outcome"] == "undecided":
-                said = without_folders(str(criterion["reason"]), run.folders)
-                yield PageEntry(f"{criterion['title']}: {said}", index, f"{exercise['id']}-{criterion['id']}")
+                reason = without_folders(str(criterion["reason"]), run.folders)
+                yield PageEntry(f"{criterion['title']}: {reason}", index, f"{exercise['id']}-{criterion['id']}")
 
 
 def _problem(row: Row, run: RunOfClass) -> str:
     hint = row.result.hint if row.result is not None else ""
-    said = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
-    return f": {'; '.join(said)}" if said else ""
+    parts = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
+    return f": {'; '.join(parts)}" if parts else ""
 
 
 def _faults(index: int, row: Row) -> Iterator[PageEntry]:

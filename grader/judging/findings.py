@@ -107,22 +107,22 @@ def fault_hint(fault: Fault) -> str:
     return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
 
 
-def faulted(fault: Fault, said: str, evidence: Mapping[str, object] | None = None, *, last: bool = False) -> Finding:
+def faulted(fault: Fault, effect: str, evidence: Mapping[str, object] | None = None, *, last: bool = False) -> Finding:
     """Return a finding without credit for the effect of a fault.
 
     Args:
         fault: The fault.
-        said: The effect, or what was found.
+        effect: The effect, or what was found.
         evidence: Plain JSON values behind it.
-        last: Whether the fault is named after `said` instead of before.
+        last: Whether the fault is named after `effect` instead of before.
     """
-    clauses = (said, fault_sentence(fault)) if last else (fault_sentence(fault), said)
+    clauses = (effect, fault_sentence(fault)) if last else (fault_sentence(fault), effect)
     return not_met("; ".join(clauses), evidence, hint=fault_hint(fault), fault=fault)
 
 
 def explain_fault(
     trace: Trace,
-    said: str,
+    effect: str,
     evidence: Mapping[str, object] | None = None,
     *,
     process: str | None = None,
@@ -130,7 +130,7 @@ def explain_fault(
 ) -> Finding | None:
     """Return a finding without credit for the effect of the first fault, of one process or any; None without one."""
     fault = first_fault(trace, process)
-    return None if fault is None else faulted(fault, said, evidence, last=last)
+    return None if fault is None else faulted(fault, effect, evidence, last=last)
 
 
 def fault_sentence(fault: Fault) -> str:

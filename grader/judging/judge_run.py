@@ -111,8 +111,8 @@ def _explained(
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    said = (note for _, t in recorded for note in (*started(t), *t.notes))
-    notes = tuple(dict.fromkeys(said))
+    found = (note for _, t in recorded for note in (*started(t), *t.notes))
+    notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
 
 

@@ -124,9 +124,9 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
 
 def _held(trace: Trace, topic: str, heard_from_ns: int) -> tuple[Held, ...]:
     sent = delivered_numbers(trace, topic)
-    heard = [r for r in sent if r.t_ns >= heard_from_ns] or sent
+    received = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
-    for reading in heard:
+    for reading in received:
         if not starts or starts[-1].value != reading.value:
             starts.append(reading)
     stops = [*(s.t_ns for s in starts), trace.stop_ns][1:]

@@ -166,8 +166,10 @@ def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progre
 
 def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Explained]:
     (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
-    said = read_explained(beside(path), exercise)
-    explained = replace(said, reference=options.reference or said.reference, template=options.template or said.template)
+    known = read_explained(beside(path), exercise)
+    explained = replace(
+        known, reference=options.reference or known.reference, template=options.template or known.template
+    )
     if explained.reference is None:
         hint = f"name it with --reference FOLDER, or as `reference:` in {beside(path).name}"
         raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)

@@ -170,11 +170,11 @@ def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
 
 
 def _change(change: ReportChange) -> Iterator[str]:
-    of, said = _points(change.after_max), f"{_signed(change.gain)} points"
+    of, gained = _points(change.after_max), f"{_signed(change.gain)} points"
     if change.before_max != change.after_max:
         of += f" (of {_points(change.before_max)} before)"
-        said += f", {_signed(100 * change.share_gain)} % of all"
-    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {said}"
+        gained += f", {_signed(100 * change.share_gain)} % of all"
+    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {gained}"
     for row in change.criteria:
         yield f"    {shown(row.exercise)}/{shown(row.criterion)}: {_row(row)}"
 

@@ -65,12 +65,12 @@ def exercise_line(exercise: ExerciseReport) -> str:
 
 def warnings(report: Report) -> list[str]:
     """Return warnings that belong to the score: the report is partial or not final, or there was no sandbox."""
-    said = [_partial(report)] if report.pending else []
+    lines = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
     if undecided:
-        said.append(_not_final(undecided))
-    return said
+        lines.append(_not_final(undecided))
+    return lines
 
 
 def summary(report: Report) -> str:
@@ -89,13 +89,13 @@ def reason(verdict: Verdict) -> str:
 
 def explanation(verdict: Verdict) -> list[str]:
     """Return the reason, the hint and the place of a verdict; each safe to show as a line of text."""
-    said = [shown(reason(verdict))]
+    lines = [shown(reason(verdict))]
     if verdict.hint:
-        said.append(f"hint: {shown(verdict.hint)}")
+        lines.append(f"hint: {shown(verdict.hint)}")
     if verdict.location is not None:
         where = place(verdict.location.file, verdict.location.line)
-        said += [f"at {where}"] if where not in said[0] else []
-    return said
+        lines += [f"at {where}"] if where not in lines[0] else []
+    return lines
 
 
 def opening(report: Report) -> list[str]:

@@ -214,10 +214,10 @@ class Dispatcher:
 
     def _on_event(self, event: tuple[float, object]) -> None:
         """Report a step, unless its submission is already finished."""
-        said = event[1]
-        if not isinstance(said, dict):
+        message = event[1]
+        if not isinstance(message, dict):
             return
-        name, step = str(said.get(remote.NAME)), str(said.get(remote.STEP))[:200]
+        name, step = str(message.get(remote.NAME)), str(message.get(remote.STEP))[:200]
         with self._lock:
             if name in self._names:
                 self._on_step(name, step)

@@ -183,8 +183,8 @@ class ActionFeedback:
         for message in mine:
             wrong = broken_rules(_feedback(message), self.fields)
             if wrong:
-                said = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
-                return f"in the feedback at {moment(message.t_ns)} {said}"
+                flaw = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
+                return f"in the feedback at {moment(message.t_ns)} {flaw}"
         if self.grows is None:
             return ""
         for before, after in pairwise(mine):

@@ -64,10 +64,10 @@ class CallsOfClient:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        said = f"{self.calls} requests on {self.service}"
+        text = f"{self.calls} requests on {self.service}"
         if self.period is None:
-            return said
-        return f"{said}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
+            return text
+        return f"{text}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if number and gaps are right; the reason names the first wrong gap."""
@@ -245,8 +245,8 @@ class ReactsToResponses:
         """What is expected, in one phrase."""
         limit = number(self.threshold)
         goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
-        said = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
-        return f"{self.process} {said}; printing alone is half of it"
+        text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
+        return f"{self.process} {text}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if the reaction to every response on this side is right."""
@@ -260,7 +260,7 @@ class ReactsToResponses:
         if not {e.kind for e in mine} >= set(sides):
             return _not_reached(trace, self.process, self.service, episodes)
         evidence = self._evidence(episodes)
-        wrong = [(e, said) for e in mine if (said := self._wrong(e, episodes))]
+        wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes))]
         if not wrong:
             return self._right(trace, mine, evidence)
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
@@ -306,11 +306,11 @@ class ReactsToResponses:
         return {"columns": ["t_s", "response", "number", "warnings"], "rows": rows}
 
     def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
-        episode, said = wrong[0]
+        episode, flaw = wrong[0]
         rule = "goes on" if episode.kind is CallKind.GOOD else "warns"
         side = "above" if episode.kind is CallKind.GOOD else "at or below"
         reason = (
-            f"{moment(episode.start_ns)}, {self.process}: {said} after {number(episode.number or 0.0)}, expected that "
+            f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}, expected that "
         )
         reason += f"it {rule}, as for every number {side} {number(self.threshold)}"
         fault = first_fault(trace, self.process)

@@ -193,17 +193,17 @@ class ThresholdResponse:
             return faulted(fault, reason, evidence, last=True)
         both = {a.value for a in every if a.t_ns == first.t_ns and first.got is not None}
         if len(both) > 1:
-            said = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
+            cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(reason + said, evidence, hint=hint)
+            return not_met(reason + cause, evidence, hint=hint)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
-            said = f"; the answers are right for what was published {span(lag)} before"
+            cause = f"; the answers are right for what was published {span(lag)} before"
             return not_met(
-                reason + said, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
+                reason + cause, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
             )
-        said, hint = self._diagnosis(violations, inputs, answers)
-        return not_met(reason + said, evidence, hint=hint)
+        cause, hint = self._diagnosis(violations, inputs, answers)
+        return not_met(reason + cause, evidence, hint=hint)
 
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
@@ -251,15 +251,15 @@ class ThresholdResponse:
     def _silent(self, trace: Trace) -> Finding:
         """Return why the controller never answered, and whether it had subscribed."""
         why = explain_no_message(trace, self.output)
-        heard = student_endpoints(trace, "subscription", self.input)
+        ends = student_endpoints(trace, "subscription", self.input)
         if first_fault(trace) is not None or why.evidence.get("messages"):
             return why
-        if not heard:
+        if not ends:
             others = [e.topic for e in student_endpoints(trace, "subscription")]
             instead = f"; it subscribes to {quote(others[0])}" if others else ""
             hint = f"subscribe to {self.input}"
             return not_met(f"{why.reason}; nothing subscribes to {self.input}{instead}", why.evidence, hint=hint)
-        return not_met(f"{why.reason}; {quote(heard[0].node)} subscribes to {self.input}{_deaf(heard)}", why.evidence)
+        return not_met(f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}", why.evidence)
 
     def _nothing_asked(self, trace: Trace) -> Finding:
         fault = first_fault(trace)

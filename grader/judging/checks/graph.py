@@ -350,7 +350,7 @@ class GraphEdges:
         ends = student_endpoints(trace, topic=edge.topic)
         if not ends:
             return f"nothing publishes {edge.topic} and nothing subscribes to it"
-        said = [
+        found = [
             f"{quote(e.node)} {'publishes' if e.kind == 'publisher' else 'subscribes'} {quote(e.type)}" for e in ends
         ]
-        return f"{edge.topic}: {', '.join(list(dict.fromkeys(said))[:4])}"
+        return f"{edge.topic}: {', '.join(list(dict.fromkeys(found))[:4])}"

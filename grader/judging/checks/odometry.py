@@ -383,12 +383,12 @@ def _dots(name: str, pairs: Sequence[_LoggedPair], tone: Tone) -> list[Series]:
 def _describe_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
     right = sum(p.right for p in pairs)
     first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
-    said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
-    said += f"{_place(last.at(X), last.at(Y))}. "
+    text = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
+    text += f"{_place(last.at(X), last.at(Y))}. "
     if not pairs:
-        return f"{said}No pair of numbers was logged."
-    said += f"{right} of {counted(len(pairs), 'logged pair')} of numbers agree with it."
-    return f"{said} {hidden} too far away to be drawn." if hidden else said
+        return f"{text}No pair of numbers was logged."
+    text += f"{right} of {counted(len(pairs), 'logged pair')} of numbers agree with it."
+    return f"{text} {hidden} too far away to be drawn." if hidden else text
 
 
 def _place(x: float, y: float) -> str:

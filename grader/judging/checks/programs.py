@@ -76,8 +76,8 @@ class ParameterDeclared:
             reason = f"{quote(found.node)}: has no parameter {self.name}, expected {self.expected}"
             return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name))
         flaw = self._flaw(found)
-        said = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
-        return not_met(f"{said}, expected {flaw}", evidence) if flaw else met(said, evidence)
+        text = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
+        return not_met(f"{text}, expected {flaw}", evidence) if flaw else met(text, evidence)
 
     def _flaw(self, found: ReportedParameter) -> str:
         if self.type not in (None, found.type):

@@ -192,8 +192,8 @@ class LogsValues:
             f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not logged "
         )
         reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
-        said, hint = self._cause(received, unlogged, outputs)
-        return not_met(f"{reason}; {said}" if said else reason, evidence, hint=hint)
+        cause, hint = self._cause(received, unlogged, outputs)
+        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint)
 
     def _cause(
         self, received: Sequence[_Received], unlogged: Sequence[_Received], outputs: Sequence[Output]
@@ -204,23 +204,23 @@ class LogsValues:
             return "", rule
         if len(silent) > len(received) / 2:
             return f"nothing is logged at {len(silent)} of the messages", rule
-        heard = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
+        logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         largest = max(abs(r.value) for r in received)
-        right = [f for f in self.unit_factors if self._mostly(heard, f, _FINE * abs(f) * largest)]
+        right = [f for f in self.unit_factors if self._mostly(logged, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
-            said, hint = wrong_conversion(heard, factor, right)
-            if said:
-                return f"{times(factor)}: {said}", hint
-            if right and all(len(h.numbers) <= len(right) for h in heard):
+            cause, hint = wrong_conversion(logged, factor, right)
+            if cause:
+                return f"{times(factor)}: {cause}", hint
+            if right and all(len(h.numbers) <= len(right) for h in logged):
                 return f"{times(factor)} is not there, only {' and '.join(map(times, right))}", ""
         return "", ""
 
     def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Printed, ...]:
         return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
 
-    def _mostly(self, heard: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
-        hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
-        return hits > 0.8 * len(heard)
+    def _mostly(self, logged: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
+        hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in logged)
+        return hits > 0.8 * len(logged)
 
 
 def _shows(value: float, largest: float, printed: Printed) -> bool:

@@ -216,11 +216,11 @@ class ServiceSequence:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        said = (
+        text = (
             f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
         )
         again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of what lies beyond"
-        return said + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
+        return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every number is the expected one; the reason names the first that is not."""
@@ -293,9 +293,9 @@ class ServiceSequence:
         before = f" after {number(answers[place - 1].wanted)}" if place else ""
         reason = f"{moment(first.response.t_ns)}, {self.service}: {found}{before} in response {place + 1}, "
         reason += f"expected {number(first.wanted)}"
-        said, hint = self._instead([a.got for a in answers], place)
+        cause, hint = self._instead([a.got for a in answers], place)
         known = evidence | {"first_wrong": place + 1, "first_wrong_s": seconds(first.response.t_ns)}
-        return not_met(f"{reason}; {said}" if said else reason, known, hint=hint)
+        return not_met(f"{reason}; {cause}" if cause else reason, known, hint=hint)
 
     def _found(self, answer: _Answer) -> str:
         if answer.got is not None:

@@ -90,8 +90,8 @@ class Period:
             "max_s": max(lengths),
             "average_s": statistics.fmean(lengths),
         }
-        said = f"{self.topic}: gaps from {min(lengths):.3f} s to {max(lengths):.3f} s, "
-        said += f"{evidence['average_s']:.3f} s on average"
+        text = f"{self.topic}: gaps from {min(lengths):.3f} s to {max(lengths):.3f} s, "
+        text += f"{evidence['average_s']:.3f} s on average"
         wrong = self._wrong(trace, gaps)
         if wrong is not None:
             t_ns, gap = wrong
@@ -99,8 +99,8 @@ class Period:
             return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)})
         average = (times[-1] - times[0]) / len(gaps)
         if self.average is not None and not within(average, self.average, self.tolerance * self.average):
-            return not_met(f"{said}; expected {self.expected}", evidence)
-        return met(said, evidence)
+            return not_met(f"{text}; expected {self.expected}", evidence)
+        return met(text, evidence)
 
     def _wrong(self, trace: Trace, gaps: Sequence[tuple[int, int]]) -> tuple[int, int] | None:
         jitter = JITTER_NS[trace.clock]
@@ -323,7 +323,7 @@ class Reaction:
             return self._untried(trace, missing)
         if not outputs and not all(a.case.silent for a in asked):
             return self._silent(trace)
-        wrong = [(a, said) for a in asked if (said := self._wrong(trace, a))]
+        wrong = [(a, flaw) for a in asked if (flaw := self._wrong(trace, a))]
         evidence: dict[str, object] = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
         if wrong:
             return self._explain(trace, wrong, len(asked), evidence)
@@ -375,9 +375,9 @@ class Reaction:
     def _explain(
         self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, object]
     ) -> Finding:
-        asked, said = wrong[0]
+        asked, flaw = wrong[0]
         shown = listed([f"{path} = {_short(asked.given.value, path)}" for path in asked.case.when])
-        reason = f"{self.output}, after {shown} on {self.input} at {moment(asked.given.t_ns)}: {said}; "
+        reason = f"{self.output}, after {shown} on {self.input} at {moment(asked.given.t_ns)}: {flaw}; "
         reason += f"wrong after {len(wrong)} of {counted(total, 'input')}"
         fault = first_fault(trace)
         if fault is not None and not asked.outputs:
@@ -385,8 +385,8 @@ class Reaction:
         return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)})
 
     def _silent(self, trace: Trace) -> Finding:
-        heard = student_endpoints(trace, "subscription", self.input)
-        if not heard and trace.deliveries(self.input) and first_fault(trace) is None:
+        subscriptions = student_endpoints(trace, "subscription", self.input)
+        if not subscriptions and trace.deliveries(self.input) and first_fault(trace) is None:
             return explain_no_subscription(trace, self.input)
         return explain_no_message(trace, self.output)
 

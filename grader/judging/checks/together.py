@@ -148,11 +148,11 @@ class AnswersTogether:
             if any(within(one.value, self._expected(r.value), EXACT) for r in recent):
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
-            said = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
-            said += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
+            reason = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
+            reason += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
             known = evidence | {"first_wrong_s": seconds(one.t_ns)}
-            return not_met(said, known, hint=hint, problem=self._wrong)
+            return not_met(reason, known, hint=hint, problem=self._wrong)
         return None
 
     def _wrong_answer(
@@ -330,12 +330,12 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     one, other = _speakers(trace, here, there)
     policy = _incompatible(here, there)
     if not alike or policy is None:
-        said = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
+        text = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
-        return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
-    said = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
+        return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
+    text = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     hint = "pass the queue depth 10 as QoS on both sides"
-    return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
+    return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
 
 
 def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
@@ -358,6 +358,6 @@ def _file_of(trace: Trace, endpoint: Endpoint) -> str:
     for record in trace.records():
         if record.logger == bare:
             return record.process
-    heard: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
-    named = (o.process for o in heard if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
+    written: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
+    named = (o.process for o in written if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
     return next(named, "")

@@ -321,10 +321,10 @@ class Transform:
                 reason = f"{moment(one.t_ns)}, {self.parent} → {self.child}: {flaw}"
                 return not_met(reason, evidence | {"first_wrong_s": seconds(one.t_ns)})
         pace = self._pace_flaw(mine)
-        said = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
+        text = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
         if not pace:
-            return met(said, evidence)
-        return explain_fault(trace, f"{said}, {pace}", evidence, last=True) or not_met(f"{said}, {pace}", evidence)
+            return met(text, evidence)
+        return explain_fault(trace, f"{text}, {pace}", evidence, last=True) or not_met(f"{text}, {pace}", evidence)
 
     def _flaw(self, one: _Found) -> str:
         got = one.numbers("translation", _AXES)

@@ -100,10 +100,10 @@ def _types(topic: str, endpoints: Iterable[Endpoint]) -> JsonObject:
 
 def _edge(endpoint: Endpoint, node: str, topic: str) -> JsonObject:
     ends = (node, topic) if endpoint.kind == "publisher" else (topic, node)
-    said = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
-    said += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
-    said += f", depth {endpoint.depth}" if endpoint.depth else ""
-    return {"from": ends[0], "to": ends[1], "text": shown(said, limit=_TEXT_LIMIT)}
+    text = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
+    text += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
+    text += f", depth {endpoint.depth}" if endpoint.depth else ""
+    return {"from": ends[0], "to": ends[1], "text": shown(text, limit=_TEXT_LIMIT)}
 
 
 def _number(value: float) -> float | int | None:
