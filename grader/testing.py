@@ -43,7 +43,7 @@ __all__ = ["TraceBuilder", "judge", "met", "not_met", "partly"]
 _PHASE = {Mark: 0, Delivery: 1, GraphSnapshot: 2}
 
 #: Fields of a message, or a function that returns them for the index of a message.
-Value = Mapping[str, Any] | Callable[[int], Mapping[str, Any]]
+Value = Mapping[str, object] | Callable[[int], Mapping[str, object]]
 
 
 def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) -> Finding:
@@ -102,7 +102,7 @@ class TraceBuilder:
         self._seen.extend(observations)
         return self
 
-    def message(self, t_s: float, topic: str, type_: str, value: Mapping[str, Any]) -> TraceBuilder:
+    def message(self, t_s: float, topic: str, type_: str, value: Mapping[str, object]) -> TraceBuilder:
         """Add one message of the student's node, with nested dicts for its fields."""
         return self.add(Message(nanoseconds(t_s), topic, type_, value))
 
@@ -123,7 +123,7 @@ class TraceBuilder:
             self.add(Message(t_ns, topic, type_, value(number) if callable(value) else value))
         return self
 
-    def delivery(self, t_s: float, topic: str, type_: str, value: Mapping[str, Any]) -> TraceBuilder:
+    def delivery(self, t_s: float, topic: str, type_: str, value: Mapping[str, object]) -> TraceBuilder:
         """Add one message that the grader published to the student's node."""
         return self.add(Delivery(nanoseconds(t_s), topic, type_, value))
 
@@ -179,8 +179,8 @@ class TraceBuilder:
         t_s: float,
         service: str,
         type_: str,
-        request: Mapping[str, Any],
-        response: Mapping[str, Any] | None,
+        request: Mapping[str, object],
+        response: Mapping[str, object] | None,
         *,
         answer_s: float = 0.0,
         by_student: bool = False,

@@ -92,7 +92,7 @@ def test_without_ros_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.stdout.startswith(
         "grading is NOT SAFE here\n  ROS 2: expected rclpy, found none in this environment\n"
     )
-    assert "mend: pip install it\n" in result.stdout
+    assert "fix: pip install it\n" in result.stdout
     assert "  kernel " in result.stdout
 
 

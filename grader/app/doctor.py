@@ -9,7 +9,7 @@ from pathlib import Path
 
 from grader.app.grade import Progress
 from grader.app.observe import ObserveRequest, observe
-from grader.core.checkup import NO_WALLS, Checkup, Exchange, Fact, TierReport
+from grader.core.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import Limits
 from grader.core.quantities import NS_PER_S
@@ -52,7 +52,7 @@ def examine(progress: Progress) -> Checkup:
     tiers = inspect_tiers(ros)
     used = next((tier.name for tier in tiers if tier.usable), "")
     progress("exchanging messages")
-    exchange = _exchange(used or NO_WALLS, progress)
+    exchange = _exchange(used or NO_SANDBOX, progress)
     return Checkup(facts, exchange, tiers, used, "" if used else _remedy(tiers), Limits())
 
 

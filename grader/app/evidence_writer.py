@@ -8,6 +8,7 @@ from typing import Any
 
 from grader.app.request import GradeRequest
 from grader.core.exercise import Drawn, Exercise
+from grader.core.json_values import JsonObject
 from grader.core.report import Report
 from grader.core.submission import Run
 from grader.execution.evidence.store import check_place, keep
@@ -47,7 +48,7 @@ class EvidenceWriter:
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
-def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
+def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> JsonObject:
     """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
     return {
         "exercises": list(request.exercises),

@@ -116,11 +116,11 @@ def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
 
 
-def _fields(criterion: Criterion) -> tuple[Field[Any], ...]:
+def _fields(criterion: Criterion) -> tuple[Field[object], ...]:
     return fields(criterion.check)  # type: ignore[arg-type]  # checks are dataclasses
 
 
-def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | None) -> Parameter:
+def _parameter(field: Field[object], kind: type, manual: Manual, check: object | None) -> Parameter:
     """Describe a parameter with its value in a check, or with its default if no check is given."""
     annotation = get_type_hints(kind, include_extras=True)[field.name]
     value = field.default if check is None else getattr(check, field.name)
@@ -128,7 +128,7 @@ def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | No
     return Parameter(field.name, text, manual.parameters.get(field.name, ""), value is MISSING)
 
 
-def _written(value: Any, annotation: Any) -> str:
+def _written(value: Any, annotation: object) -> str:
     """Format a value the way a rubric writes it."""
     unit = _unit(annotation)
     if value is None:
@@ -144,7 +144,7 @@ def _written(value: Any, annotation: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _several(values: Mapping[str, Any] | tuple[Any, ...]) -> str:
+def _several(values: Mapping[str, object] | tuple[object, ...]) -> str:
     if isinstance(values, tuple):
         return ", ".join(_written(inner, None) for inner in values) or "none"
     return ", ".join(f"{key}: {_written(inner, None)}" for key, inner in values.items()) or "none"
@@ -158,7 +158,7 @@ def _parts(value: Any) -> str:
     return f"{{{', '.join(parts)}}}"
 
 
-def _unit(annotation: Any) -> Unit | None:
+def _unit(annotation: object) -> Unit | None:
     """Return the unit of an annotation, also of an optional one."""
     for part in (annotation, *get_args(annotation)):
         for mark in getattr(part, "__metadata__", ()):
@@ -211,14 +211,14 @@ def _count(count: Count) -> str:
     return f"{count.low} to {count.high} (drawn)" if isinstance(count, CountBetween) else str(count)
 
 
-def _cases(items: tuple[Any, ...], what: str) -> str:
+def _cases(items: tuple[object, ...], what: str) -> str:
     """Describe how many cases there are, and whether their order is drawn."""
     low, high = cases(items)
     order = " in a drawn order" if _is_open(items) else ""
     return f"{low if low == high else f'{low} to {high}'} {what}{order}"
 
 
-def _is_open(items: tuple[Any, ...]) -> bool:
+def _is_open(items: tuple[object, ...]) -> bool:
     return any(isinstance(item, (AnyOrder, SomeOf)) for item in items)
 
 

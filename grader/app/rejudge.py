@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 from grader.app.evidence_writer import request_of
 from grader.app.exit_codes import UNUSABLE, exit_code
@@ -24,7 +25,7 @@ from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
 from grader.reporting.delivery import Output, write_whole
 from grader.reporting.formats import FORMATS, PageLayout, rendered
-from grader.reporting.json_report import dumps, report_to_json
+from grader.reporting.json_report import ReportData, dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.variants import First
 
@@ -103,7 +104,7 @@ def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange 
     if before is None:
         return None
     try:
-        return change(name, before, report_to_json(report))
+        return change(name, cast("ReportData", before), report_to_json(report))
     except (KeyError, TypeError, ValueError):
         return None
 

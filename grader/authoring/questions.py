@@ -6,7 +6,6 @@ import ast
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id
 from grader.core.quantities import NS_PER_S, seconds
@@ -48,12 +47,12 @@ def _read(text: str) -> str | float | bool | None:
 #: Suffixes of fields with times, which differ in each run.
 OF_THE_RUN = ("stamp.sec", "stamp.nanosec")
 #: Something comes after anything.
-ANY: list[dict[str, Any]] = [{"when": {}, "then": {}}]
+ANY: list[dict[str, object]] = [{"when": {}, "then": {}}]
 #: Most distinct inputs to turn into cases, and most fields of an answer.
 _MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
 
 
-def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
+def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, object]]:
     """Return a case for each distinct input: its fields, and the answer within a second.
 
     Args:
@@ -72,7 +71,7 @@ def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
     return [_case(sent, answer, paths) for sent, answer in different.values()]
 
 
-def texts(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def texts(value: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
     """Yield path and value of every string in a message."""
     for name, inner in value.items():
         if isinstance(inner, Mapping):
@@ -91,7 +90,7 @@ def _answers(trace: Trace, inputs: tuple[Delivery, ...], answered: str) -> list[
     return found
 
 
-def _scalars(value: Mapping[str, Any]) -> dict[str, float | str]:
+def _scalars(value: Mapping[str, object]) -> dict[str, float | str]:
     return {**dict(texts(value)), **{k: v for k, v in leaves(value).items() if not k.endswith(OF_THE_RUN) and v == v}}  # noqa: PLR0124  NaN
 
 
@@ -101,7 +100,7 @@ def _telling(answers: list[Message]) -> list[str]:
     return [path for path in (rows[0] if rows else ()) if any(row.get(path) for row in rows)][:_MOST_ANSWER_FIELDS]
 
 
-def _case(sent: Delivery, answer: Message | None, paths: list[str]) -> dict[str, Any]:
+def _case(sent: Delivery, answer: Message | None, paths: list[str]) -> dict[str, object]:
     when = {path: value for path, value in _scalars(sent.value).items() if value}
     if answer is None:
         return {"when": when, "silent": True}
@@ -204,10 +203,11 @@ def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriter
         yield DraftCriterion(f"{name}_values", title, "field_values", asked, hint, needs, comment)
     words = _constant_texts([message.value for message in seen.driven.messages(topic.name)])
     if words:
-        said = {"topic": topic.name, "fields": words}
+        equal = {"topic": topic.name, "fields": words}
         comment = f"seen: the same in {counted(len(rows), 'message')}; decide: does the task ask for them?"
         hint = f"the texts of every message on {topic.name} are the same"
-        yield DraftCriterion(f"{name}_texts", f"Right texts on {topic.name}", "field_equal", said, hint, needs, comment)
+        title = f"Right texts on {topic.name}"
+        yield DraftCriterion(f"{name}_texts", title, "field_equal", equal, hint, needs, comment)
     for path, (low, high) in list(varying.items())[:_MOST_FIELDS]:
         yield from _varying(topic, path, low, high, needs)
 
@@ -226,7 +226,7 @@ def _varying(topic: TopicSummary, path: str, low: float, high: float, needs: str
     yield DraftCriterion(f"{name}_range", title, "field_in_range", asked, hint, needs, comment)
 
 
-def _constant_texts(values: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _constant_texts(values: Sequence[Mapping[str, object]]) -> dict[str, str]:
     """Return the non-empty strings that are the same in all messages, by their paths."""
     rows = [dict(texts(value)) for value in values]
     first = rows[0] if rows else {}
@@ -273,7 +273,7 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
     for service in dict.fromkeys(e.service for e in seen.driven.service_ends("client")):
         calls = len(seen.driven.requests(service, "student"))
         if calls:
-            wanted: dict[str, Any] = {"service": service, "calls": calls}
+            wanted: dict[str, object] = {"service": service, "calls": calls}
             comment = f"seen: {counted(calls, 'call')}; decide: how many, and how long between two of them?"
             hint = f"call {service} once it is there"
             yield DraftCriterion(
@@ -283,7 +283,7 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
 
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
     for node, name, value in parameters(seen.alone):
-        asked: dict[str, Any] = {"name": name, **({"node": node} if node else {})}
+        asked: dict[str, object] = {"name": name, **({"node": node} if node else {})}
         comment = "decide: is this default asked for?"
         if value is None:
             comment = "its value is no number, text or truth value; decide: is it asked for at all?"

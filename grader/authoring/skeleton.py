@@ -7,7 +7,6 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +27,7 @@ class DraftStimulus:
     """
 
     kind: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, object]
     comment: str = ""
 
 
@@ -49,7 +48,7 @@ class DraftCriterion:
     id: str
     title: str
     check: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, object]
     hint: str
     needs: str = ""
     comment: str = ""
@@ -140,7 +139,7 @@ def scenario_id(draft: Draft) -> str:
 
 
 def _scenario(draft: Draft) -> Iterator[str]:
-    observe: dict[str, Any] = {"duration": DraftQuantity(f"{draft.duration_s:g} s")}
+    observe: dict[str, object] = {"duration": DraftQuantity(f"{draft.duration_s:g} s")}
     if draft.after:
         observe |= {"after_first_message_on": draft.after, "wait_at_most": DraftQuantity("60 s")}
     yield from ("scenarios:", f"  - id: {scenario_id(draft)}", f"    processes: {_value(list(draft.files))}")
@@ -179,7 +178,7 @@ def _comment(text: str, indent: str = "") -> Iterator[str]:
     yield from textwrap.wrap(line, _WIDTH, initial_indent=start, subsequent_indent=start, break_on_hyphens=False)
 
 
-def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator[str]:
+def _mapping(start: str, parameters: Mapping[str, object], indent: str) -> Iterator[str]:
     """Yield parameters on the line of their key, or below it if the line would be too long."""
     line = f"{start} {_value(parameters)}"
     if len(line) <= _LONGEST:
@@ -194,7 +193,7 @@ def _mapping(start: str, parameters: Mapping[str, Any], indent: str) -> Iterator
             yield f"{indent}{_plain(str(key))}: {_value(value)}"
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     """Format a value as YAML on one line."""
     if isinstance(value, DraftQuantity):
         return value.text

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from grader.app.grade import Progress
 from grader.app.observe import ObserveRequest, watch
@@ -29,15 +28,15 @@ from grader.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 ODOMETRY = "nav_msgs/msg/Odometry"
 #: Time before the first stimulus, to observe how the nodes wait.
 FIRST_S = 1.0
+#: Topic -> fields of the messages that the author wants to send.
+SentMessages = Mapping[str, Sequence[Mapping[str, object]]]
 #: No message was named.
-NOTHING: Mapping[str, Sequence[Mapping[str, Any]]] = MappingProxyType({})
+NOTHING: SentMessages = MappingProxyType({})
 _VALUES = (1, 2, 3, 4)
 _CALLS = 3
 
 
-def stimuli_for(
-    trace: Trace, duration_s: float, given: Mapping[str, Sequence[Mapping[str, Any]]] = NOTHING
-) -> tuple[DraftStimulus, ...]:
+def stimuli_for(trace: Trace, duration_s: float, given: SentMessages = NOTHING) -> tuple[DraftStimulus, ...]:
     """Propose stimuli for all endpoints of the nodes that wait for input.
 
     Args:
@@ -48,9 +47,7 @@ def stimuli_for(
     return (*_topics(trace, duration_s, given), *_services(trace), *_parameters(trace))
 
 
-def _topics(
-    trace: Trace, duration_s: float, given: Mapping[str, Sequence[Mapping[str, Any]]]
-) -> Iterator[DraftStimulus]:
+def _topics(trace: Trace, duration_s: float, given: SentMessages) -> Iterator[DraftStimulus]:
     spoken = {end.topic for end in student_endpoints(trace, "publisher")}
     for topic, type_ in dict.fromkeys((e.topic, e.type) for e in student_endpoints(trace, "subscription")):
         if topic in given:
@@ -80,7 +77,7 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
     return DraftStimulus("messages", {**given, "start": start}, "decide: which fields? {} leaves all at their defaults")
 
 
-def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, Any]]) -> DraftStimulus:
+def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, object]]) -> DraftStimulus:
     """Spread the author's messages over the available time."""
     period_s = max(0.1, math.floor(10 * (duration_s - FIRST_S) / (len(values) + 1)) / 10)
     period, start = DraftQuantity(f"{min(2.0, period_s):g} s"), DraftQuantity(f"{FIRST_S:g} s")
@@ -152,9 +149,9 @@ def new_rubric(request: ObserveRequest, progress: Progress, *, id_: str = "", se
     return Skeleton(text, len(kept), len(left_out), draft.remarks)
 
 
-def read_sent(sent: Sequence[str]) -> dict[str, list[Mapping[str, Any]]]:
+def read_sent(sent: Sequence[str]) -> SentMessages:
     """Parse the messages to send, by topic; raises GraderError for invalid ones."""
-    given: dict[str, list[Mapping[str, Any]]] = {}
+    given: dict[str, list[Mapping[str, object]]] = {}
     for text in sent:
         topic, _, fields = text.partition("=")
         try:
@@ -173,7 +170,7 @@ def _remarks(trace: Trace) -> Iterator[str]:
             yield f"nothing was published on {topic}: send what its node waits for with --send TOPIC={{field: value}}"
 
 
-def _begun(trace: Trace, request: ObserveRequest, id_: str, given: Mapping[str, Sequence[Mapping[str, Any]]]) -> Draft:
+def _begun(trace: Trace, request: ObserveRequest, id_: str, given: SentMessages) -> Draft:
     """Return a draft with the scenario of the reference and no criteria."""
     files = tuple(file.name for file in request.files)
     duration_s = request.duration_ns / NS_PER_S

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Any
 
-from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
+from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
 from grader.classroom.roster import Person, fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
+from grader.reporting.json_report import ReportData
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
     return RunFacts(line, tuple(_rows(book, run, reports)), tuple(_warnings(run, reports)))
 
 
-def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[tuple[str, str]]:
     conditions = run.conditions
     seed = conditions.seed
     yield "grader", _counted(_versions(report) for report in reports) or conditions.grader
@@ -87,27 +87,27 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]
     yield "sources", ", ".join(f"{PurePath(source).name or source} ({layout})" for source, layout in book.layouts)
 
 
-def _warnings(run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _warnings(run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[str]:
     if run.stopped:
         yield "This run was stopped before everybody was graded; the same command goes on where it was."
     bare = sum(_isolation(report).startswith("none") for report in reports)
     if bare:
-        yield f"No sandbox: {bare} of {len(reports)} submissions ran without walls around them."
+        yield f"No isolation: {bare} of {len(reports)} submissions ran without a sandbox."
 
 
-def _versions(report: Mapping[str, Any]) -> str:
+def _versions(report: ReportData) -> str:
     made = report.get("environment", {})
     names = ("grader", "rclpy", "ros_distro", "rmw", "python")
     return ", ".join(f"{name} {made[name]}" for name in names if made.get(name))
 
 
-def _isolation(report: Mapping[str, Any]) -> str:
+def _isolation(report: ReportData) -> str:
     return str(report.get("environment", {}).get("isolation", ""))
 
 
-def _clock(asked: str, reports: Sequence[Mapping[str, Any]]) -> str:
-    walls = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
-    return f"asked for: {asked}; on the wall clock in part or whole: {walls} of {len(reports)}"
+def _clock(asked: str, reports: Sequence[ReportData]) -> str:
+    on_wall = sum(any(e.get("clock") == "wall" for e in report["exercises"]) for report in reports)
+    return f"asked for: {asked}; on the wall clock in part or whole: {on_wall} of {len(reports)}"
 
 
 def _cost(book: Gradebook) -> str:
@@ -216,7 +216,7 @@ def _listings(book: Gradebook, rows: Sequence[Row], run: RunOfClass) -> Iterator
     yield Listing(
         "not-graded",
         "Not graded",
-        "There is no report. What was refused is for the student to mend; --rerun failed tries again what failed here.",
+        "There is no report. What was refused is for the student to fix; --rerun failed tries again what failed here.",
         tuple(
             PageEntry(f"{row.status.value}{_problem(row, run)}", k)
             for k, row in enumerate(rows)
@@ -273,31 +273,27 @@ def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:
 
 
 def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
-    for exercise in _exercises(row):
+    for exercise in exercises_of(row.report):
         for criterion in exercise["criteria"]:
             if criterion["outcome"] == "undecided":
-                said = without_folders(str(criterion["reason"]), run.folders)
-                yield PageEntry(f"{criterion['title']}: {said}", index, f"{exercise['id']}-{criterion['id']}")
+                reason = without_folders(str(criterion["reason"]), run.folders)
+                yield PageEntry(f"{criterion['title']}: {reason}", index, f"{exercise['id']}-{criterion['id']}")
 
 
 def _problem(row: Row, run: RunOfClass) -> str:
     hint = row.result.hint if row.result is not None else ""
-    said = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
-    return f": {'; '.join(said)}" if said else ""
+    parts = [without_folders(text, run.folders) for text in (row.problem, hint and f"hint: {hint}") if text]
+    return f": {'; '.join(parts)}" if parts else ""
 
 
 def _faults(index: int, row: Row) -> Iterator[PageEntry]:
-    for exercise in _exercises(row):
+    for exercise in exercises_of(row.report):
         for fault in exercise.get("faults", ()):
             where = f"{fault['file']}:{fault['line']}" if fault["line"] else fault["file"] or "a node"
             what = _ENDED.get(fault["kind"], str(fault["kind"]).replace("_", " "))
             when = f" at t = {fault['t_s']:.3f} s" if fault["t_s"] else ""
             text = str(fault["text"]).strip().rsplit("\n", 1)[-1]
             yield PageEntry(f"{where}: {what}{when}: {text}", index, str(exercise["id"]))
-
-
-def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:
-    return () if row.report is None else row.report["exercises"]
 
 
 def without_folders(text: str, folders: Sequence[str]) -> str:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import grader
 from grader.app.grade import read_exercises, read_recording
@@ -21,7 +20,7 @@ from grader.app.request import GradeRequest, recording_digest
 from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
 from grader.classroom.class_page import RunOfClass, folders_of, title_of
-from grader.classroom.gradebook import Gradebook, ReportData, Row, decisions_for, make_gradebook
+from grader.classroom.gradebook import Gradebook, Row, decisions_for, make_gradebook
 from grader.classroom.grading import ClassRun, own_conditions, refuse_without_key, with_known_students
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
@@ -35,6 +34,7 @@ from grader.core.errors import GraderError, HarnessError
 from grader.core.exercise import Exercise
 from grader.execution.temp_dirs import scratch_folder
 from grader.reporting.class_page.contents import PageLink
+from grader.reporting.json_report import ReportData
 from grader.rubrics.variants import First
 from grader.similarity.finding import find_similar, read_programs
 from grader.similarity.library import ComparedProgram, Handed, Similar
@@ -181,7 +181,7 @@ def _write(files: Mapping[str, bytes], store: Store) -> tuple[Path, ...]:
 
 def _report(path: Path) -> ReportData | None:
     try:
-        report: Any = json.loads(path.read_bytes())
+        report: ReportData = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
         return None
     return report if isinstance(report, dict) and "exercises" in report else None

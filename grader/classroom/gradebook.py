@@ -9,16 +9,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
-from typing import Any
 
 from grader.classroom.adjustments import Adjusted, Adjustments, Decision, adjust, unknown_student
 from grader.classroom.intake import HandedInEntry, Intake
 from grader.classroom.roster import Person, RosterMatch, fold_handle
 from grader.classroom.store import Kept, ResultStatus, State
 from grader.reporting.escape import csv_cell, shown
-
-#: A report as JSON values.
-ReportData = Mapping[str, Any]
+from grader.reporting.json_report import CriterionData, ExerciseData, ReportData
 
 
 class Status(str, Enum):
@@ -301,14 +298,14 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
     exercises: dict[str, None] = {}
     criteria: dict[tuple[str, str], None] = {}
     for row in rows:
-        for exercise in _exercises(row.report):
+        for exercise in exercises_of(row.report):
             exercises[exercise["id"]] = None
             criteria.update({(exercise["id"], criterion["id"]): None for criterion in exercise["criteria"]})
     return list(exercises), sorted(criteria, key=lambda pair: list(exercises).index(pair[0]))
 
 
 def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
-    by_exercise = {e["id"]: e for e in _exercises(report)}
+    by_exercise = {e["id"]: e for e in exercises_of(report)}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
     return [
         *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
@@ -316,9 +313,10 @@ def _points(report: ReportData | None, exercises: Sequence[str], criteria: Seque
     ]
 
 
-def _is_undecided(criterion: Mapping[str, Any]) -> bool:
-    return bool(criterion["outcome"] == "undecided")
+def _is_undecided(criterion: CriterionData) -> bool:
+    return criterion["outcome"] == "undecided"
 
 
-def _exercises(report: ReportData | None) -> Sequence[Mapping[str, Any]]:
+def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
+    """Return the exercises of a report, if there is one."""
     return () if report is None else report["exercises"]

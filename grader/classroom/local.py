@@ -13,13 +13,13 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import msgspec
 
 from grader.classroom import store as kept
 from grader.classroom.store import Conditions, ResultStatus, State
-from grader.core.checkup import NO_WALLS, missing
+from grader.core.checkup import NO_SANDBOX, missing
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import choose_isolation
 
@@ -129,7 +129,7 @@ class LocalScheduler:
         choice = choose_isolation(isolation, find_ros())
         name = choice.isolation.name
         warnings = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
-        if choice.isolation.shares_network and name != NO_WALLS and self._jobs > 1:
+        if choice.isolation.shares_network and name != NO_SANDBOX and self._jobs > 1:
             self._jobs = 1
             warnings.append(f"sandbox {name}: submissions share the network, so they are graded one at a time")
         return warnings
@@ -226,7 +226,7 @@ class LocalScheduler:
             _kill(process)
 
 
-def _message(line: bytes) -> dict[str, Any]:
+def _message(line: bytes) -> dict[str, object]:
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):

@@ -6,11 +6,11 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
 from grader.classroom.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
+from grader.core.json_values import JsonObject
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
 from grader.reporting.escape import json_value, shown
@@ -152,14 +152,14 @@ def summary_json(graded: Graded) -> str:
             "duplicates": [list(names) for names in matching.duplicates],
             "strays": json_value(book.strays),
             "left_out": {platform: list(lines) for platform, lines in graded.left_out.items()},
-            "remarks": [*json_value(book.remarks), *graded.remarks],
+            "remarks": json_value([*book.remarks, *graded.remarks]),
             "results_of_nobody": list(book.foreign),
             "layouts": [{"source": json_value(source), "layout": layout} for source, layout in book.layouts],
         }
     )
 
 
-def _row(row: Row) -> dict[str, Any]:
+def _row(row: Row) -> JsonObject:
     person, adjusted = row.person, row.adjusted
     return {
         "name": row.name or None,

@@ -8,13 +8,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from grader.classroom.gradebook import Gradebook, ReportData, Row, number, table, text_cell
+from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
 from grader.classroom.roster import Person, columns_of, fold_handle, person_of, read_table
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
-from grader.reporting.json_report import json_text
+from grader.reporting.json_report import CriterionData, json_text
 from grader.submissions.collected import listed, shown
 
 #: The columns that Canvas requires before the scores, in this order.
@@ -151,15 +150,8 @@ def feedback(row: Row) -> str:
     """
     parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points." if row.report else ""]
     parts.append(_decision(row))
-    parts += [
-        _lost(criterion)
-        for exercise in (row.handed_back or _NOTHING)["exercises"]
-        for criterion in exercise["criteria"]
-    ]
+    parts += [_lost(criterion) for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
     return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
-
-
-_NOTHING: ReportData = {"exercises": ()}
 
 
 def _decision(row: Row) -> str:
@@ -174,7 +166,7 @@ def _decision(row: Row) -> str:
     return ""
 
 
-def _lost(criterion: Mapping[str, Any]) -> str:
+def _lost(criterion: CriterionData) -> str:
     if criterion["outcome"] == "met":
         return ""
     points = f"{number(criterion['score'])}/{number(criterion['max_score'])}"

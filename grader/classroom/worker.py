@@ -12,7 +12,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import date
-from typing import Any
 
 import msgspec
 
@@ -146,7 +145,7 @@ def _step(step: str) -> None:
     _send({"step": step})
 
 
-def _send(message: Mapping[str, Any]) -> None:
+def _send(message: Mapping[str, object]) -> None:
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
 

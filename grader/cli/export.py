@@ -8,7 +8,7 @@ import click
 
 from grader.app.exit_codes import ALL_MET
 from grader.cli.options import PATH
-from grader.core.checkup import NO_WALLS, TIERS
+from grader.core.checkup import NO_SANDBOX, TIERS
 from grader.core.errors import GraderError
 from grader.reporting.delivery import show
 
@@ -40,7 +40,7 @@ def _gradescope(
     """Write an autograder ZIP that Gradescope takes as it is."""
     from grader.packaging import Chosen, gradescope  # noqa: PLC0415  reads rubrics, which --help does not need
 
-    if isolation == NO_WALLS:
+    if isolation == NO_SANDBOX:
         click.echo("warning: without a sandbox a student's program can write its own result", err=True)
     _write(target, gradescope(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation), seed_key))
     return ALL_MET

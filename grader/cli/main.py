@@ -226,7 +226,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
 @click.command(name="doctor")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _doctor(*, as_json: bool) -> int:
-    """Say what this machine can do: ROS, an exchange of messages, sandboxes, limits, and what mends each lack.
+    """Say what this machine can do: ROS, an exchange of messages, sandboxes, limits, and how to fix what is missing.
 
     Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
     """

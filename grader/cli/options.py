@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
 EVIDENCE = "evidence"
 PATH = click.Path(path_type=Path)
-_Command = TypeVar("_Command", bound=Callable[..., Any])
+_Command = TypeVar("_Command", bound=Callable[..., object])
 
 
 #: How long all recordings of one submission may take together, in seconds.

@@ -1,4 +1,4 @@
-"""Figures: pictures of what nodes did, as plain data that any renderer can draw."""
+"""Figures that show the behaviour of nodes, as plain data for any renderer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Point = tuple[float, float]
 
 
 class Look(str, Enum):
-    """How the points of a series are joined."""
+    """How the points of a series are connected."""
 
     LINE = "line"
     STEP = "step"  # a value holds until the next one
@@ -19,7 +19,7 @@ class Look(str, Enum):
 
 
 class Tone(str, Enum):
-    """What a series or a moment means to its reader; a renderer gives it a colour and a shape."""
+    """The meaning of a series or a moment; renderers choose colours and shapes for it."""
 
     MAIN = "main"
     SECOND = "second"
@@ -32,14 +32,14 @@ class Tone(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One row of points.
+    """A series of points.
 
     Attributes:
-        name: What a reader sees in the legend.
-        points: (x, y), units of the axes; NaN breaks a line.
-        look: How they are joined.
-        tone: What they mean.
-        texts: What each point says beyond its numbers; empty, or one a point. Student-controlled.
+        name: Its name in the legend.
+        points: (x, y) in the units of the axes; NaN interrupts a line.
+        look: How the points are connected.
+        tone: Their meaning.
+        texts: A text for each point; empty if there are none. Student-controlled.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A range of the vertical axis in which values are accepted, edges inside."""
+    """A range of the vertical axis in which values are accepted, including its limits."""
 
     low: float
     high: float
@@ -61,7 +61,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A value of the vertical axis worth a line."""
+    """A horizontal line at a value."""
 
     value: float
     label: str
@@ -69,7 +69,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A value of the horizontal axis worth a line through all panels."""
+    """A vertical line through all panels."""
 
     x: float
     label: str
@@ -81,13 +81,13 @@ class Panel:
     """One coordinate system of a chart.
 
     Attributes:
-        title: What is drawn on the vertical axis.
+        title: Title of the vertical axis.
         unit: Its unit; empty for none.
         series: In drawing order.
-        bands: What is accepted.
+        bands: Ranges of accepted values.
         levels: Thresholds and expected values.
-        lanes: If set, the vertical axis has these rows instead of numbers, from the top; y counts them from 0.
-        grid: Lines of the horizontal axis: (first, distance); None leaves them to the renderer.
+        lanes: If not empty, the vertical axis has these rows instead of numbers, from the top; y is the index of a row.
+        grid: Grid lines of the horizontal axis: (first, distance); None if the renderer chooses.
     """
 
     title: str
@@ -101,18 +101,18 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels under each other that share the horizontal axis.
+    """Panels below each other that share the horizontal axis.
 
     Attributes:
         id: Unique within the exercise.
-        title: What a reader sees.
-        about: The picture in words, for whoever cannot see it.
-        criteria: Ids of the criteria that it belongs to.
-        x_title: What is drawn on the horizontal axis.
+        title: Its title.
+        about: A description for readers who cannot see it.
+        criteria: Ids of the criteria that it illustrates.
+        x_title: Title of the horizontal axis.
         x_unit: Its unit.
-        panels: From the top.
+        panels: Its panels, from the top.
         moments: Lines through all panels.
-        square: Whether one metre is as long upwards as sideways.
+        square: Whether both axes have the same scale.
     """
 
     id: str
@@ -128,7 +128,7 @@ class Chart:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """The live ROS graph in one situation; topics that every node has are left out."""
+    """The ROS graph at one time, without topics that every node has."""
 
     title: str
     graph: GraphSnapshot
@@ -136,7 +136,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class GraphFigure:
-    """The live ROS graph before and after; the other attributes are those of a chart."""
+    """The ROS graph at several times; its other attributes are those of a chart."""
 
     id: str
     title: str
@@ -154,7 +154,7 @@ class Excerpt:
 
     Attributes:
         file: Relative to the submission.
-        line: The line that is meant, from 1.
+        line: The line of interest, from 1.
         first: Number of the first line shown.
         lines: The text, student-controlled, without line ends.
     """

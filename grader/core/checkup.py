@@ -26,7 +26,7 @@ REQUIRED = ("fs_read", "fs_write", "procs", "net_egress", "shm")
 #: Tier names, strongest first, and the letter of each.
 TIERS = {"bubblewrap-root": "A2", "bubblewrap": "A1", "bubblewrap-flat": "B", "landlock": "C", "none": "D"}
 #: The name of the tier without isolation.
-NO_WALLS = "none"
+NO_SANDBOX = "none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def missing(properties: Sequence[Property]) -> tuple[Property, ...]:
 
 def described(isolation: str, properties: Sequence[Property]) -> str:
     """Format the tier and each property with its mechanism on one line; exactly `none` without a sandbox."""
-    if isolation == NO_WALLS or not properties:
+    if isolation == NO_SANDBOX or not properties:
         return isolation
     letter = TIERS.get(isolation)
     return f"{isolation}{f' ({letter})' if letter else ''}: {'; '.join(map(str, properties))}"
@@ -88,8 +88,8 @@ def described(isolation: str, properties: Sequence[Property]) -> str:
 
 def summarised(isolation: str, properties: Sequence[Property]) -> str:
     """Format the tier and how much it contains, short enough for one line of a terminal."""
-    if isolation == NO_WALLS:
-        return "NONE: no walls around the student's code"
+    if isolation == NO_SANDBOX:
+        return "NONE: no sandbox around the student's code"
     open_ones = [found.name for found in properties if not found.holds]
     if not properties:
         return isolation

@@ -1,4 +1,4 @@
-"""Exercises: what a rubric file says, as values; and the contract between a trace and a check."""
+"""Exercises: the contents of a rubric file as values, and the interface of checks."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from grader.core.trace import Trace
 
 
 class ProblemKind(Enum):
-    """The kinds of problems that diagnosis tells apart; a check names one only where a diagnosis needs it."""
+    """The kinds of problems that diagnosis distinguishes; a check states one only if a diagnosis needs it."""
 
-    BURSTS = "bursts"  # several messages come at once
-    STOPPED = "stopped"  # messages came, and then no more
-    NO_MESSAGE = "no_message"  # none ever came
-    NO_NUMBER = "no_number"  # the type of the messages has no number in it
+    BURSTS = "bursts"  # several messages arrive at once
+    STOPPED = "stopped"  # messages arrived, then stopped
+    NO_MESSAGE = "no_message"  # no message arrived
+    NO_NUMBER = "no_number"  # the message type contains no number
     CONSTANT = "constant"  # the values are all the same
     NEVER_CHANGES = "never_changes"  # the answer cannot change, because the input stays on one side of the threshold
-    WRONG_ANSWER = "wrong_answer"  # an answer does not fit its input, or one of the two is never given
-    KEPT_APART = "kept_apart"  # types or QoS keep publisher and subscription from talking to each other
-    NO_EDGE = "no_edge"  # two processes are not joined in the graph
-    COUNT_START = "count_start"  # a count starts at another number
-    ONE_PER_MESSAGE = "one_per_message"  # there is a log for every message
+    WRONG_ANSWER = "wrong_answer"  # an answer does not fit its input, or one of the two answers never occurs
+    KEPT_APART = "kept_apart"  # types or QoS of publisher and subscription are incompatible
+    NO_EDGE = "no_edge"  # two processes are not connected in the graph
+    COUNT_START = "count_start"  # a count starts at the wrong number
+    ONE_PER_MESSAGE = "one_per_message"  # every message is logged
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Problem:
 
     Attributes:
         kind: What is wrong.
-        topics: The topics that it is about, where a check looks at several.
+        topics: The topics concerned, if a check looks at several.
         start: The number that a count starts at; None for problems of other kinds.
     """
 
@@ -44,7 +44,7 @@ class Problem:
     start: int | None = None
 
 
-#: What `until` may name besides a date; only a platform knows when it comes.
+#: Values of `until` besides a date; only a platform knows when these events happen.
 DUE_DATE, PUBLISHED = "due_date", "published"
 _DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
@@ -57,7 +57,7 @@ class Audience(str, Enum):
 
 
 class Shows(str, Enum):
-    """How much of a criterion's result a student sees, from everything to nothing."""
+    """How much of the result of a criterion a student sees, from everything to nothing."""
 
     ALL = "all"
     WITHOUT_NUMBERS = "reason_without_numbers"
@@ -65,7 +65,7 @@ class Shows(str, Enum):
     NOTHING = "nothing"
 
 
-#: From the most open to the closest.
+#: From the least to the most restrictive.
 ORDER = tuple(Shows)
 
 
@@ -74,9 +74,9 @@ class Feedback:
     """What a student sees of one criterion.
 
     Attributes:
-        shows: How much.
-        until: The last day on which that holds, as `2026-12-01`, after which all is shown; `due_date` or `published`
-            for what only a platform knows; empty for ever.
+        shows: How much of the result.
+        until: The last day on which this applies, as `2026-12-01`; everything is shown afterwards. `due_date` and
+            `published` are events that only a platform knows; empty if it always applies.
     """
 
     shows: Shows = Shows.ALL
@@ -88,16 +88,16 @@ class Feedback:
         return Shows.ALL if over else self.shows
 
 
-#: Where a rubric says nothing else.
+#: The default if a rubric states no feedback policy.
 OPEN = Feedback()
 
 
 def strictest(shown: tuple[Shows, ...]) -> Shows:
-    """Return the closest of several; all is shown of none."""
+    """Return the most restrictive level; `Shows.ALL` if there is none."""
     return max(shown, key=ORDER.index, default=Shows.ALL)
 
 
-#: What may stand in a rubric in the place of a variant.
+#: The value of a variant in a rubric.
 Value = str | int | float | bool
 
 
@@ -106,7 +106,7 @@ class Variant:
     """The values of one exercise for one student.
 
     Attributes:
-        student: Whose they are, as staff wrote it; empty for nobody's.
+        student: The student, as staff wrote the name; empty if the values belong to nobody.
         values: Name and value, in the order of the rubric.
     """
 
@@ -114,8 +114,8 @@ class Variant:
     values: tuple[tuple[str, Value], ...]
 
     @property
-    def said(self) -> str:
-        """The values, each with its name."""
+    def text(self) -> str:
+        """The values with their names, for readers."""
         return ", ".join(f"{name.replace('_', ' ')} {written(value)}" for name, value in self.values)
 
 
@@ -124,7 +124,7 @@ class Drawn:
     """The values of all exercises for one student.
 
     Attributes:
-        student: Whose they are.
+        student: The student.
         values: Exercise id -> name -> value.
     """
 
@@ -133,22 +133,22 @@ class Drawn:
 
 
 def variant_notes(variant: Variant | None) -> tuple[str, ...]:
-    """Return what a report says of the variant that was graded; nothing if nothing varies."""
-    return () if variant is None else (f"graded by the variant of {variant.student}: {variant.said}",)
+    """Return the notes of a report about the graded variant; empty if nothing varies."""
+    return () if variant is None else (f"graded by the variant of {variant.student}: {variant.text}",)
 
 
 def written(value: Value) -> str:
-    """Return a value as a rubric writes it."""
+    """Format a value as in a rubric."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def exercise_name(number: str) -> str:
-    """Return what an exercise is called by its number: `Exercise 1`, but `Project 1` if the number says so itself."""
+    """Return the name of an exercise: `Exercise 1` for the number 1, but `Project 1` if the number is `Project 1`."""
     return f"Exercise {number}" if number[:1].isdigit() else number
 
 
 class Outcome(str, Enum):
-    """What judging a criterion came to."""
+    """The result of judging a criterion."""
 
     MET = "met"
     PARTLY = "partly"
@@ -174,9 +174,9 @@ class Finding:
         reason: One sentence in the form `where: what was found, what was expected`; no markup.
         evidence: Plain JSON values behind the reason; keys in a fixed order.
         location: Place in the student's file, if the trace names one.
-        hint: One thing to do; empty if nothing is very likely right.
-        blocked_by: Id of the criterion without which this question cannot be asked; credit is then 0.
-        problem: What is wrong, where diagnosis can say more about it; no report shows this.
+        hint: One thing to do; empty if no advice is very likely to be right.
+        blocked_by: Id of the criterion that must be met before this one can be judged; credit is then 0.
+        problem: The problem found, if diagnosis can explain it further; not shown in reports.
     """
 
     credit: Fraction
@@ -192,7 +192,7 @@ class Check(Protocol):
     """A typed question about a trace: a frozen dataclass whose fields are the rubric's parameters."""
 
     def judge(self, trace: Trace) -> Finding:
-        """Return what the trace says; pure, and never raises for anything a student can do."""
+        """Judge the trace. This is a pure function, and nothing that a student does makes it raise."""
         ...
 
 
@@ -201,7 +201,7 @@ class SourceCheck(Protocol):
     """A check that also reads the text of the students' files."""
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return what the files, by their wanted names, and the trace say; as pure as `judge`."""
+        """Judge the trace and the files, by their required names; a pure function like `judge`."""
         ...
 
 
@@ -210,16 +210,16 @@ class Criterion:
     """One row of a rubric.
 
     Attributes:
-        id: Unique within the exercise, fixed for ever.
-        title: What a reader sees.
+        id: Unique within the exercise; never changes.
+        title: Its title.
         points: Above 0.
         scenario: Id of the scenario whose trace is judged.
-        check: The question.
-        needs: Ids of criteria that must be met or partly met for this one to make sense.
-        hint: What to tell a student who did not meet it, if the check has nothing better.
-        chapter: Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
-        feedback: How much of its result a student is shown.
-        check_name: What the rubric calls its check; says nothing that the check does not.
+        check: The check that judges it.
+        needs: Ids of criteria that must be met or partly met before this one is judged.
+        hint: Hint for a student who did not meet it, if the check has no better one.
+        chapter: The part of the course text that requires it, e.g. `Exercise 1, acceptance criterion 2`; may be empty.
+        feedback: How much of its result a student sees.
+        check_name: Name of its check in the rubric.
     """
 
     id: str
@@ -241,14 +241,14 @@ class Exercise:
     Attributes:
         id: Unique, e.g. `velocity_publisher`.
         number: Number in the chapter, as text.
-        title: What a reader sees.
+        title: Its title.
         required: Whether the chapter requires it.
-        files: File names a submission must hold, in order.
-        scenarios: What is recorded, in order.
-        criteria: What is judged, in order.
-        digest: `sha256:` over the bytes of the rubric file and of the checks of its own.
-        by_request: Whether it is graded only where somebody asks for it.
-        variant: The values that differ from student to student, as they are in here; None if none do.
+        files: File names that a submission must contain, in order.
+        scenarios: Its scenarios, in the order of recording.
+        criteria: Its criteria, in order.
+        digest: `sha256:` digest of the rubric file and its own check files.
+        by_request: Whether it is graded only on request.
+        variant: The values for this student; None if nothing varies.
     """
 
     id: str

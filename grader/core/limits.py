@@ -1,4 +1,4 @@
-"""Limits: what the students' processes of one scenario may use, and the words for a limit that was reached."""
+"""Limits of the students' processes in one scenario, and their descriptions for messages."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from typing import Annotated
 
 from grader.core.quantities import GIB, KIB, MIB, NS_PER_S, Bytes, DurationNs, Least, duration, size
 
-#: Real time, in seconds, that all recordings of one submission may take together unless told otherwise; those of an
-#: ordinary submission take 3 to 10 s.
+#: Default limit, in seconds of real time, for all recordings of one submission together; an ordinary submission takes
+#: 3 to 10 s.
 TIME_BUDGET_S = 300.0
 
-#: What a process may map beyond what it may fill: libraries, thread stacks and pools that stay empty.
+#: Address space beyond the memory limit: libraries, and thread stacks and memory pools that stay empty.
 ADDRESS_SPACE_BEYOND = 3 * GIB // 2
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What each student process may use with everything it starts, and how much of what it does is looked at.
+    """What each student process and its children may use, and how much of their behaviour is recorded.
 
-    Reaching a limit is told to the student, and what was recorded before is judged. The first group is of each student
-    process with everything it starts, the second of each file or folder, the third of the scenario. The defaults leave
-    room above what any of the 170 right programs of our test set needed, in brackets: each by itself, for ten seconds
-    of virtual time, on two processors. A rubric may set each to no less than a node that does nothing needs.
+    The student is told if a limit is reached, and the recording up to then is judged. The first group applies to each
+    student process with its children, the second to each file or folder, the third to the scenario. The defaults are
+    well above the most that any of the 170 correct programs of our test set needed, given in parentheses: each alone,
+    for ten seconds of virtual time, on two processors. A rubric cannot set a limit below the needs of an idle node.
 
     Attributes:
-        memory_bytes: Memory filled, without what is read from files such as libraries (45 MiB).
-        processor_ns: Processor time, all threads together (6.3 s, of a loop that only looks at the clock).
+        memory_bytes: Memory used, without pages mapped from files such as libraries (45 MiB).
+        processor_ns: Processor time of all threads together (6.3 s, by a loop that only reads the clock).
         processes: Processes and threads (16).
-        output_bytes: Output that is kept, of standard output and of standard error; more is read and dropped.
+        output_bytes: Output kept of each of standard output and standard error; the rest is read and discarded.
         lines: Log records and lines of output that are kept (200).
-        open_files: Descriptors of one process (16).
+        open_files: Open file descriptors of one process (16).
         file_bytes: Size of one file.
-        scratch_bytes: All files in one of the folders that the process may write to.
-        wall_ns: Real time of the recording; on the wall clock our longest scenario takes up to 80 s.
+        scratch_bytes: Total size of the files in one of the folders that the process may write to.
+        wall_ns: Real time of the recording (80 s, by our longest scenario on the wall clock).
         messages: Messages on one topic; more end the recording (400).
-        message_bytes: Size of a message whose content is kept (76 bytes); of a larger one only time and topic are.
-        traffic_bytes: Size of all messages kept; more end the recording (25 KiB).
-        participants: DDS participants, of which a process has one for each ROS context; more end the recording.
+        message_bytes: Largest message whose content is kept (76 bytes); of a larger one, only time and topic are kept.
+        traffic_bytes: Total size of the messages kept; more end the recording (25 KiB).
+        participants: DDS participants; a process has one for each ROS context; more end the recording.
     """
 
     memory_bytes: Annotated[Bytes, Least(128 * MIB), "memory filled, as in 512 MiB"] = 512 * MIB
@@ -58,26 +58,26 @@ class Limits:
 
     @property
     def processor_s(self) -> int:
-        """Processor time in whole seconds, at least 1, as the system counts it."""
+        """Processor time in whole seconds, rounded up, at least 1."""
         return max(1, -(-self.processor_ns // NS_PER_S))
 
     @property
     def address_space_bytes(self) -> int:
-        """Memory that one process may map, filled or not: what the system itself enforces at once."""
+        """Address space of one process, whether used or not; the kernel enforces this limit immediately."""
         return self.memory_bytes + ADDRESS_SPACE_BEYOND
 
     def memory_words(self) -> str:
-        """Say how much memory there is."""
+        """Describe the memory limit."""
         return f"{size(self.memory_bytes)} of memory"
 
     def processor_words(self) -> str:
-        """Say how much processor time there is."""
+        """Describe the limit of processor time."""
         return f"{duration(self.processor_ns)} of processor time"
 
     def wall_words(self) -> str:
-        """Say how much real time there is."""
+        """Describe the limit of real time."""
         return f"{duration(self.wall_ns)} of real time"
 
     def processes_words(self) -> str:
-        """Say how many processes and threads there are."""
+        """Describe the limit of processes and threads."""
         return f"{self.processes:,} processes and threads"

@@ -1,4 +1,4 @@
-"""Scenarios: one simulated situation with its duration, stimuli and limits; no marks and no answers."""
+"""Scenarios: a simulated situation with its duration, stimuli and limits, without points or expected answers."""
 
 from __future__ import annotations
 
@@ -27,66 +27,66 @@ class CountBetween:
 
 
 Time = Annotated[int | TimeBetween, Kind("time")]
-#: One that is above 0.
+#: A time above 0.
 LongTime = Annotated[int | TimeBetween, Kind("time above 0")]
-#: Nanoseconds that are never drawn, above 0.
+#: A fixed time in nanoseconds, above 0.
 FixedTime = Annotated[int, Kind("fixed time above 0")]
-#: The same, or 0 for never.
+#: A fixed time in nanoseconds; 0 means never.
 TimeOrNever = Annotated[int, Kind("fixed time above 0, or nothing")]
 Count = Annotated[int | CountBetween, Kind("count")]
-#: One that may be 0 for never.
+#: A count; 0 means never.
 CountOrNever = Annotated[int | CountBetween, Kind("count, or nothing")]
 
 
 def shortest(time: Time) -> int:
-    """Return the least that a time may come to, in nanoseconds."""
+    """Return the shortest possible time, in nanoseconds."""
     return time.low_ns if isinstance(time, TimeBetween) else time
 
 
 def longest(time: Time) -> int:
-    """Return the most that a time may come to, in nanoseconds."""
+    """Return the longest possible time, in nanoseconds."""
     return time.high_ns if isinstance(time, TimeBetween) else time
 
 
 def fewest(count: Count) -> int:
-    """Return the least that a count may come to."""
+    """Return the smallest possible count."""
     return count.low if isinstance(count, CountBetween) else count
 
 
 def most(count: Count) -> int:
-    """Return the most that a count may come to."""
+    """Return the largest possible count."""
     return count.high if isinstance(count, CountBetween) else count
 
 
 @dataclass(frozen=True, slots=True)
 class InOrder:
-    """Cases that follow each other as they are written, wherever among others they come."""
+    """Cases that stay next to each other in the written order, wherever they are placed among others."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class SomeOf:
-    """A drawn number of cases, each one of several kinds."""
+    """A number of cases, each drawn from several kinds."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
     count: Count
 
 
 @dataclass(frozen=True, slots=True)
 class AnyOrder:
-    """Cases in an order drawn from the seed, each of them present; those of a SomeOf are scattered among the others."""
+    """Cases that are all used, in an order drawn from the seed; cases of a SomeOf are scattered among the others."""
 
-    items: tuple[Any, ...]
+    items: tuple[object, ...]
 
 
-def cases(items: tuple[Any, ...]) -> tuple[int, int]:
-    """Return how many cases a list of items comes to, the fewest and the most."""
+def cases(items: tuple[object, ...]) -> tuple[int, int]:
+    """Return the smallest and the largest number of cases in a list of items."""
     each = [_cases(item) for item in items]
     return sum(low for low, _ in each), sum(high for _, high in each)
 
 
-def _cases(item: Any) -> tuple[int, int]:
+def _cases(item: object) -> tuple[int, int]:
     if isinstance(item, SomeOf):
         return fewest(item.count), most(item.count)
     return cases(item.items) if isinstance(item, (InOrder, AnyOrder)) else (1, 1)
@@ -99,7 +99,7 @@ class Span:
     Attributes:
         duration_ns: Observed time.
         after_first_message_on: If set, observation starts with the first message on this topic.
-        wait_at_most_ns: How long that first message is waited for.
+        wait_at_most_ns: Longest wait for that first message.
     """
 
     duration_ns: LongTime
@@ -130,7 +130,7 @@ class JustBelow:
 
 
 NumberSpec = float | Between | JustAbove | JustBelow
-#: A number, or several in an order of their own.
+#: A number, or several numbers with an order.
 NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
 
 
@@ -138,15 +138,15 @@ NumberItem = NumberSpec | AnyOrder | InOrder | SomeOf
 class NumberStream:
     """A stimulus: numbers published on a topic, each held for a while.
 
-    They are published in the type that the student's node takes.
+    They are published with the message type that the student's node subscribes to.
 
     Attributes:
         topic: Topic name, absolute.
-        type: Message type used while no subscription tells another, e.g. `std_msgs/msg/Float32`.
+        type: Message type if no subscription has another one, e.g. `std_msgs/msg/Float32`.
         values: Numbers in order.
         period_ns: Time between two messages.
-        hold_ns: How long each number is repeated; where that is drawn, for each number anew, the last one is repeated
-            until the end of an observation that begins with the scenario.
+        hold_ns: How long each number is repeated. If this is drawn, each number gets its own time, and the last one is
+            repeated until the end of an observation that starts with the scenario.
         start_ns: Time of the first message since scenario start.
     """
 
@@ -162,7 +162,7 @@ class NumberStream:
 class OdometryStream:
     """A stimulus: the recorded odometry.
 
-    It is played with its own timing by a publisher that then disappears.
+    It is played with its original timing by a publisher that disappears afterwards.
 
     Attributes:
         topic: Topic name, absolute.
@@ -197,28 +197,28 @@ class Written:
     decimals: int = 1
 
 
-#: What a field of a planned message may hold; mappings are nested messages, tuples are sequences. Mappings have no
-#: hash: stimuli that differ in nothing else share theirs, and are told apart by comparing them.
+#: The value of a field in a planned message: mappings are nested messages, tuples are sequences. Mappings are not
+#: hashable, so stimuli that differ only in them have equal hashes and are distinguished by comparison.
 FieldSpec = str | int | float | bool | Between | Choose | Written | Mapping[str, "FieldSpec"] | tuple["FieldSpec", ...]
 Fields = Annotated[Mapping[str, FieldSpec], Kind("fields")]
-#: The fields of one message, or of several in an order of their own.
+#: The fields of one message, or of several messages with an order.
 FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
 
 
 @dataclass(frozen=True, slots=True)
 class MessageStream:
-    """A stimulus: messages of one type, one a period; fields left out keep their defaults.
+    """A stimulus: messages of one type, one per period; omitted fields keep their defaults.
 
     Attributes:
         topic: Topic name, absolute.
-        type: e.g. `std_msgs/msg/String`; fixed, unlike a number stream's.
+        type: e.g. `std_msgs/msg/String`; unlike that of a number stream, it does not depend on the student's node.
         values: Fields of each message.
         period_ns: Time between two messages.
         start_ns: Time of the first message.
-        repeats: How often each is sent, one a period; where that is drawn, for each anew.
+        repeats: How often each message is sent, once per period; drawn separately for each message.
         stop_ns: When the publisher disappears; 0 for never.
-        best_effort: Whether it offers best effort only.
-        latched: Whether it offers transient local.
+        best_effort: Whether it offers only best-effort reliability.
+        latched: Whether it offers transient-local durability.
     """
 
     topic: Topic
@@ -244,7 +244,7 @@ class ServiceServer:
         stop_ns: When it disappears; 0 for never.
         delay_ns: Time from a request to its response.
         cycle: Whether the responses begin again after the last one; otherwise the last one is repeated.
-        answers: After so many responses it takes one more request, and disappears without a response; 0 for never.
+        answers: After this many responses it accepts one more request and disappears without answering; 0 for never.
     """
 
     service: Topic
@@ -259,17 +259,17 @@ class ServiceServer:
 
 @dataclass(frozen=True, slots=True)
 class ServiceCalls:
-    """A stimulus: clients that call the student's server; a call waits for the server to be there.
+    """A stimulus: clients that call the student's server; a call waits until the server exists.
 
     Attributes:
         service: Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions
             are calls of the services behind them.
         type: e.g. `std_srvs/srv/Trigger`.
-        requests: Fields of each request in order, repeated from the first one if there are fewer than calls.
-        calls: How many requests each client sends.
-        clients: How many clients there are; the k-th call of all of them is sent at the same instant.
-        period_ns: Time between two calls of a client; it does not wait for the response.
-        start_ns: When the clients appear and call first.
+        requests: Fields of each request in order; with fewer requests than calls, they repeat from the first one.
+        calls: Number of requests of each client.
+        clients: Number of clients; all of them send their k-th call at the same instant.
+        period_ns: Time between two calls of a client, which does not wait for responses.
+        start_ns: When the clients appear and send their first call.
     """
 
     service: Topic
@@ -283,17 +283,17 @@ class ServiceCalls:
 
 @dataclass(frozen=True, slots=True)
 class ActionGoal:
-    """A stimulus: a goal for the student's action server, which may be cancelled after a while.
+    """A stimulus: a goal for the student's action server, which may be cancelled later.
 
-    In the trace its parts are calls of the services behind an action, `/NAME/_action/send_goal`, `get_result` and
-    `cancel_goal`; what the server publishes are messages on `/NAME/_action/feedback` and `status`.
+    In the trace it appears as calls of the action's services, `/NAME/_action/send_goal`, `get_result` and
+    `cancel_goal`; feedback and status are messages on `/NAME/_action/feedback` and `/NAME/_action/status`.
 
     Attributes:
         action: Absolute name.
         type: e.g. `test_msgs/action/Fibonacci`.
         goal: Fields of the goal.
-        start_ns: When the client appears and sends the goal; it waits for the server as a real client would.
-        cancel_after_ns: Time from the goal's acceptance until it asks to cancel it; 0 for never.
+        start_ns: When the client appears and sends the goal; it waits for the server, as a real client does.
+        cancel_after_ns: Time from the acceptance of the goal to the request to cancel it; 0 for never.
     """
 
     action: Topic
@@ -307,7 +307,7 @@ Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | Servi
 
 
 def longest_course_ns(stimulus: Stimulus) -> int:
-    """Return when a stimulus has shown all of its cases at the latest; for a server, when it appears."""
+    """Return the latest time at which a stimulus has presented all its cases; for a server, when it appears."""
     start_ns = longest(stimulus.start_ns)
     if isinstance(stimulus, NumberStream):
         return start_ns + cases(stimulus.values)[1] * longest(stimulus.hold_ns)
@@ -319,7 +319,7 @@ def longest_course_ns(stimulus: Stimulus) -> int:
 
 
 def is_open(stimulus: Stimulus) -> bool:
-    """Return whether anything but values is left to the seed."""
+    """Return whether the seed decides anything besides values: times, counts or orders."""
     parts = [getattr(stimulus, name) for name in stimulus.__slots__]
     inside = [item for part in parts if isinstance(part, tuple) for item in part]
     return any(isinstance(part, (TimeBetween, CountBetween, AnyOrder, SomeOf)) for part in (*parts, *inside))
@@ -332,12 +332,12 @@ class Scenario:
     Attributes:
         id: Unique within the exercise.
         processes: File names of the student processes that run in it, in start order.
-        span: How long it is observed.
+        span: When and how long it is observed.
         stimuli: What the grader publishes.
-        limits: How much the processes may use, and how much is recorded.
+        limits: Limits of the processes and of the recording.
         starts_ns: `(process, t_ns)` of processes that start late; the others start at 0.
-        may_exit: Processes that are free to end by themselves: with code 0 that is no fault.
-        shutdown_ns: How long the processes may take to end after the stop signal, if that is looked at; 0 if not.
+        may_exit: Processes that may end by themselves; exit code 0 is then no fault.
+        shutdown_ns: How long the processes may take to end after the stop signal; 0 if this is not checked.
     """
 
     id: str
@@ -357,7 +357,7 @@ class TimedMessage:
     Attributes:
         t_ns: Time since the start of the stream.
         cdr: The message as it goes over the wire (CDR with its 4-byte header).
-        value: The decoded fields that judging reads.
+        value: The decoded fields, for judging.
     """
 
     t_ns: int

@@ -81,5 +81,5 @@ def main_not_called(file: str, line: int = 0) -> str:
         line: The line of main, from 1; 0 leaves it out.
     """
     place = f"{file}:{line}" if line else file
-    said = f"{place}: nothing calls main(), so `python3 {file}` would do nothing"
-    return f"{said}; add: if __name__ == '__main__': main()"
+    problem = f"{place}: nothing calls main(), so `python3 {file}` would do nothing"
+    return f"{problem}; add: if __name__ == '__main__': main()"

@@ -34,7 +34,7 @@ _SQLITE_HEAD = 18  # the magic, then the page size in two bytes, where 1 means 6
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
 _HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record /odom` writes it"
-_HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may mend"
+_HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may fix"
 
 _Raw = tuple[int, bytes]
 

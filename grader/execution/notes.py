@@ -129,16 +129,16 @@ def _class_not_started(file: str, data: Mapping[str, Any], places: Places) -> st
     name = data.get("class")
     if not _is_name(name):
         return ""
-    said = f"{file}: nothing starts {name}, so `python3 {file}` would do nothing"
-    return f"{said}; add a main() that calls rclpy.init(), makes the node and spins it"
+    problem = f"{file}: nothing starts {name}, so `python3 {file}` would do nothing"
+    return f"{problem}; add a main() that calls rclpy.init(), makes the node and spins it"
 
 
 def _neighbour_imported(file: str, data: Mapping[str, Any], places: Places) -> str:
     name = data.get("module")
     if not _is_name(name) or not places.has(f"{file.rpartition('/')[0]}/{name}.py".lstrip("/")):
         return ""
-    said = f"{file}: import {name} finds {name}.py beside it with `python3` only, not with `ros2 run`"
-    return f"{said}; in a package, write: from . import {name}"
+    problem = f"{file}: import {name} finds {name}.py beside it with `python3` only, not with `ros2 run`"
+    return f"{problem}; in a package, write: from . import {name}"
 
 
 def _is_name(name: object) -> bool:

@@ -285,8 +285,8 @@ class NodeProcess:
             relative, place = file.removeprefix(f"{self.root}/"), int(line[:9])
             if relative == file or not self.places.has(relative, place):
                 relative, place = "", 0
-            said = self._anywhere(message)[:TEXT_CHARACTERS]
-            found.append(LogRecord(t_ns, self.name, severity, logger, said, relative, place))
+            shortened = self._anywhere(message)[:TEXT_CHARACTERS]
+            found.append(LogRecord(t_ns, self.name, severity, logger, shortened, relative, place))
             position = match.end()
         return found + self._lines(t_ns, stream, text[position:])
 

@@ -127,8 +127,8 @@ class WorkerProcess:
             raise HarnessError(f"{expected} ({error})") from error
         if not isinstance(answer, dict) or "trace" not in answer:
             problem = str(answer.get("problem", "")) if isinstance(answer, dict) else ""
-            said = problem.strip().splitlines()
-            raise HarnessError(f"worker: {said[-1] if said else 'expected a trace, found none'}"[:600])
+            lines = problem.strip().splitlines()
+            raise HarnessError(f"worker: {lines[-1] if lines else 'expected a trace, found none'}"[:600])
         self.worn = answer.get("worn") is True
         real_ns, starved_ns = (answer.get(name) for name in ("real_ns", "starved_ns"))
         if isinstance(real_ns, int) and isinstance(starved_ns, int):

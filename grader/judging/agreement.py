@@ -11,10 +11,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
-from typing import Any
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds, within
-from grader.core.trace import ClockKind, Delivery, Fault, LogRecord, Message, Request, Response, Trace
+from grader.core.trace import ClockKind, Delivery, Fault, GraphSnapshot, LogRecord, Message, Request, Response, Trace
 from grader.judging.findings import faults_before_stop
 
 #: Rates and counts agree within this share, plus the absolute number below.
@@ -225,7 +224,7 @@ def _columns(messages: Sequence[Message]) -> dict[str, list[float]]:
     return {path: column for path, column in columns.items() if len(column) == len(messages)}
 
 
-def _numbers(value: Mapping[str, Any], above: str = "") -> list[tuple[str, float]]:
+def _numbers(value: Mapping[str, object], above: str = "") -> list[tuple[str, float]]:
     found: list[tuple[str, float]] = []
     for name, part in value.items():
         if name in CLOCK_FIELDS or len(found) >= FIELDS:
@@ -272,7 +271,7 @@ class _Decision:
     """The last answer published while a value was held, and when the value ended, since the start of the window."""
 
     stop_ns: int
-    given: Mapping[str, Any]
+    given: Mapping[str, object]
     answer: float
 
 
@@ -292,9 +291,9 @@ def _decided(window: _Window, given: str, output: str) -> list[_Decision]:
     return found
 
 
-def _held(window: _Window, topic: str) -> list[tuple[int, int, Mapping[str, Any]]]:
+def _held(window: _Window, topic: str) -> list[tuple[int, int, Mapping[str, object]]]:
     """Return start, end and content of each value of a stimulus, inside the window."""
-    spans: list[tuple[int, int, Mapping[str, Any]]] = []
+    spans: list[tuple[int, int, Mapping[str, object]]] = []
     for delivery in window.trace.deliveries(topic):
         if not window.holds(delivery.t_ns):
             continue
@@ -337,18 +336,18 @@ def _logged(window: _Window, process: str) -> list[LogRecord]:
 
 def _endpoints(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     early = [g for g in virtual.trace.graphs() if g.t_ns < virtual.stop_ns - EDGE_NS]
-    lasting = {key for g in early for key in _keys(g.endpoints, g.services)}
-    ever = {key for g in virtual.trace.graphs() for key in _keys(g.endpoints, g.services)}
-    seen = {key for g in wall.trace.graphs() for key in _keys(g.endpoints, g.services)}
+    lasting = {key for g in early for key in _keys(g)}
+    ever = {key for g in virtual.trace.graphs() for key in _keys(g)}
+    seen = {key for g in wall.trace.graphs() for key in _keys(g)}
     for kind, name, type_ in sorted(lasting - seen):
         yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "there", "not there")
     for kind, name, type_ in sorted(seen - ever):
         yield Difference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "not there", "there")
 
 
-def _keys(endpoints: Sequence[Any], services: Sequence[Any]) -> Iterator[tuple[str, str, str]]:
-    yield from ((e.kind, e.topic, e.type) for e in endpoints)
-    yield from ((s.kind, s.service, s.type) for s in services)
+def _keys(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:
+    yield from ((e.kind, e.topic, e.type) for e in graph.endpoints)
+    yield from ((s.kind, s.service, s.type) for s in graph.services)
 
 
 def _ends(virtual: _Window, wall: _Window) -> Iterator[Difference]:

@@ -260,18 +260,18 @@ def _faults(trace: Trace, lanes: list[str], rows: list[Series]) -> None:
     if not faults and not limits:
         return
     lanes.append("faults")
-    said = [(seconds(f.t_ns), fault_sentence(f)) for f in faults] + [(seconds(m.t_ns), m.detail) for m in limits]
-    points = [(t, float(len(lanes) - 1)) for t, _ in said]
-    rows.append(series("fault", points, look=Look.DOTS, tone=Tone.BAD, texts=[text for _, text in said]))
+    events = [(seconds(f.t_ns), fault_sentence(f)) for f in faults] + [(seconds(m.t_ns), m.detail) for m in limits]
+    points = [(t, float(len(lanes) - 1)) for t, _ in events]
+    rows.append(series("fault", points, look=Look.DOTS, tone=Tone.BAD, texts=[text for _, text in events]))
 
 
 def _about(trace: Trace, processes: Sequence[str]) -> str:
     parts = []
     for process in processes:
         records = [r for r in trace.records(process) if r.t_ns <= trace.stop_ns]
-        said = f"{process}: {counted(len(records), 'log record')}"
+        about = f"{process}: {counted(len(records), 'log record')}"
         lines = printed_lines(trace, process)
-        parts.append(f"{said}, {counted(len(lines), 'printed line')}" if lines else said)
+        parts.append(f"{about}, {counted(len(lines), 'printed line')}" if lines else about)
     faults = [quote(fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
     parts.append(f"faults: {'; '.join(faults[:3])}" if faults else "no fault")
     return f"{'; '.join(parts)}; observed for {seconds(trace.stop_ns):.1f} s."
@@ -289,8 +289,8 @@ def series(  # noqa: PLR0913  what a series consists of
     """Return a series reduced to a visible number of points; the extremes of each stretch stay."""
     most = min(most, MOST_TEXTS) if texts else most
     kept = kept_indices([y for _, y in points], most)
-    said = tuple(quote(texts[k], _TEXT_LENGTH) for k in kept) if texts else ()
-    return Series(name, tuple(points[k] for k in kept), look, tone, said)
+    labels = tuple(quote(texts[k], _TEXT_LENGTH) for k in kept) if texts else ()
+    return Series(name, tuple(points[k] for k in kept), look, tone, labels)
 
 
 def kept_indices(values: Sequence[float], most: int) -> list[int]:
@@ -352,8 +352,8 @@ def which_answers(answers: Sequence[Reading]) -> str:
     values = sorted({r.value for r in answers})
     if not values:
         return ""
-    said = ", ".join(number(v) for v in values[:5]) + (" and others" if len(values) > 5 else "")
-    return f", all of them {said}" if len(values) == 1 else f" ({said})"
+    listed = ", ".join(number(v) for v in values[:5]) + (" and others" if len(values) > 5 else "")
+    return f", all of them {listed}" if len(values) == 1 else f" ({listed})"
 
 
 def points_of(values: Sequence[Reading]) -> list[Point]:

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from grader.core.exercise import Finding, Location, Problem
 from grader.core.quantities import NS_PER_S, seconds
@@ -30,19 +29,19 @@ _RUN_ON_HINT = "keep the node running: it must not end before it is stopped"
 AT_ONCE_NS = NS_PER_S
 
 
-def met(reason: str, evidence: Mapping[str, Any] | None = None) -> Finding:
+def met(reason: str, evidence: Mapping[str, object] | None = None) -> Finding:
     """Return a finding with full credit."""
     return Finding(Fraction(1), reason, evidence or {})
 
 
-def partly(reason: str, evidence: Mapping[str, Any] | None = None, *, hint: str = "") -> Finding:
+def partly(reason: str, evidence: Mapping[str, object] | None = None, *, hint: str = "") -> Finding:
     """Return a finding with half credit."""
     return Finding(HALF, reason, evidence or {}, hint=hint)
 
 
 def not_met(  # noqa: PLR0913  each is a field of the finding
     reason: str,
-    evidence: Mapping[str, Any] | None = None,
+    evidence: Mapping[str, object] | None = None,
     *,
     hint: str = "",
     fault: Fault | None = None,
@@ -76,7 +75,7 @@ def fault_location(fault: Fault) -> Location | None:
     return Location(fault.file, fault.line) if fault.file and fault.line > 0 else None
 
 
-def fault_evidence(fault: Fault) -> dict[str, Any]:
+def fault_evidence(fault: Fault) -> dict[str, object]:
     """Return a fault as plain JSON values."""
     return {
         "process": fault.process,
@@ -108,30 +107,30 @@ def fault_hint(fault: Fault) -> str:
     return _SPIN_HINT if fault.t_ns < AT_ONCE_NS else _RUN_ON_HINT
 
 
-def faulted(fault: Fault, said: str, evidence: Mapping[str, Any] | None = None, *, last: bool = False) -> Finding:
+def faulted(fault: Fault, effect: str, evidence: Mapping[str, object] | None = None, *, last: bool = False) -> Finding:
     """Return a finding without credit for the effect of a fault.
 
     Args:
         fault: The fault.
-        said: The effect, or what was found.
+        effect: The effect, or what was found.
         evidence: Plain JSON values behind it.
-        last: Whether the fault is named after `said` instead of before.
+        last: Whether the fault is named after `effect` instead of before.
     """
-    clauses = (said, fault_sentence(fault)) if last else (fault_sentence(fault), said)
+    clauses = (effect, fault_sentence(fault)) if last else (fault_sentence(fault), effect)
     return not_met("; ".join(clauses), evidence, hint=fault_hint(fault), fault=fault)
 
 
 def explain_fault(
     trace: Trace,
-    said: str,
-    evidence: Mapping[str, Any] | None = None,
+    effect: str,
+    evidence: Mapping[str, object] | None = None,
     *,
     process: str | None = None,
     last: bool = False,
 ) -> Finding | None:
     """Return a finding without credit for the effect of the first fault, of one process or any; None without one."""
     fault = first_fault(trace, process)
-    return None if fault is None else faulted(fault, said, evidence, last=last)
+    return None if fault is None else faulted(fault, effect, evidence, last=last)
 
 
 def fault_sentence(fault: Fault) -> str:

@@ -8,7 +8,6 @@ import statistics
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
 
 from grader.core.exercise import Criterion, Exercise, Finding, Outcome, variant_notes
 from grader.core.quantities import NS_PER_S, seconds
@@ -112,8 +111,8 @@ def _explained(
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    said = (note for _, t in recorded for note in (*started(t), *t.notes))
-    notes = tuple(dict.fromkeys(said))
+    found = (note for _, t in recorded for note in (*started(t), *t.notes))
+    notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
 
 
@@ -166,7 +165,7 @@ class VerdictBuilder:
     submission: Submission
     done: dict[str, Verdict] = field(default_factory=dict)
     missing_owner: dict[str, str] = field(default_factory=dict)
-    fault_owner: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    fault_owner: dict[tuple[object, ...], str] = field(default_factory=dict)
 
     def verdicts(self) -> tuple[Verdict, ...]:
         """Return one verdict for each criterion, in rubric order."""
@@ -287,14 +286,14 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
 
 
 def _without_points(
-    criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, Any] | None = None
+    criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, object] | None = None
 ) -> Verdict:
     points = criterion.points
     known = evidence or {}
     return Verdict(criterion.id, criterion.title, outcome, Fraction(0), points, reason, hint=hint, evidence=known)
 
 
-def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
+def _fault_of(finding: Finding) -> tuple[object, ...] | None:
     """Return a key that identifies a fault across scenarios, or None if the finding rests on none."""
     fault = finding.evidence.get(FAULT_KEY)
     if not isinstance(fault, Mapping):
@@ -383,7 +382,7 @@ def _ranges(messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def _numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:
+def _numbers(value: object, name: str) -> Iterator[tuple[str, float]]:
     """Yield the finite numbers of a message by dotted name; lists are left out, because they have no names."""
     if isinstance(value, Mapping):
         for key, field in value.items():

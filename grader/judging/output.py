@@ -349,16 +349,16 @@ class LoggedNumbers:
     numbers: tuple[Printed, ...]
 
 
-def wrong_conversion(heard: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
+def wrong_conversion(logged: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
     """Return a clause about what is logged instead of a converted value, and a hint; both empty if unclear.
 
     Args:
-        heard: One entry for each message with a log.
+        logged: One entry for each message with a log.
         factor: The correct conversion factor.
         others: Factors that are also correct, whose numbers are ignored.
     """
-    largest = max((abs(h.value) for h in heard), default=0.0)
-    telling = [h for h in heard if h.numbers and abs(h.value) > _SMALL * largest]
+    largest = max((abs(h.value) for h in logged), default=0.0)
+    telling = [h for h in logged if h.numbers and abs(h.value) > _SMALL * largest]
     if len(telling) < _FEWEST:
         return "", ""
     left = [LoggedNumbers(h.value, tuple(n for n in h.numbers if not _explained(n, h, others))) for h in telling]
@@ -377,8 +377,8 @@ def _factor(left: Sequence[LoggedNumbers], factor: float) -> tuple[str, str]:
         known = _known(candidate, factor)
         exact = known[0] if known else candidate
         if _scaled(left, exact) >= _SURE:
-            said = f"instead there is {number(exact)} times the value"
-            return (f"{said}, {known[1]}" if known else said), ""
+            text = f"instead there is {number(exact)} times the value"
+            return (f"{text}, {known[1]}" if known else text), ""
     return "", ""
 
 
@@ -389,16 +389,16 @@ def _scaled(left: Sequence[LoggedNumbers], factor: float) -> float:
 def _known(candidate: float, factor: float) -> tuple[float, str] | None:
     if not math.isclose(factor, _DEGREES, rel_tol=1e-3):
         return None
-    return next(((f, said) for f, said in _FOR_DEGREES if math.isclose(candidate, f, rel_tol=0.02)), None)
+    return next(((f, text) for f, text in _FOR_DEGREES if math.isclose(candidate, f, rel_tol=0.02)), None)
 
 
 def _shows_value(printed: Printed, value: float, relative: float = CONVERSION) -> bool:
     return shows_about(printed, value, coarsest=abs(value) / 3, relative=relative)
 
 
-def _explained(printed: Printed, heard: LoggedNumbers, factors: Sequence[float]) -> bool:
-    return any(_shows_value(printed, f * heard.value) for f in factors)
+def _explained(printed: Printed, logged: LoggedNumbers, factors: Sequence[float]) -> bool:
+    return any(_shows_value(printed, f * logged.value) for f in factors)
 
 
-def _share(heard: Sequence[LoggedNumbers], fits: Callable[[LoggedNumbers, Printed], bool]) -> float:
-    return sum(any(fits(h, n) for n in h.numbers) for h in heard) / len(heard)
+def _share(logged: Sequence[LoggedNumbers], fits: Callable[[LoggedNumbers, Printed], bool]) -> float:
+    return sum(any(fits(h, n) for n in h.numbers) for h in logged) / len(logged)

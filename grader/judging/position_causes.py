@@ -97,8 +97,8 @@ def cause_of(analysis: Analysis, track: Track) -> Cause:
 
 def _chance(analysis: Analysis) -> Cause:
     numbers = sum(len(e.numbers) for g in analysis.groups for e in g.entries)
-    said = f"{counted(numbers, 'number')} in {counted(len(analysis.groups), 'sentence')} of different wording, "
-    return Cause("chance", f"{said}some of which show the position by chance", _POSITION_HINT)
+    text = f"{counted(numbers, 'number')} in {counted(len(analysis.groups), 'sentence')} of different wording, "
+    return Cause("chance", f"{text}some of which show the position by chance", _POSITION_HINT)
 
 
 def _sample(group: Group) -> Group:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S
 from grader.core.trace import ClockKind, Delivery, LogRecord, OutputLine, Trace
@@ -38,7 +37,7 @@ class Pose:
     t_ns: int
     x: float
     y: float
-    fields: Mapping[str, Any]
+    fields: Mapping[str, object]
 
     @classmethod
     def of(cls, delivery: Delivery) -> Pose:
@@ -120,7 +119,7 @@ def _track_of(trace: Trace, topic: str) -> Track | None:
     return Track(played, times, start_ns, min(stop_ns, trace.stop_ns), JITTER_NS[trace.clock])
 
 
-def _number(fields: Mapping[str, Any], path: str) -> float:
+def _number(fields: Mapping[str, object], path: str) -> float:
     found = number_in(fields, path)
     return _NAN if found is None else found
 

@@ -88,16 +88,16 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
         return Answer(problem=f"{name} cannot be judged: {error.message}")
     except (Exception, SystemExit) as error:  # a failing check must cost no points and must not end the report
         problem = f"the check {name} failed on this recording through no fault of the submission"
-        said = f"{type(error).__name__}: {quote(str(error))}"
+        text = f"{type(error).__name__}: {quote(str(error))}"
         if not criterion.check_name or name in CHECKS:
-            return Answer(problem=problem, error=said)
-        said = f"{_place(error)}{said}"
-        return Answer(problem=problem, error=said, hint=f"mend the check that the rubric brings: {said}")
+            return Answer(problem=problem, error=text)
+        text = f"{_place(error)}{text}"
+        return Answer(problem=problem, error=text, hint=f"fix the check that the rubric brings: {text}")
     if name in CHECKS and 0 <= finding.credit <= 1:
         return Answer(finding=_start_failure_first(finding, scenario, trace))
     wrong = breach(finding)
     if wrong:
-        return Answer(problem=f"the check {name} {wrong}", hint="mend the check that the rubric brings")
+        return Answer(problem=f"the check {name} {wrong}", hint="fix the check that the rubric brings")
     finding = replace(finding, credit=Fraction(finding.credit))
     return Answer(finding=_start_failure_first(finding, scenario, trace))
 
@@ -135,8 +135,8 @@ def _started(trace: Trace) -> int:
     ends = (*trace.service_ends("service"), *trace.service_ends("client"))
     only_services = {e.node for e in ends} - {e.node for e in endpoints}
     known = len({e.participant for e in endpoints}) + len(only_services)
-    said: tuple[Request | Response, ...] = (*trace.of(Request), *trace.of(Response))
-    return known or int(bool(trace.messages()) or any(r.sender == "student" for r in said))
+    calls: tuple[Request | Response, ...] = (*trace.of(Request), *trace.of(Response))
+    return known or int(bool(trace.messages()) or any(r.sender == "student" for r in calls))
 
 
 #: Deepest nesting of evidence.

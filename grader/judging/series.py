@@ -214,11 +214,11 @@ def _rounded(wanted: Curve, sample: Sample, *, decimals: int) -> float:
 def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
     """Yield common mistakes, the most frequent first."""
     for start in (s for near in range(1, _FURTHEST_START + 1) for s in (near, -near)):
-        said = f"the values are right for a count that starts at {start}"
-        yield Instead(said, _FIRST_HINT if start == 1 else "", start), partial(_at, wanted, start=start)
+        clause = f"the values are right for a count that starts at {start}"
+        yield Instead(clause, _FIRST_HINT if start == 1 else "", start), partial(_at, wanted, start=start)
     for degrees in (_DEGREES, 1 / _DEGREES):
-        said = "the angle is converted between degrees and radians before the formula"
-        yield Instead(said, _RADIAN_HINT), partial(_at, wanted, pace=degrees)
+        clause = "the angle is converted between degrees and radians before the formula"
+        yield Instead(clause, _RADIAN_HINT), partial(_at, wanted, pace=degrees)
     for factor in _PACES:
         fast, slow = (f"the values go through {wanted.text} {number(factor)} times too {w}" for w in ("fast", "slowly"))
         yield Instead(fast, _PACE_HINT), partial(_at, wanted, pace=factor)
@@ -229,8 +229,8 @@ def _ways(wanted: Curve) -> Iterator[tuple[Instead, _Wanted]]:
         hint = "sine and cosine are taken for each other"
         yield Instead(f"the values follow {wanted.mistaken.text}", hint), partial(_at, wanted.mistaken)
     for decimals in range(_MOST_DECIMALS + 1):
-        said = f"the values are rounded to {counted(decimals, 'decimal')}"
-        yield Instead(said, "publish the value as it is"), partial(_rounded, wanted, decimals=decimals)
+        clause = f"the values are rounded to {counted(decimals, 'decimal')}"
+        yield Instead(clause, "publish the value as it is"), partial(_rounded, wanted, decimals=decimals)
 
 
 def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead | None:
@@ -242,12 +242,12 @@ def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Inste
     unscaled = [replace(s, value=s.value / factor) for s in samples]
     if not _follow(unscaled, partial(_at, wanted), tolerance):
         return None
-    said = f"each value is {number(factor)} times the one expected"
+    clause = f"each value is {number(factor)} times the one expected"
     if math.isclose(factor, -1.0, rel_tol=1e-6):
-        return Instead(said, "the sign is the wrong way round")
+        return Instead(clause, "the sign is the wrong way round")
     if any(math.isclose(factor, f, rel_tol=1e-3) for f in (_DEGREES, 1 / _DEGREES)):
-        return Instead(said, "that is the factor between degrees and radians: publish the value unconverted")
-    return Instead(said)
+        return Instead(clause, "that is the factor between degrees and radians: publish the value unconverted")
+    return Instead(clause)
 
 
 #: Step between the lags that are tried, and the longest lag.

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
-from typing import Any
 
 from grader.core.quantities import NS_PER_MS
 from grader.core.trace import ClockKind, LogRecord, Request, Response, Trace
@@ -37,6 +36,8 @@ def calls_of(trace: Trace, service: str, asker: str) -> tuple[Call, ...]:
     return tuple(Call(r, responses.get(r.number)) for r in asked)
 
 
+#: A decoded parameter.
+ParameterValue = str | float | bool | list[str | float | bool] | None
 #: Number of a type -> its field in rcl_interfaces/msg/ParameterValue, and the name of the type.
 _TYPES: Mapping[int, tuple[str, str]] = {
     1: ("bool_value", "bool"),
@@ -66,7 +67,7 @@ class ReportedParameter:
     t_ns: int
     node: str
     type: str
-    value: Any
+    value: ParameterValue
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,7 @@ class ParameterSetting:
 
     t_ns: int
     node: str
-    value: Any
+    value: ParameterValue
     answered: bool
     taken: bool
     why: str
@@ -124,7 +125,7 @@ def settings(trace: Trace, name: str, node: str | None = None) -> list[Parameter
     return sorted(found, key=lambda s: s.t_ns)
 
 
-def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> ParameterSetting:
+def _set(call: Call, place: int, parameter: Mapping[str, object]) -> ParameterSetting:
     node = call.request.service.rpartition("/")[0]
     value = _typed(parameter.get("value"))[1]
     if call.response is None:
@@ -136,7 +137,7 @@ def _set(call: Call, place: int, parameter: Mapping[str, Any]) -> ParameterSetti
     return ParameterSetting(call.response.t_ns, node, value, answered=True, taken=taken, why=why)
 
 
-def _typed(value: object) -> tuple[str, Any]:
+def _typed(value: object) -> tuple[str, ParameterValue]:
     if not isinstance(value, Mapping):
         return "", None
     number = value.get("type")
@@ -144,7 +145,7 @@ def _typed(value: object) -> tuple[str, Any]:
     return name, value.get(field)
 
 
-def _list(value: Mapping[str, Any], name: str) -> list[Any]:
+def _list(value: Mapping[str, object], name: str) -> list[object]:
     found = value.get(name)
     return list(found) if isinstance(found, (list, tuple)) else []
 

@@ -124,18 +124,18 @@ def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...
 
 def _held(trace: Trace, topic: str, heard_from_ns: int) -> tuple[Held, ...]:
     sent = delivered_numbers(trace, topic)
-    heard = [r for r in sent if r.t_ns >= heard_from_ns] or sent
+    received = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
-    for reading in heard:
+    for reading in received:
         if not starts or starts[-1].value != reading.value:
             starts.append(reading)
     stops = [*(s.t_ns for s in starts), trace.stop_ns][1:]
     return tuple(Held(start.t_ns, stop, start.value) for start, stop in zip(starts, stops, strict=True))
 
 
-def field(value: Mapping[str, Any], path: str) -> float | None:
+def field(value: Mapping[str, object], path: str) -> float | None:
     """Return the number at a path such as `linear.x`, or None if there is none."""
-    here: Any = value
+    here: object = value
     for name in _names(path):
         if not isinstance(here, (dict, Mapping)) or name not in here:  # the check for dict is much faster
             return None
@@ -148,7 +148,7 @@ def _names(path: str) -> tuple[str, ...]:
     return tuple(path.split("."))
 
 
-def leaves(value: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+def leaves(value: Mapping[str, object], prefix: str = "") -> dict[str, float]:
     """Return every number of a message by path."""
     found: dict[str, float] = {}
     for name, inner in value.items():
@@ -163,13 +163,13 @@ class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never end
     """A value has no field at that path."""
 
 
-def at_path(value: Mapping[str, Any], path: str) -> Any:
+def at_path(value: Mapping[str, object], path: str) -> Any:
     """Return the part of a value at a path; list elements are counted from 0.
 
     Raises:
         NoSuchField: The path does not exist.
     """
-    here: Any = value
+    here: object = value
     for name in _names(path):
         if isinstance(here, Mapping) and name in here:
             here = here[name]
@@ -180,7 +180,7 @@ def at_path(value: Mapping[str, Any], path: str) -> Any:
     return here
 
 
-def value_at(value: Mapping[str, Any], path: str, default: Any = None) -> Any:
+def value_at(value: Mapping[str, object], path: str, default: object = None) -> Any:
     """Return the part of a value at a path, or the default if the path does not exist."""
     try:
         return at_path(value, path)
@@ -188,12 +188,12 @@ def value_at(value: Mapping[str, Any], path: str, default: Any = None) -> Any:
         return default
 
 
-def number_at(value: Mapping[str, Any], path: str) -> float | None:
+def number_at(value: Mapping[str, object], path: str) -> float | None:
     """Return the number at a path, or None if there is none."""
     return as_number(value_at(value, path))
 
 
-def text_at(value: Mapping[str, Any], path: str) -> str | None:
+def text_at(value: Mapping[str, object], path: str) -> str | None:
     """Return the text at a path, or None if there is none."""
     found = value_at(value, path)
     return found if isinstance(found, str) else None
@@ -289,19 +289,19 @@ def as_rule(rule: RuleOrValue, tolerance: float = 1e-6) -> FieldRule:
     return rule if isinstance(rule, FieldRule) else FieldRule(equals=rule, tolerance=tolerance)
 
 
-def broken_rules(value: Mapping[str, Any], rules: Mapping[str, RuleOrValue], tolerance: float = 1e-6) -> list[str]:
+def broken_rules(value: Mapping[str, object], rules: Mapping[str, RuleOrValue], tolerance: float = 1e-6) -> list[str]:
     """Return the paths whose rules a value breaks, in order; the tolerance applies to plain expected values."""
     return [path for path, rule in rules.items() if not _keeps(value, path, as_rule(rule, tolerance))]
 
 
-def _keeps(value: Mapping[str, Any], path: str, rule: FieldRule) -> bool:
+def _keeps(value: Mapping[str, object], path: str, rule: FieldRule) -> bool:
     try:
         return rule.allows(at_path(value, path))
     except NoSuchField:
         return False
 
 
-def breach(value: Mapping[str, Any], path: str, rule: RuleOrValue) -> str:
+def breach(value: Mapping[str, object], path: str, rule: RuleOrValue) -> str:
     """Return the found and the expected value at a path, as a clause."""
     try:
         found = f"{path} is {shown(at_path(value, path))}"

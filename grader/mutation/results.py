@@ -24,7 +24,7 @@ class Fate(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class ResultRank:
+class TrialResult:
     """The result of grading a program by a rubric.
 
     Attributes:
@@ -62,9 +62,9 @@ class ResultRank:
         return Fate.SURVIVED if self.decided else Fate.UNDECIDED
 
 
-def standing_of(report: ExerciseReport) -> ResultRank:
+def result_of(report: ExerciseReport) -> TrialResult:
     """Extract the result of a program from its report."""
-    return ResultRank(
+    return TrialResult(
         score=report.score,
         max_score=report.max_score,
         outcomes={verdict.id: verdict.outcome for verdict in report.verdicts},
@@ -81,7 +81,7 @@ class Trial:
         file: Name of the changed file.
         operator: The operator that changed it.
         change: The change in one line.
-        standing: The result of grading it.
+        result: The result of grading it.
         expected: Criteria one of which should detect it, according to the notes; empty if not given.
         because: The explanation in the notes of why a mutant survives or a variant loses points.
     """
@@ -90,19 +90,19 @@ class Trial:
     file: str
     operator: str
     change: str
-    standing: ResultRank
+    result: TrialResult
     expected: tuple[str, ...] = ()
     because: str = ""
 
     @property
     def fate(self) -> Fate:
         """The fate of the mutant."""
-        return self.standing.fate
+        return self.result.fate
 
     @property
     def as_expected(self) -> bool:
         """Whether an expected criterion detected it; any criterion if none are expected."""
-        return self.fate is Fate.KILLED and (not self.expected or bool(set(self.expected) & set(self.standing.turned)))
+        return self.fate is Fate.KILLED and (not self.expected or bool(set(self.expected) & set(self.result.turned)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +128,8 @@ class SelftestResult:
     rubric: str
     exercise: str
     criteria: tuple[str, ...]
-    reference: ResultRank
-    template: ResultRank | None
+    reference: TrialResult
+    template: TrialResult | None
     baseline: Fraction | None
     mutants: tuple[Trial, ...]
     variants: tuple[Trial, ...]
@@ -157,7 +157,7 @@ class SelftestResult:
     @property
     def never_turned(self) -> tuple[str, ...]:
         """Criteria that detected no mutant, without an explanation; empty if only some mutants were run."""
-        turned = {id_ for trial in self.mutants for id_ in trial.standing.turned}
+        turned = {id_ for trial in self.mutants for id_ in trial.result.turned}
         return (
             tuple(id_ for id_ in self.criteria if id_ not in turned and id_ not in self.unturned) if self.whole else ()
         )

@@ -29,7 +29,7 @@ from grader.mutation.explained import Explained, Explanation, beside, idle, read
 from grader.mutation.operators.mutants import mutants_of
 from grader.mutation.operators.program import Program
 from grader.mutation.operators.variants import variants_of
-from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial, one_line_change, standing_of
+from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of
 from grader.submissions.sources import read_sources
 from grader.submissions.submission import stage_submission
 
@@ -63,24 +63,24 @@ class TrialRunner:
     traces: dict[str, Trace] = field(default_factory=dict)
     recordings: int = 0
 
-    def measure_reference(self) -> ResultRank:
+    def measure_reference(self) -> TrialResult:
         """Grade the reference solution, and keep its traces."""
-        standing, self.traces = self._recorded(self.reference)
-        return standing
+        result, self.traces = self._recorded(self.reference)
+        return result
 
-    def standing(self, submission: Submission) -> ResultRank:
+    def grade(self, submission: Submission) -> TrialResult:
         """Grade a complete submission."""
         return self._recorded(submission)[0]
 
-    def _recorded(self, submission: Submission) -> tuple[ResultRank, dict[str, Trace]]:
+    def _recorded(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
         jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
         sources = read_sources(submission)
-        return standing_of(judge_exercise(self.exercise, traces, submission, sources)), traces
+        return result_of(judge_exercise(self.exercise, traces, submission, sources)), traces
 
-    def standings(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, ResultRank]]:
+    def grade_changed(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, TrialResult]]:
         """Grade changed programs; scenarios without the changed file reuse the traces of the reference."""
         done, waiting = 0, iter(candidates)
         at_once = _AT_ONCE * self.workers
@@ -105,9 +105,9 @@ class TrialRunner:
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
-    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> ResultRank:
+    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> TrialResult:
         sources = {**self.sources, candidate.file: candidate.source}
-        return standing_of(judge_exercise(self.exercise, {**self.traces, **own}, submission, sources))
+        return result_of(judge_exercise(self.exercise, {**self.traces, **own}, submission, sources))
 
     def _staged(self, candidate: Candidate, root: Path) -> Submission:
         found = self.reference.files[candidate.file].found or candidate.file
@@ -166,8 +166,10 @@ def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progre
 
 def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Explained]:
     (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
-    said = read_explained(beside(path), exercise)
-    explained = replace(said, reference=options.reference or said.reference, template=options.template or said.template)
+    known = read_explained(beside(path), exercise)
+    explained = replace(
+        known, reference=options.reference or known.reference, template=options.template or known.template
+    )
     if explained.reference is None:
         hint = f"name it with --reference FOLDER, or as `reference:` in {beside(path).name}"
         raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)
@@ -226,7 +228,7 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
     reference = bench.measure_reference()
     template = None
     if explained.template is not None:
-        template = bench.standing(_staged(explained.template, exercise, bench.session, "template"))
+        template = bench.grade(_staged(explained.template, exercise, bench.session, "template"))
     # Without a correct program, results of wrong ones are meaningless.
     tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
     correct = tuple(_variants(bench, explained, options)) if reference.full else ()
@@ -252,10 +254,10 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
     """Run the selected mutants."""
     found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
     wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
-    for candidate, standing in bench.standings(
+    for candidate, result in bench.grade_changed(
         _sampled(wanted, options.sample, options.seed or 0), f"{bench.exercise.id}: mutant"
     ):
-        trial = _trial(candidate, standing, bench)
+        trial = _trial(candidate, result, bench)
         because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
         expected = _first(explained.expected, trial.id)
         yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
@@ -267,15 +269,15 @@ def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions
     wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
     chosen = _sampled(wanted, most, options.seed or 0)
-    for candidate, standing in bench.standings(chosen, f"{bench.exercise.id}: variant"):
-        trial = _trial(candidate, standing, bench)
+    for candidate, result in bench.grade_changed(chosen, f"{bench.exercise.id}: variant"):
+        trial = _trial(candidate, result, bench)
         because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
         yield replace(trial, because=because.because if because else "")
 
 
-def _trial(candidate: Candidate, standing: ResultRank, bench: TrialRunner) -> Trial:
+def _trial(candidate: Candidate, result: TrialResult, bench: TrialRunner) -> Trial:
     change = one_line_change(bench.sources[candidate.file], candidate.source)
-    return Trial(candidate.id, candidate.file, candidate.operator, change, standing)
+    return Trial(candidate.id, candidate.file, candidate.operator, change, result)
 
 
 def _wanted(id_: str, options: SelftestOptions) -> bool:
@@ -305,7 +307,7 @@ def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Tri
     survived = [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]
     lost = [trial.id for trial in variants if trial.fate is Fate.KILLED]
     every = [trial.id for trial in mutants]
-    turned = {id_ for trial in mutants for id_ in trial.standing.turned}
+    turned = {id_ for trial in mutants for id_ in trial.result.turned}
     return (
         *idle(explained.survivors, lambda e: any(map(e.fits, survived))),
         *idle(explained.expected, lambda e: any(map(e.fits, every))),

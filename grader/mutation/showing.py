@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from io import StringIO
-from typing import Any
 
 from rich.console import Console
 from rich.padding import Padding
@@ -13,7 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial
+from grader.core.json_values import JsonObject
+from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult
 from grader.reporting.escape import shown, valid_unicode
 
 SCHEMA = "grader/selftest/v1"
@@ -49,10 +50,10 @@ def render_results(results: Sequence[SelftestResult], *, width: int, colour: boo
 def _result(console: Console, result: SelftestResult) -> None:
     verdict = Text("no hole found" if result.passed else "HAS HOLES", style=_GOOD if result.passed else _BAD)
     console.print(Text(f"{shown(result.exercise)} ({shown(result.rubric)}): ").append(verdict))
-    console.print(f"  reference  {_standing(result.reference)}", style="" if result.reference.full else _BAD)
+    console.print(f"  reference  {_score(result.reference)}", style="" if result.reference.full else _BAD)
     if result.template is not None:
-        said = "" if result.baseline is None else f", expected {_points(result.baseline)}"
-        console.print(f"  template   {_standing(result.template)}{said}", style="" if result.template_fits else _BAD)
+        expected = "" if result.baseline is None else f", expected {_points(result.baseline)}"
+        console.print(f"  template   {_score(result.template)}{expected}", style="" if result.template_fits else _BAD)
     if not result.reference.full:
         console.print("  mutants    none tried: first the reference has to score full")
         _reasons(console, result.reference)
@@ -96,14 +97,14 @@ def _operators(result: SelftestResult) -> Table:
     for name in dict.fromkeys(trial.operator for trial in result.mutants):
         own = [trial for trial in result.mutants if trial.operator == name]
         killed = [trial for trial in own if trial.fate is Fate.KILLED]
-        said = [trial for trial in killed if trial.expected]
-        right = sum(trial.as_expected for trial in said)
+        predicted = [trial for trial in killed if trial.expected]
+        right = sum(trial.as_expected for trial in predicted)
         survived = sum(trial.fate is Fate.SURVIVED and not trial.because for trial in own)
         row = [
             len(own),
             len(killed),
             right,
-            len(said) - right,
+            len(predicted) - right,
             sum(bool(t.because) for t in own),
             _undecided(own),
             survived,
@@ -116,11 +117,11 @@ def _criteria(result: SelftestResult) -> Table:
     """Build the table with a row for each criterion."""
     table = _table("criterion", "turned by", "alone", "expected", "of these turned", "")
     for id_ in result.criteria:
-        turned = [trial for trial in result.mutants if id_ in trial.standing.turned]
-        alone = sum(trial.standing.turned == (id_,) for trial in turned)
+        turned = [trial for trial in result.mutants if id_ in trial.result.turned]
+        alone = sum(trial.result.turned == (id_,) for trial in turned)
         meant = [trial for trial in result.mutants if id_ in trial.expected]
         never = "NEVER TURNED" if id_ in result.never_turned else ""
-        row = (len(turned), alone, len(meant), sum(id_ in trial.standing.turned for trial in meant))
+        row = (len(turned), alone, len(meant), sum(id_ in trial.result.turned for trial in meant))
         table.add_row(id_, *(str(number or "") for number in row), never, style=_BAD if never else "")
     return table
 
@@ -145,14 +146,14 @@ def _listed(console: Console, title: str, trials: Iterable[Trial], style: str) -
         if trial.because:
             _put(console, 4, f"because {shown(trial.because, limit=600)}")
         elif trial.fate is not Fate.SURVIVED:
-            _reasons(console, trial.standing)
+            _reasons(console, trial.result)
         if trial.expected and not trial.as_expected:
             _put(console, 4, f"expected {' or '.join(trial.expected)}")
 
 
-def _reasons(console: Console, standing: ResultRank) -> None:
-    for id_, reason in standing.reasons.items():
-        if standing.outcomes[id_] is not Outcome.BLOCKED:
+def _reasons(console: Console, result: TrialResult) -> None:
+    for id_, reason in result.reasons.items():
+        if result.outcomes[id_] is not Outcome.BLOCKED:
             _put(console, 4, f"{id_}: {shown(reason, limit=300)}")
 
 
@@ -160,11 +161,11 @@ def _put(console: Console, indent: int, text: str, style: str = "") -> None:
     console.print(Padding(Text(text, style=style), (0, 0, 0, indent), expand=False))
 
 
-def _standing(standing: ResultRank) -> str:
-    return f"{_points(standing.score)}/{_points(standing.max_score)}"
+def _score(result: TrialResult) -> str:
+    return f"{_points(result.score)}/{_points(result.max_score)}"
 
 
-def _points(points: Any) -> str:
+def _points(points: Fraction) -> str:
     return f"{round(float(points), 3):g}"
 
 
@@ -178,17 +179,17 @@ def results_to_json(results: Sequence[SelftestResult]) -> str:
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
 
 
-def _as_data(result: SelftestResult) -> Mapping[str, Any]:
+def _as_data(result: SelftestResult) -> JsonObject:
     return {
         "rubric": valid_unicode(result.rubric),
         "exercise": result.exercise,
         "passed": result.passed,
         "whole": result.whole,
-        "reference": _standing_data(result.reference),
-        "template": None if result.template is None else _standing_data(result.template),
+        "reference": _result_data(result.reference),
+        "template": None if result.template is None else _result_data(result.template),
         "template_expected": None if result.baseline is None else float(result.baseline),
         "criteria": [
-            {"id": id_, "turned_by": sum(id_ in t.standing.turned for t in result.mutants)} for id_ in result.criteria
+            {"id": id_, "turned_by": sum(id_ in t.result.turned for t in result.mutants)} for id_ in result.criteria
         ],
         "never_turned": list(result.never_turned),
         "unturned_because": {id_: valid_unicode(because) for id_, because in result.unturned.items()},
@@ -200,24 +201,24 @@ def _as_data(result: SelftestResult) -> Mapping[str, Any]:
     }
 
 
-def _trial_data(trial: Trial) -> Mapping[str, Any]:
+def _trial_data(trial: Trial) -> JsonObject:
     return {
         "id": valid_unicode(trial.id),
         "file": valid_unicode(trial.file),
         "operator": trial.operator,
         "change": valid_unicode(trial.change),
         "fate": trial.fate.value,
-        "killed_by": list(trial.standing.turned),
+        "killed_by": list(trial.result.turned),
         "expected": list(trial.expected),
         "because": valid_unicode(trial.because),
-        **_standing_data(trial.standing),
+        **_result_data(trial.result),
     }
 
 
-def _standing_data(standing: ResultRank) -> Mapping[str, Any]:
+def _result_data(result: TrialResult) -> JsonObject:
     return {
-        "score": float(standing.score),
-        "max_score": float(standing.max_score),
-        "outcomes": {id_: outcome.value for id_, outcome in standing.outcomes.items()},
-        "reasons": {id_: valid_unicode(reason) for id_, reason in standing.reasons.items()},
+        "score": float(result.score),
+        "max_score": float(result.max_score),
+        "outcomes": {id_: outcome.value for id_, outcome in result.outcomes.items()},
+        "reasons": {id_: valid_unicode(reason) for id_, reason in result.reasons.items()},
     }

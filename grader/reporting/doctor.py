@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
-from typing import Any
 
 from rich.text import Text
 
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.json_values import JsonObject
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
 from grader.reporting.escape import json_value, shown
@@ -59,7 +59,7 @@ def _head(page: Page, checkup: Checkup) -> None:
     for problem in checkup.problems:
         page.put(shown(problem.value), prefix=f"  {problem.name}: ", indent=4)
         if problem.remedy:
-            page.put(shown(problem.remedy), prefix=Text("    mend: ", style="bold"), indent=6)
+            page.put(shown(problem.remedy), prefix=Text("    fix: ", style="bold"), indent=6)
 
 
 def _title(page: Page, text: str) -> None:
@@ -75,12 +75,12 @@ def _fact(page: Page, fact: Fact) -> None:
 
 
 def _remedy(page: Page, remedy: str, column: int) -> None:
-    page.put(shown(remedy), prefix=f"  {'':{column}}mend: ", indent=6)
+    page.put(shown(remedy), prefix=f"  {'':{column}}fix: ", indent=6)
 
 
 def _exchange(page: Page, exchange: Exchange) -> None:
     outcome = Text("works" if exchange.succeeded else "FAILS", style=_GOOD if exchange.succeeded else _BAD)
-    where = "without a sandbox" if exchange.tier == NO_WALLS else f"in {exchange.tier}"
+    where = "without a sandbox" if exchange.tier == NO_SANDBOX else f"in {exchange.tier}"
     found = f"{exchange.arrived} of {exchange.expected} messages of a trial node {where} arrived, "
     page.put(f"{found}{exchange.took_s:.1f} s with all preparations", prefix=Text("  ").append(outcome).append("  "))
     if exchange.problem:
@@ -93,7 +93,7 @@ def _tier(page: Page, tier: TierReport, *, used: bool) -> None:
         page.put("holds; grading uses it", prefix=head, style=_GOOD)
     elif tier.usable:
         page.put("holds", prefix=head)
-    elif tier.name == NO_WALLS:
+    elif tier.name == NO_SANDBOX:
         page.put("no sandbox at all; only with --isolation none", prefix=head, style=_QUIET)
     else:
         page.put(f"not here: {_why(tier)}", prefix=head)
@@ -121,7 +121,7 @@ def _matrix(page: Page, checkup: Checkup) -> None:
         by = _mechanism(tried, checkup.used, name)
         page.put(Text(meaning).append(f" ({shown(by)})" if by else "", style=_QUIET), prefix=row, indent=6)
     for tier in tried:
-        if tier.name != NO_WALLS:
+        if tier.name != NO_SANDBOX:
             for found in _open(tier):
                 page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
 
@@ -169,11 +169,11 @@ def checkup_to_json(checkup: Checkup) -> str:
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
-def _facts(facts: Sequence[Fact]) -> list[dict[str, Any]]:
+def _facts(facts: Sequence[Fact]) -> list[JsonObject]:
     return [{"name": f.name, "value": f.value, "fits": f.fits, "remedy": f.remedy or None} for f in facts]
 
 
-def _exchange_json(exchange: Exchange) -> dict[str, Any]:
+def _exchange_json(exchange: Exchange) -> JsonObject:
     return {
         "succeeded": exchange.succeeded,
         "isolation": exchange.tier,
@@ -184,7 +184,7 @@ def _exchange_json(exchange: Exchange) -> dict[str, Any]:
     }
 
 
-def _tier_json(tier: TierReport) -> dict[str, Any]:
+def _tier_json(tier: TierReport) -> JsonObject:
     return {
         "name": tier.name,
         "tier": tier.tier,

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
 
 from grader.core.exercise import Audience
 from grader.core.report import Report
@@ -21,24 +20,24 @@ class PageLayout:
     colour: bool
 
 
-def _nothing(report: Report, layout: PageLayout) -> Mapping[str, Any]:
+def _nothing(report: Report, layout: PageLayout) -> Mapping[str, object]:
     del report, layout
     return {}
 
 
-def _layout(report: Report, layout: PageLayout) -> Mapping[str, Any]:
+def _layout(report: Report, layout: PageLayout) -> Mapping[str, object]:
     del report
     return {"width": layout.width, "colour": layout.colour}
 
 
-def _folder(report: Report, layout: PageLayout) -> Mapping[str, Any]:
+def _folder(report: Report, layout: PageLayout) -> Mapping[str, object]:
     from grader.reporting.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
 
     del layout
     return {"folder": repository_folder(report.path, os.environ)}
 
 
-def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
+def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, object]:
     from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
 
     del report, layout
@@ -63,12 +62,12 @@ class Format:
     renderer: str
     suffix: str
     usual: Audience
-    arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing
+    arguments: Callable[[Report, PageLayout], Mapping[str, object]] = _nothing
     withholds: bool = False
     illustrated: bool = False
     written_early: bool = False
 
-    def __call__(self, report: Report, layout: PageLayout, **arguments: Any) -> str:
+    def __call__(self, report: Report, layout: PageLayout, **arguments: object) -> str:
         """Return the text of a report."""
         module, _, function = self.renderer.partition(":")
         text: str = getattr(import_module(f"grader.reporting.{module}"), function)(

@@ -3,29 +3,86 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping
-from enum import Enum
 from fractions import Fraction
 from importlib.resources import files
-from typing import Any
+from typing import Any, TypedDict
+
+from typing_extensions import NotRequired
 
 from grader.core.checkup import Property, described
-from grader.core.exercise import Location, Variant
+from grader.core.exercise import Location
+from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
-from grader.reporting.escape import command_line, valid_unicode
+from grader.reporting.escape import command_line, json_value, valid_unicode
 
 #: Decimal places of every score and duration.
 DIGITS = 6
-# Integers beyond 64 bits are not measurements, and most JSON readers cannot hold them.
-_MOST_BITS = 64
 # Legal inside a JSON string, but a terminal may interpret them: C1 controls, and characters that reorder or hide text.
 _OBEYED_BY_TERMINALS = re.compile("[\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\U000e0000-\U000e007f]")
 
 
-def report_to_json(report: Report) -> dict[str, Any]:
+class CriterionData(TypedDict):
+    """A criterion of a JSON report."""
+
+    id: str
+    title: str
+    outcome: str
+    score: float
+    max_score: float
+    reason: str
+    hint: str | None
+    location: JsonObject | None
+    evidence: Mapping[str, Any]
+    blocked_by: NotRequired[str]
+    same_cause_as: NotRequired[str]
+
+
+class FaultData(TypedDict):
+    """A fault in a JSON report."""
+
+    kind: str
+    file: str
+    line: int
+    text: str
+    t_s: float
+
+
+class ExerciseData(TypedDict):
+    """An exercise of a JSON report."""
+
+    id: str
+    number: str
+    title: str
+    required: bool
+    score: float
+    max_score: float
+    clock: str
+    clock_reason: str | None
+    criteria: list[CriterionData]
+    faults: list[FaultData]
+    notes: list[str]
+    starts: NotRequired[list[JsonObject]]
+    variant: NotRequired[JsonObject]
+
+
+class ReportData(TypedDict):
+    """A JSON report, as written here and as read back."""
+
+    schema: str
+    submission: JsonObject
+    environment: JsonObject
+    score: float
+    max_score: float
+    final: bool
+    duration_s: float
+    exercises: list[ExerciseData]
+    reproduce: JsonObject
+
+
+def report_to_json(report: Report) -> ReportData:
     """Return a report as plain JSON values, keys in the order of the format."""
     return {
         "schema": SCHEMA,
@@ -62,7 +119,7 @@ def dumps(report: Report) -> str:
     return json_text(report_to_json(report))
 
 
-def json_text(values: Mapping[str, Any]) -> str:
+def json_text(values: Mapping[str, object]) -> str:
     """Return plain JSON values as text in the way of `dumps`; platform formats use it too."""
     text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
     return _OBEYED_BY_TERMINALS.sub(lambda match: json.dumps(match.group())[1:-1], text) + "\n"
@@ -75,12 +132,12 @@ def report_schema() -> dict[str, Any]:
     return schema
 
 
-def _property(found: Property) -> dict[str, Any]:
+def _property(found: Property) -> JsonObject:
     return {"name": found.name, "holds": found.holds, "mechanism": found.mechanism, "found": found.found}
 
 
-def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
-    return {
+def _exercise(exercise: ExerciseReport, report: Report) -> ExerciseData:
+    data: ExerciseData = {
         "id": exercise.id,
         "number": exercise.number,
         "title": valid_unicode(exercise.title),
@@ -92,14 +149,17 @@ def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
         "criteria": [_criterion(verdict) for verdict in exercise.verdicts],
         "faults": [_fault(fault) for fault in exercise.faults],
         "notes": _notes(exercise, report),
-        **_starts(exercise),
-        **_variant(exercise.variant),
     }
+    if exercise.starts:
+        data["starts"] = _starts(exercise)
+    if (variant := exercise.variant) is not None:
+        data["variant"] = {"student": valid_unicode(variant.student), "values": json_value(dict(variant.values))}
+    return data
 
 
-def _starts(exercise: ExerciseReport) -> dict[str, Any]:
-    """Return how each file was started, where that is known."""
-    starts = [
+def _starts(exercise: ExerciseReport) -> list[JsonObject]:
+    """Return how each file was started."""
+    return [
         {
             "process": valid_unicode(start.process),
             "file": valid_unicode(start.file),
@@ -109,14 +169,6 @@ def _starts(exercise: ExerciseReport) -> dict[str, Any]:
         }
         for start in exercise.starts
     ]
-    return {"starts": starts} if starts else {}
-
-
-def _variant(variant: Variant | None) -> dict[str, Any]:
-    """Return the values of this student's variant, if the rubric has variants."""
-    if variant is None:
-        return {}
-    return {"variant": {"student": valid_unicode(variant.student), "values": _plain(dict(variant.values))}}
 
 
 def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
@@ -126,9 +178,8 @@ def _notes(exercise: ExerciseReport, report: Report) -> list[str]:
     return list(dict.fromkeys(valid_unicode(note) for note in notes))
 
 
-def _criterion(verdict: Verdict) -> dict[str, Any]:
-    links = {"blocked_by": verdict.blocked_by, "same_cause_as": verdict.same_cause_as}
-    return {
+def _criterion(verdict: Verdict) -> CriterionData:
+    data: CriterionData = {
         "id": verdict.id,
         "title": valid_unicode(verdict.title),
         "outcome": verdict.outcome.value,
@@ -137,16 +188,20 @@ def _criterion(verdict: Verdict) -> dict[str, Any]:
         "reason": valid_unicode(verdict.reason),
         "hint": valid_unicode(verdict.hint) or None,
         "location": _location(verdict.location),
-        "evidence": _plain(verdict.evidence),
-        **{name: id_ for name, id_ in links.items() if id_},
+        "evidence": json_value(verdict.evidence),
     }
+    if verdict.blocked_by:
+        data["blocked_by"] = verdict.blocked_by
+    if verdict.same_cause_as:
+        data["same_cause_as"] = verdict.same_cause_as
+    return data
 
 
-def _location(location: Location | None) -> dict[str, Any] | None:
+def _location(location: Location | None) -> JsonObject | None:
     return None if location is None else {"file": valid_unicode(location.file), "line": location.line}
 
 
-def _fault(fault: ReportedFault) -> dict[str, Any]:
+def _fault(fault: ReportedFault) -> FaultData:
     return {
         "kind": fault.kind,
         "file": valid_unicode(fault.file),
@@ -160,24 +215,3 @@ def _number(value: Fraction | float) -> int | float:
     """Return a whole number as an int, and any other number rounded."""
     rounded = round(float(value), DIGITS)
     return int(rounded) if rounded.is_integer() else rounded
-
-
-def _plain(value: object) -> Any:
-    """Return evidence as JSON values; what JSON cannot represent becomes text."""
-    if isinstance(value, Mapping):
-        return {valid_unicode(str(key)): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, Enum):
-        return _plain(value.value)
-    if value is None or isinstance(value, bool):
-        return value
-    return _plain_number(value) if isinstance(value, (int, float, Fraction)) else valid_unicode(str(value))
-
-
-def _plain_number(value: float | Fraction) -> int | float | str:
-    if isinstance(value, Fraction):
-        return _number(value)
-    if isinstance(value, float):
-        return value if math.isfinite(value) else str(value)
-    return value if value.bit_length() <= _MOST_BITS else f"an integer of {value.bit_length()} bits"

@@ -122,11 +122,11 @@ def _explanation(verdict: Verdict, detail: Detail) -> str:
 
 
 def _fault(fault: ReportedFault, detail: Detail) -> str:
-    said = f"- fault: {markdown(wording.happened(fault))}: {markdown_code(fault.text, limit=detail.text)}\n"
+    item = f"- fault: {markdown(wording.happened(fault))}: {markdown_code(fault.text, limit=detail.text)}\n"
     if not (detail.frames and fault.frames):
-        return said
+        return item
     block = markdown_block("\n".join(wording.frames(fault.frames)))
-    return said + "\n" + "\n".join(f"  {line}" for line in block.split("\n")) + "\n"
+    return item + "\n" + "\n".join(f"  {line}" for line in block.split("\n")) + "\n"
 
 
 def _notes(notes: Sequence[str], detail: Detail) -> list[str]:

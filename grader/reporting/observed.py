@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import Any
 
+from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
 from grader.core.report import Summary, TopicSummary
 from grader.core.trace import Endpoint, Fault, LogRecord, OutputLine
-from grader.reporting.escape import shown, valid_unicode
+from grader.reporting.escape import json_value, shown
 from grader.reporting.graph import draw_graph
 
 SCHEMA = "grader/observation/v1"
@@ -108,7 +108,7 @@ def _fault(fault: Fault) -> Iterator[str]:
 
 def summary_to_json(summary: Summary) -> str:
     """Return a summary as JSON text; times are in seconds."""
-    data: dict[str, Any] = {
+    data: JsonObject = {
         "schema": SCHEMA,
         "processes": list(summary.processes),
         "starts": [
@@ -157,10 +157,10 @@ def summary_to_json(summary: Summary) -> str:
         ],
         "notes": list(summary.notes),
     }
-    return json.dumps(_valid(data), indent=2, allow_nan=False) + "\n"
+    return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
-def _topic_json(topic: TopicSummary) -> dict[str, Any]:
+def _topic_json(topic: TopicSummary) -> JsonObject:
     pace = topic.pace
     return {
         "name": topic.name,
@@ -177,14 +177,5 @@ def _topic_json(topic: TopicSummary) -> dict[str, Any]:
     }
 
 
-def _end_json(end: Endpoint) -> dict[str, Any]:
+def _end_json(end: Endpoint) -> JsonObject:
     return {"node": end.node, "type": end.type, "reliability": end.reliability, "durability": end.durability}
-
-
-def _valid(value: Any) -> Any:
-    """Return JSON values without lone surrogates in their text."""
-    if isinstance(value, str):
-        return valid_unicode(value)
-    if isinstance(value, dict):
-        return {valid_unicode(key): _valid(field) for key, field in value.items()}
-    return [_valid(field) for field in value] if isinstance(value, list) else value

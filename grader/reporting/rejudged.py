@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from grader.reporting.escape import shown
+from grader.reporting.json_report import ReportData
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class ReportChange:
         return round(_share(self.after, self.after_max) - _share(self.before, self.before_max), 9)
 
 
-def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> ReportChange:
+def change(name: str, before: ReportData, after: ReportData) -> ReportChange:
     """Compare two JSON reports, for the exercises in the second one.
 
     Raises:
@@ -88,7 +88,7 @@ def dropped_first(changes: Sequence[ReportChange]) -> list[ReportChange]:
     return sorted((c for c in changes if c.criteria), key=lambda c: (c.share_gain, c.gain, c.name))
 
 
-def _standings(report: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], ReportStanding]]:
+def _standings(report: ReportData) -> Iterator[tuple[tuple[str, str], ReportStanding]]:
     for exercise in report["exercises"]:
         for row in exercise["criteria"]:
             standing = ReportStanding(
@@ -101,8 +101,7 @@ def _mark(standing: ReportStanding | None) -> tuple[str, float, float] | None:
     return None if standing is None else (standing.outcome, standing.score, standing.max_score)
 
 
-def _sums(standings: Any) -> tuple[float, float]:
-    rows = list(standings)
+def _sums(rows: Collection[ReportStanding]) -> tuple[float, float]:
     return round(sum(r.score for r in rows), 6), round(sum(r.max_score for r in rows), 6)
 
 
@@ -158,7 +157,7 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
 def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
     """Return a class as JSON text: every report, or with `changes` the changes, losses first."""
     judged = [r for r in results if not r.problem]
-    data: dict[str, Any] = {"schema": SCHEMA}
+    data: dict[str, object] = {"schema": SCHEMA}
     if changes:
         ordered = dropped_first([r.change for r in judged if r.change is not None])
         data["changed"] = [{**asdict(c), "gain": c.gain} for c in ordered]
@@ -171,11 +170,11 @@ def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
 
 
 def _change(change: ReportChange) -> Iterator[str]:
-    of, said = _points(change.after_max), f"{_signed(change.gain)} points"
+    of, gained = _points(change.after_max), f"{_signed(change.gain)} points"
     if change.before_max != change.after_max:
         of += f" (of {_points(change.before_max)} before)"
-        said += f", {_signed(100 * change.share_gain)} % of all"
-    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {said}"
+        gained += f", {_signed(100 * change.share_gain)} % of all"
+    yield f"{_name(change.name)}: {_points(change.before)} -> {_points(change.after)} of {of}: {gained}"
     for row in change.criteria:
         yield f"    {shown(row.exercise)}/{shown(row.criterion)}: {_row(row)}"
 

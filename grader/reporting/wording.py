@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import floor
 
-from grader.core.checkup import NO_WALLS, summarised
+from grader.core.checkup import NO_SANDBOX, summarised
 from grader.core.exercise import Outcome, exercise_name
 from grader.core.quantities import seconds
 from grader.core.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
@@ -65,12 +65,12 @@ def exercise_line(exercise: ExerciseReport) -> str:
 
 def warnings(report: Report) -> list[str]:
     """Return warnings that belong to the score: the report is partial or not final, or there was no sandbox."""
-    said = [_partial(report)] if report.pending else []
+    lines = [_partial(report)] if report.pending else []
     judged = [verdict for e in report.exercises if e.id not in report.pending for verdict in e.verdicts]
     undecided = [verdict for verdict in judged if verdict.outcome is Outcome.UNDECIDED]
     if undecided:
-        said.append(_not_final(undecided))
-    return said
+        lines.append(_not_final(undecided))
+    return lines
 
 
 def summary(report: Report) -> str:
@@ -89,13 +89,13 @@ def reason(verdict: Verdict) -> str:
 
 def explanation(verdict: Verdict) -> list[str]:
     """Return the reason, the hint and the place of a verdict; each safe to show as a line of text."""
-    said = [shown(reason(verdict))]
+    lines = [shown(reason(verdict))]
     if verdict.hint:
-        said.append(f"hint: {shown(verdict.hint)}")
+        lines.append(f"hint: {shown(verdict.hint)}")
     if verdict.location is not None:
         where = place(verdict.location.file, verdict.location.line)
-        said += [f"at {where}"] if where not in said[0] else []
-    return said
+        lines += [f"at {where}"] if where not in lines[0] else []
+    return lines
 
 
 def opening(report: Report) -> list[str]:
@@ -126,6 +126,15 @@ def ending(report: Report) -> list[str]:
     """Return the lines that help to reproduce the report, the command last; each safe to show as a line of text."""
     rows = [f"{name}: {value}" for name, value in reproduction(report)]
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
+
+
+def overview(report: Report) -> list[str]:
+    """Return the whole report but its criteria, for a platform that shows these as tests."""
+    lines = [*opening(report), run_line(report)]
+    for exercise in report.exercises:
+        found = remarks(exercise)
+        lines += ["", exercise_line(exercise), *found] if found else []
+    return [*lines, "", *ending(report)]
 
 
 def _capped(lines: list[str], most: int, what: str) -> list[str]:
@@ -166,11 +175,11 @@ def versions(report: Report) -> str:
 
 def clock(report: Report) -> str:
     """Return which clock the nodes ran on."""
-    walls = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
-    if not walls:
+    on_wall = [exercise.number for exercise in report.exercises if exercise.clock is ClockKind.WALL]
+    if not on_wall:
         return "virtual"
-    first = exercise_name(walls[0]).replace("Exercise", "exercise", 1)
-    return f"virtual, but the wall clock in {', '.join([first, *walls[1:]])}"
+    first = exercise_name(on_wall[0]).replace("Exercise", "exercise", 1)
+    return f"virtual, but the wall clock in {', '.join([first, *on_wall[1:]])}"
 
 
 def isolation(report: Report) -> str:
@@ -180,7 +189,7 @@ def isolation(report: Report) -> str:
 
 def ran_without_sandbox(report: Report) -> bool:
     """Return whether the student's code ran without a sandbox."""
-    return report.environment.isolation == NO_WALLS
+    return report.environment.isolation == NO_SANDBOX
 
 
 def run_line(report: Report) -> str:

@@ -73,8 +73,8 @@ def _header(path: Path) -> Header:
     """Read the header of a built-in rubric, without validating the rest."""
     above, _, _ = path.read_text(encoding="utf-8").partition("\nscenarios:")
     tree: Any = read_yaml(above).data
-    said = tree["exercise"]
-    return Header(path, said["id"], str(said["number"]), said.get("by_request", False))
+    exercise = tree["exercise"]
+    return Header(path, exercise["id"], str(exercise["number"]), exercise.get("by_request", False))
 
 
 def _number_order(number: str) -> list[tuple[int, str]]:

@@ -12,6 +12,7 @@ from functools import lru_cache, partial
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pydantic import AfterValidator, Field, create_model
+from pydantic.config import JsonDict
 
 from grader.core.quantities import DurationNs, Hertz, Kind, Least, Unit
 from grader.rubrics.drawing import Fields, SomeLongTime, SomeTime
@@ -53,7 +54,7 @@ T = TypeVar("T")
 _PREFIX = "p_"
 
 #: Required form of parameters by their name, beyond being text.
-_BY_NAME: Mapping[str, Any] = {
+_BY_NAME: Mapping[str, object] = {
     **dict.fromkeys(
         ("topic", "input", "output", "forward", "back", "service", "action", "publishes", "subscribes"), Topic
     ),
@@ -61,7 +62,7 @@ _BY_NAME: Mapping[str, Any] = {
     "process": PythonFile,
 }
 
-_BY_ANNOTATION: tuple[tuple[Any, Any], ...] = (
+_BY_ANNOTATION: tuple[tuple[object, object], ...] = (
     (DurationNs, Duration),
     (Hertz, Frequency),
     (float, Real),
@@ -69,7 +70,7 @@ _BY_ANNOTATION: tuple[tuple[Any, Any], ...] = (
     (bool, YesNo),
 )
 
-_BY_KIND: Mapping[str, Any] = {
+_BY_KIND: Mapping[str, object] = {
     "topic": Topic,
     "message type": MessageType,
     "service type": ServiceType,
@@ -100,7 +101,7 @@ class _Parameters(Shape):
 
     made: ClassVar[type]
 
-    def built(self) -> Any:
+    def built(self) -> object:
         """Return the dataclass that the mapping describes; omitted fields keep their defaults.
 
         Raises:
@@ -109,19 +110,19 @@ class _Parameters(Shape):
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
         return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
 
-    def _is_given(self, field: dataclasses.Field[Any]) -> bool:
+    def _is_given(self, field: dataclasses.Field[object]) -> bool:
         return _is_required(field) or _PREFIX + field.name in self.model_fields_set
 
 
 def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Choice]:
     """Return the model of a mapping with one key, which selects the dataclass or shape of its value."""
-    shapes: dict[str, Any] = {k: cls if issubclass(cls, Shape) else _parameters(cls) for k, cls in options.items()}
+    shapes = {k: cls if issubclass(cls, Shape) else _parameters(cls) for k, cls in options.items()}
     fields: dict[str, Any] = {f"{_PREFIX}{key}": (shapes[key], Field(default=None, alias=key)) for key in options}
     return create_model(name, __base__=Choice, __doc__=summary, **fields)
 
 
 @lru_cache(maxsize=256)
-def _parameters(cls: Any) -> type[Shape]:
+def _parameters(cls: type) -> type[Shape]:
     """Return the model of a check; its fields have the same names in rubrics as in Python."""
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
@@ -148,7 +149,7 @@ def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usua
         key = aliases.get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
         default = usual.get(key, ... if _is_required(field) else field.default)
         words, least = _mark(hints[field.name], str), _mark(hints[field.name], Least)
-        minimum: Any = {"minimum": least.value} if least and not _mark(hints[field.name], Unit) else None
+        minimum: JsonDict | None = {"minimum": least.value} if least and not _mark(hints[field.name], Unit) else None
         info = Field(default, alias=key, description=words, json_schema_extra=minimum)
         fields[f"{_PREFIX}{field.name}"] = (_accepted(hints[field.name]), info)
     return _model(cls, name, fields)
@@ -161,7 +162,7 @@ def _model(cls: type, name: str, fields: dict[str, Any]) -> type[Shape]:
     return model
 
 
-def _is_required(field: dataclasses.Field[Any]) -> bool:
+def _is_required(field: dataclasses.Field[object]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
+from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
@@ -74,7 +75,8 @@ def _kind(value: object) -> str:
 
 
 if TYPE_CHECKING:
-    FieldValue = Any  # the type checker does not support recursive aliases; pydantic reads the one below
+    # pydantic reads the one below
+    FieldValue = DrawnFieldShape | dict[str, "FieldValue"] | tuple["FieldValue", ...] | str | float
 else:
     FieldValue = TypeAliasType(
         "FieldValue",
@@ -161,7 +163,7 @@ SomeCount = Annotated[
 class InOrderShape(Shape):
     """Cases that follow each other as written, wherever among others they come."""
 
-    in_order: Any
+    in_order: object
 
     def built(self) -> InOrder:
         """Return the cases as a scenario holds them."""
@@ -171,7 +173,7 @@ class InOrderShape(Shape):
 class SomeOfShape(Shape):
     """A number of cases, each one of those listed, drawn from the seed."""
 
-    some_of: Any
+    some_of: object
     count: SomeCount
 
     def built(self) -> SomeOf:
@@ -182,7 +184,7 @@ class SomeOfShape(Shape):
 class AnyOrderShape(Shape):
     """Cases that all come, in an order drawn from the seed."""
 
-    any_order: Any
+    any_order: object
 
     def built(self) -> AnyOrder:
         """Return the cases as a scenario holds them."""
@@ -207,7 +209,7 @@ def _spelt(value: object) -> object:
     return value
 
 
-def cases_model(case: Any, name: str) -> Any:
+def cases_model(case: object, name: str) -> object:
     """Return the model of an entry in a list of cases: one case, or several with an order keyword.
 
     Args:
@@ -225,11 +227,11 @@ def cases_model(case: Any, name: str) -> Any:
     return _one_of({**inner, "<any_order>": any_order})
 
 
-def _one_of(kinds: Mapping[str, Any]) -> Any:
+def _one_of(kinds: Mapping[str, object]) -> object:
     tagged = tuple(Annotated[kind, Tag(tag)] for tag, kind in kinds.items())
     return Annotated[Union[tagged], Discriminator(_kind_of_case), BeforeValidator(_spelt)]  # noqa: UP007
 
 
-def list_of(case: Any) -> Any:
+def list_of(case: object) -> Any:
     """Return the type of a list of cases."""
-    return tuple[case, ...]
+    return GenericAlias(tuple, (case, ...))

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, nearest_position
 from grader.submissions.collected import listed, shown
@@ -62,7 +63,7 @@ def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) 
     return [_mistake(one, tree, model) for one in errors if not _follows_from_another(one, errors)]
 
 
-def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:
+def _follows_from_another(one: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
     """Return whether an error follows from another one: a misspelt key, a list cut short."""
     *parent, name = one["loc"] or ("",)
     if one["type"] == "missing":
@@ -71,7 +72,7 @@ def _follows_from_another(one: Any, errors: Sequence[Any]) -> bool:
     return one["type"] == "too_short" and bool(one["input"])
 
 
-def _mistake(one: Any, tree: YamlTree, model: type[BaseModel]) -> Mistake:
+def _mistake(one: ErrorDetails, tree: YamlTree, model: type[BaseModel]) -> Mistake:
     path, where = nearest_position(tree.values, one["loc"])
     kind, name = one["type"], str(one["loc"][-1]) if one["loc"] else ""
     if kind == "missing":
@@ -96,7 +97,7 @@ def _inside(path: TreePath) -> str:
 
 def _keys(model: type[BaseModel], path: TreePath) -> list[str]:
     """Return the keys that a mapping at a path may have."""
-    inside: Any = model
+    inside: object = model
     for part in path:
         inside = _step(inside, part)
     shape = _shape_in(inside)
@@ -119,7 +120,7 @@ def _shape_in(annotation: object) -> type[BaseModel] | None:
     return shape
 
 
-def _first(annotation: Any, wanted: Callable[[Any], bool]) -> Any:
+def _first(annotation: object, wanted: Callable[[object], bool]) -> Any:
     """Return the first matching part of an annotation, searching from the outside in."""
     if wanted(annotation):
         return annotation

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import date
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, create_model, model_validator
+from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, create_model, model_validator
 from typing_extensions import Self
 
 from grader.core.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
@@ -23,7 +23,7 @@ from grader.core.scenario import (
     Span,
 )
 from grader.rubrics.check_parameters import choice_model, part_model
-from grader.rubrics.drawing import SomeLongTime
+from grader.rubrics.drawing import SomeLongTime, list_of
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.stimuli import ParameterShape, StateShape, TransitionShape
 from grader.rubrics.types import (
@@ -94,11 +94,11 @@ def _until(value: object) -> str:
 
 
 _Words = Annotated[
-    Any, AfterValidator(_shows), WithJsonSchema({"type": "string", "enum": [shows.value for shows in ORDER]})
+    str, PlainValidator(_shows), WithJsonSchema({"type": "string", "enum": [shows.value for shows in ORDER]})
 ]
 _Until = Annotated[
-    Any,
-    AfterValidator(_until),
+    str | None,
+    PlainValidator(_until),
     WithJsonSchema(
         {
             "type": "string",
@@ -203,8 +203,6 @@ def rubric_model(checks: tuple[tuple[str, type], ...]) -> type[RubricShape]:
         checks: Pairs of a check's name and its frozen dataclass, in the order that messages list them.
     """
     check = choice_model("Check", "The question asked of the trace, by the check's name.", dict(checks))
-    criterion: Any = create_model(
-        "Criterion", __base__=CriterionShape, __doc__="One row of a rubric.", check=(check, ...)
-    )
-    criteria = (tuple[criterion, ...], Field(min_length=1))
+    criterion = create_model("Criterion", __base__=CriterionShape, __doc__="One row of a rubric.", check=(check, ...))
+    criteria = (list_of(criterion), Field(min_length=1))
     return create_model("Rubric", __base__=RubricShape, __doc__="A rubric of rclpy-grader.", criteria=criteria)

@@ -171,11 +171,11 @@ def _reduced(value: Any) -> tuple[Any, ...]:
     return _remade, (module.__file__, vars(module)["__content__"], type(value).__qualname__, given)
 
 
-def _remade(path: str, content: bytes, name: str, given: Mapping[str, Any]) -> Any:
+def _remade(path: str, content: bytes, name: str, given: Mapping[str, object]) -> Any:
     return getattr(_module(path, content), name)(**given)
 
 
-def _problems(file: OwnFile, table: Mapping[Any, Any], taken: Mapping[str, type]) -> Iterator[str]:
+def _problems(file: OwnFile, table: Mapping[str, object], taken: Mapping[str, type]) -> Iterator[str]:
     """Yield what prevents the entries of a table from being checks, each with its place."""
     where = shown(str(file.path), 500)
     lines = _lines(file.content)

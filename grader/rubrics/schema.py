@@ -10,6 +10,8 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic.json_schema import JsonSchemaValue
+
 from grader.judging.checks import CHECKS
 from grader.rubrics.model import rubric_model
 from grader.rubrics.variants import REFERENCE
@@ -29,7 +31,7 @@ _FIXED = frozenset({"ExerciseShape", "FeedbackShape", "LimitsShape", "VariantSha
 _FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
 
 
-def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
+def rubric_schema(checks: Mapping[str, type] = CHECKS) -> JsonSchemaValue:
     """Return the JSON Schema (2020-12) of rubric files.
 
     Args:
@@ -46,7 +48,7 @@ def schema_text(checks: Mapping[str, type] = CHECKS) -> str:
     return json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False) + "\n"
 
 
-def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
+def _varying(name: str, node: JsonSchemaValue) -> JsonSchemaValue:
     """Return the definition of a mapping whose values may be variants."""
     if name in _FIXED:
         return node
@@ -57,7 +59,7 @@ def _varying(name: str, node: dict[str, Any]) -> dict[str, Any]:
     return {**node, "properties": free}
 
 
-def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
+def _or_variant(node: JsonSchemaValue) -> JsonSchemaValue:
     """Return a schema of values that also accepts a variant."""
     for word in ("anyOf", "oneOf"):
         if word in node:
@@ -68,7 +70,7 @@ def _or_variant(node: dict[str, Any]) -> dict[str, Any]:
     return {"anyOf": [node, _REFERS]} if _is_scalar(node) else _inside(node)
 
 
-def _inside(node: dict[str, Any]) -> dict[str, Any]:
+def _inside(node: JsonSchemaValue) -> JsonSchemaValue:
     """Return a schema of a list or mapping whose values may be variants."""
     found = dict(node)
     for word in ("items", "additionalProperties"):
@@ -79,7 +81,7 @@ def _inside(node: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _is_scalar(node: dict[str, Any]) -> bool:
+def _is_scalar(node: JsonSchemaValue) -> bool:
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if options:
         return any(map(_is_scalar, options))
@@ -87,7 +89,7 @@ def _is_scalar(node: dict[str, Any]) -> bool:
     return bool({kinds} & _SCALARS if isinstance(kinds, str) else set(kinds) & _SCALARS)
 
 
-def _tidy(node: Any, *, names: bool = False) -> Any:
+def _tidy(node: object, *, names: bool = False) -> Any:
     """Remove details of Python: generated titles, and defaults that a rubric could not write.
 
     Args:
@@ -102,7 +104,7 @@ def _tidy(node: Any, *, names: bool = False) -> Any:
     return {key: _tidy(value, names=not names and key in ("properties", "$defs")) for key, value in kept.items()}
 
 
-def _misleads(key: str, value: object, node: dict[str, Any]) -> bool:
+def _misleads(key: str, value: object, node: JsonSchemaValue) -> bool:
     """Return whether a schema entry describes Python instead of the rubric."""
     if key == "title":
         return isinstance(value, str)

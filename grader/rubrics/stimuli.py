@@ -137,9 +137,9 @@ _PARAMETER_FIELDS: tuple[tuple[type, str, int, int], ...] = (
 )
 
 
-def _parameter_value(value: Any) -> Mapping[str, FieldSpec]:
+def _parameter_value(value: FieldSpec) -> Mapping[str, FieldSpec]:
     several = isinstance(value, tuple)
-    first = value[0] if several and value else value
+    first = value[0] if isinstance(value, tuple) and value else value
     for kind, name, number, list_number in _PARAMETER_FIELDS:
         if isinstance(first, kind):
             field = f"{name}_array_value" if several else f"{name}_value"

@@ -17,6 +17,7 @@ from pydantic import (
     Strict,
     model_validator,
 )
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from typing_extensions import Self
 
@@ -64,7 +65,7 @@ class Choice(Shape):
         return build(self.chosen[1])
 
 
-def build(value: Any) -> Any:
+def build(value: object) -> Any:
     """Return a validated value, and everything inside it, as values for an exercise."""
     if isinstance(value, Shape):
         return value.built()
@@ -91,7 +92,7 @@ class MatchingText:
         """Check the text after its type."""
         return core_schema.no_info_after_validator_function(self._check, core_schema.str_schema(strict=True))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the text to editors."""
         return {"type": "string", "pattern": f"^(?:{self.pattern})$", "examples": [self.example]}
 
@@ -112,7 +113,7 @@ class Quantity:
         """Parse the text instead of pydantic's own validation."""
         return core_schema.no_info_plain_validator_function(self._read)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the text to editors."""
         return {"type": "string", "pattern": quantity_pattern(self.unit), "examples": [quantity_example(self.unit)]}
 
@@ -138,7 +139,7 @@ class PointsRule:
         """Parse the fraction instead of pydantic's own validation."""
         return core_schema.no_info_plain_validator_function(self._read)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe points to editors."""
         fraction = {"type": "string", "pattern": r"^[0-9]+( */ *[1-9][0-9]*|\.[0-9]+)?$", "examples": ["1/3"]}
         return {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, fraction]}
@@ -232,9 +233,9 @@ class _Readable:
         read = _formula if self.is_formula else _pattern
         return core_schema.no_info_after_validator_function(read, core_schema.str_schema(strict=True))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the text to editors."""
-        described: dict[str, Any] = {"type": "string", "examples": [self.example]}
+        described: JsonSchemaValue = {"type": "string", "examples": [self.example]}
         return described if self.is_formula else {**described, "format": "regex"}
 
 

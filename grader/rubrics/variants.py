@@ -9,9 +9,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Protocol
 
-from pydantic import AfterValidator, ConfigDict, WithJsonSchema, model_validator
+from pydantic import AfterValidator, ConfigDict, PlainValidator, WithJsonSchema, model_validator
 from typing_extensions import Self
 
 from grader.core.exercise import Drawn, Value, Variant
@@ -61,17 +61,17 @@ def _amount(value: object) -> object:
     return value
 
 
-_Scalar = Annotated[Any, AfterValidator(_scalar), WithJsonSchema({"type": ["string", "number", "boolean"]})]
-_Amount = Annotated[Any, AfterValidator(_amount), WithJsonSchema({"type": ["string", "number"]})]
+_Scalar = Annotated[Value, PlainValidator(_scalar), WithJsonSchema({"type": ["string", "number", "boolean"]})]
+_Amount = Annotated[Value, PlainValidator(_amount), WithJsonSchema({"type": ["string", "number"]})]
 
 
-def _several(values: tuple[Any, ...]) -> tuple[Any, ...]:
+def _several(values: tuple[Value, ...]) -> tuple[Value, ...]:
     if len({(type(value), value) for value in values}) < max(2, len(values)):
         raise wrong("two or more different values")
     return values
 
 
-def _two(values: tuple[Any, ...]) -> tuple[Any, ...]:
+def _two(values: tuple[Value, ...]) -> tuple[Value, ...]:
     if len(values) != 2:
         raise wrong("two numbers, the lower one first")
     return values
@@ -136,8 +136,7 @@ class VariantOptions:
     def value(self, index: int) -> Value:
         """Return the value with the given index, counted from 0."""
         if self._shape.choose is not None:
-            chosen: Value = self._shape.choose[index]
-            return chosen
+            return self._shape.choose[index]
         low, step, _, unit = _span(self._shape)
         number = low + index * step
         if unit:

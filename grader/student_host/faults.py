@@ -36,8 +36,8 @@ class Describer:
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
         kind = _name_of(type(error))
-        said = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
-        return {"code": "exception", "type": kind, "message": _behind(kind, said), **self._place(frames)}
+        message = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
+        return {"code": "exception", "type": kind, "message": _behind(kind, message), **self._place(frames)}
 
     def _is_of_file(self, error: SyntaxError) -> bool:
         """Return whether a file of the submission cannot be compiled: any code may raise a SyntaxError itself."""

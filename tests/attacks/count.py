@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from arena import UNPRIVILEGED
 from attack_runs import Attack, read_attacks, run_unit, units
 
-from grader.core.checkup import NO_WALLS, TIERS
+from grader.core.checkup import NO_SANDBOX, TIERS
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import inspect_tiers
 
@@ -28,13 +28,15 @@ from grader.execution.sandbox.choose import inspect_tiers
 def main() -> int:
     """Run what is asked for, print the table, and return 0 if everything was contained."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tiers", nargs="*", metavar="TIER", help=", ".join(name for name in TIERS if name != NO_WALLS))
+    parser.add_argument(
+        "tiers", nargs="*", metavar="TIER", help=", ".join(name for name in TIERS if name != NO_SANDBOX)
+    )
     parser.add_argument("--only", default="", metavar="NUMBERS", help="only these attacks, e.g. 1,2,64")
     asked = parser.parse_args()
     wanted = {int(number) for number in asked.only.split(",") if number}
     attacks = [attack for attack in read_attacks() if not wanted or attack.number in wanted]
     here = usable_tiers()
-    if unknown := [tier for tier in asked.tiers if tier not in TIERS or tier == NO_WALLS]:
+    if unknown := [tier for tier in asked.tiers if tier not in TIERS or tier == NO_SANDBOX]:
         parser.error(f"expected tiers out of {', '.join(here)}, found {', '.join(unknown)}")
     results = {tier: count(tier, attacks) for tier in asked.tiers or here}
     print_table(attacks, results)
@@ -45,7 +47,7 @@ def usable_tiers() -> list[str]:
     """Return the tiers whose self-test passes here; as root, those of an ordinary user are counted in."""
     usable = [tier.name for tier in inspect_tiers(find_ros()) if tier.usable]
     as_user = list(UNPRIVILEGED) if os.geteuid() == 0 else []
-    return [name for name in TIERS if name in (*usable, *as_user) and name != NO_WALLS]
+    return [name for name in TIERS if name in (*usable, *as_user) and name != NO_SANDBOX]
 
 
 def count(tier: str, attacks: Sequence[Attack]) -> dict[int, list[str]]:

@@ -161,11 +161,11 @@ def test_the_digest_covers_the_file(tmp_path: Path) -> None:
 
 
 def test_an_exception_leaves_the_criterion_undecided(tmp_path: Path) -> None:
-    """It costs no points; class, text, file and line are there for whoever mends the check."""
+    """It costs no points; class, text, file and line are there for whoever fixes the check."""
     found = verdict(write_rubric(tmp_path), TraceBuilder("pump.py").trace())
     assert (found.outcome, found.score) == (Outcome.UNDECIDED, 0)
     assert found.evidence["error"] == "pump_checks.py:29: LookupError: nobody thought of silence"
-    assert found.hint == f"mend the check that the rubric brings: {found.evidence['error']}"
+    assert found.hint == f"fix the check that the rubric brings: {found.evidence['error']}"
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ class FakeScheduler:
         return self
 
     def prepare(self, isolation: str) -> list[Any]:
-        return ["no walls"] if isolation == "none" else []
+        return ["no sandbox"] if isolation == "none" else []
 
     def run(self, tasks: Sequence[Task], on_step: Callable[..., Any]) -> Generator[Attempt, None, None]:
         for task in tasks:

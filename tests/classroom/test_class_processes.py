@@ -131,7 +131,7 @@ def test_tasks_reach_the_process_as_they_are(tmp_path: Path, odd: str) -> None:
 def test_submissions_that_could_reach_each_other_go_one_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tier: str, shares: bool, most: int
 ) -> None:
-    """Where the sandbox leaves them one network; without walls it is the user's wish."""
+    """Where the sandbox leaves them one network; without a sandbox it is the user's wish."""
     isolation = SimpleNamespace(name=tier, shares_network=shares)
     choice = SimpleNamespace(isolation=isolation, containment=())
     monkeypatch.setattr("grader.classroom.local.find_ros", lambda: None)

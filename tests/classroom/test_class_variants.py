@@ -59,7 +59,7 @@ def test_everybody_is_graded_by_their_own_values(class_: Callable[..., Any], tmp
 
 
 def test_whose_variant_is_not_clear_is_not_graded(class_: Callable[..., Any]) -> None:
-    """That is no mark; the row says what to mend."""
+    """That is no mark; the row says what to fix."""
     graded, _ = class_()
     eve = next(row for row in graded.book.rows if row.name == "eve")
     assert (eve.status.value, eve.adjusted.score) == ("refused", None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, described, missing, summarised
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, described, missing, summarised
 
 ALL = tuple(Property(name, holds=True, mechanism=f"wall {n}") for n, name in enumerate(PROPERTIES))
 OPEN = (*ALL[:4], Property("net_egress", holds=False, mechanism="no interface but lo", found="eth0"), *ALL[5:])
@@ -27,8 +27,8 @@ def test_what_is_not_contained_is_said_with_what_was_found() -> None:
 @pytest.mark.parametrize("properties", [(), ALL])
 def test_no_walls_are_exactly_none(properties: tuple[Property, ...]) -> None:
     """Programs compare the word; people get more of them."""
-    assert described(NO_WALLS, properties) == "none"
-    assert "no walls" in summarised(NO_WALLS, properties)
+    assert described(NO_SANDBOX, properties) == "none"
+    assert "no sandbox" in summarised(NO_SANDBOX, properties)
 
 
 @pytest.mark.parametrize("name", PROPERTIES)

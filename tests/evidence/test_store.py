@@ -151,7 +151,7 @@ def test_damage_is_refused_by_name(tmp_path: Path, name: str, damage: Callable[.
 
 
 def test_a_recording_that_shows_something_else_is_found(tmp_path: Path) -> None:
-    """Who changes what other tools see, and mends the digest, is found by comparing it with what is judged."""
+    """Who changes what other tools see, and fixes the digest, is found by comparing it with what is judged."""
     kept_run(tmp_path / "a", velocity_run(velocity_trace()))
     kept_run(tmp_path / "b", velocity_run(velocity_trace(forward=0.7)))
     one, other = ((tmp_path / n / RECORDING).read_bytes() for n in "ab")

@@ -671,7 +671,7 @@ def test_descriptors_and_exit_codes_of_a_worker_come_through(any_tier: Sandbox) 
         assert (done.returncode, ours.recv(10)) == (9, b"hello")
 
 
-# --- the tier without walls ---
+# --- the tier without a sandbox ---
 
 
 def test_without_walls_the_environment_is_exact_all_the_same(plain: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:

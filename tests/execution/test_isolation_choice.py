@@ -15,7 +15,7 @@ import pytest
 from sandboxes import USER, opened_start, unreachable, walls
 
 import grader
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Property, TierReport, missing
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox import choose, memory, selftest, tiers
@@ -67,7 +67,7 @@ def tested(monkeypatch: pytest.MonkeyPatch, ros: RosInstallation) -> tuple[list[
         asked.append(isolation)
         return reports.get(isolation, report(isolation))
 
-    monkeypatch.setattr(choose, "isolation_from_name", lambda name: Plain() if name == NO_WALLS else name)
+    monkeypatch.setattr(choose, "isolation_from_name", lambda name: Plain() if name == NO_SANDBOX else name)
     monkeypatch.setattr(selftest, "inspect", inspected)
     monkeypatch.setattr(tiers, "is_for_others", lambda name: name == "bubblewrap-root")
     return asked, reports

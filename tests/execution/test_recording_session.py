@@ -71,7 +71,7 @@ def test_a_clock_that_was_chosen_is_kept(clock: str) -> None:
 
 
 def test_a_fault_of_ours_is_not_tried_on_the_other_clock() -> None:
-    """The wall clock would not mend it."""
+    """The wall clock would not fix it."""
     recorder = Recorder("a", broken=("a",))
     recorded(recorder, AUTO, "a")
     assert recorder.recorded == [("a", "virtual")]

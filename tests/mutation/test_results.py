@@ -13,38 +13,38 @@ import pytest
 
 import grader.mutation
 from grader.core.exercise import Outcome
-from grader.mutation.results import Fate, ResultRank, SelftestResult, Trial, one_line_change
+from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change
 from grader.mutation.showing import render_results, results_to_json
 
 MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
 SCHEMA = json.loads((Path(grader.mutation.__file__).parent / "selftest.schema.json").read_text(encoding="utf-8"))
 
 
-def standing(rate: Outcome = MET, speed: Outcome = MET) -> ResultRank:
+def trial_result(rate: Outcome = MET, speed: Outcome = MET) -> TrialResult:
     """Return what a program is worth under two criteria."""
     outcomes = {"rate": rate, "speed": speed}
     reasons = {id_: f"{id_} is {outcome.value}" for id_, outcome in outcomes.items() if outcome is not MET}
     points = {MET: 2, PARTLY: 1, NOT_MET: 0, BLOCKED: 0, UNDECIDED: 0}
-    return ResultRank(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
+    return TrialResult(Fraction(sum(points[o] for o in outcomes.values())), Fraction(4), outcomes, reasons)
 
 
 def trial(number: int, **attributes: Any) -> Trial:
     """Return a mutant."""
     outcomes = {name: attributes.pop(name) for name in ("rate", "speed") if name in attributes}
-    return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", standing(**outcomes), **attributes)
+    return Trial(f"a.py:{number}:period:x", "a.py", "period", f"a => {number}", trial_result(**outcomes), **attributes)
 
 
 def result(*mutants: Trial, **attributes: Any) -> SelftestResult:
     """Return what came of a rubric whose every criterion was turned once."""
     always = (trial(1, rate=NOT_MET), trial(2, speed=PARTLY))
     given: dict[str, Any] = {
-        "template": standing(NOT_MET, BLOCKED),
+        "template": trial_result(NOT_MET, BLOCKED),
         "baseline": Fraction(0),
         "variants": (),
         **attributes,
     }
     return SelftestResult(
-        "r.yaml", "fan", ("rate", "speed"), given.pop("reference", standing()), mutants=(*always, *mutants), **given
+        "r.yaml", "fan", ("rate", "speed"), given.pop("reference", trial_result()), mutants=(*always, *mutants), **given
     )
 
 
@@ -60,7 +60,7 @@ def result(*mutants: Trial, **attributes: Any) -> SelftestResult:
 )
 def test_what_becomes_of_a_mutant(outcomes: tuple[Outcome, Outcome], fate: Fate) -> None:
     """A trouble of the grader's neither kills it nor lets it survive."""
-    assert standing(*outcomes).fate is fate
+    assert trial_result(*outcomes).fate is fate
 
 
 def test_a_rubric_without_a_known_hole_passes() -> None:
@@ -72,7 +72,7 @@ def test_a_rubric_without_a_known_hole_passes() -> None:
     "holed",
     [
         result(trial(3)),
-        result(reference=standing(rate=PARTLY)),
+        result(reference=trial_result(rate=PARTLY)),
         result(baseline=Fraction(1)),
         result(variants=(trial(4, rate=NOT_MET),)),
         replace(result(), mutants=(trial(1, rate=NOT_MET), trial(2, speed=BLOCKED))),
@@ -128,7 +128,7 @@ def test_a_change_fits_on_one_line(before: str, after: str, change: str) -> None
 
 def everything() -> SelftestResult:
     """Return a result with something of every kind, and hostile text."""
-    hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", standing())
+    hostile = Trial("a\x1b[31m.py:1:text:\u202e", "a\x1b.py", "text", "x\n::error::y", trial_result())
     return result(
         hostile,
         trial(3, because="the same"),
@@ -154,7 +154,7 @@ def test_the_text_names_every_kind() -> None:
 
 def test_without_a_right_reference_the_text_says_why_nothing_was_tried() -> None:
     """And which criteria it lost."""
-    text = render_results([replace(result(reference=standing(rate=PARTLY)), mutants=())], width=80, colour=False)
+    text = render_results([replace(result(reference=trial_result(rate=PARTLY)), mutants=())], width=80, colour=False)
     assert "none tried" in text
     assert "rate: rate is partly" in text
 

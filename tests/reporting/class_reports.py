@@ -110,7 +110,7 @@ def _verdict(criterion: Criterion, before: Mapping[str, Verdict], draw: random.R
                        f"not judged: needs {needed} (not met)", blocked_by=needed)  # fmt: skip
     owner = next((o for o in FOLLOWS.get(criterion.id, ()) if before[o].outcome is Outcome.NOT_MET), "")
     if owner:
-        hint = f"this has the same cause as {owner}: mend that first"
+        hint = f"this has the same cause as {owner}: fix that first"
         return replace(_lost(criterion, "t = 0.2 s, /fan_speed: 0 for 26 °C", hint, {}), same_cause_as=owner)
     for percent, cause, reason, hint in MISTAKES.get(criterion.id, ()):
         if draw.random() * 100 < percent:

@@ -86,7 +86,7 @@ class Parsed(HTMLParser):
 def student(number: int = 1, name: str = "Ada", **changes: Any) -> StudentRow:
     """Return a student with a drawn report."""
     report = report_to_json(class_reports.drawn_report(number, name))
-    score, most = (Fraction(str(report[key])) for key in ("score", "max_score"))
+    score, most = Fraction(str(report["score"])), Fraction(str(report["max_score"]))
     given = StudentRow(folder=f"s{number}", name=name, raw=score, max_score=most, final=score, report=report)
     return replace(given, **changes)
 
@@ -143,7 +143,7 @@ def test_each_criterion_has_its_counts() -> None:
     assert numbers[2] == sum(
         c["outcome"] == "not_met"
         for s in students
-        for e in (s.report or {})["exercises"]
+        for e in (s.report["exercises"] if s.report else ())
         for c in e["criteria"]
         if c["id"] == "log_period"
     )

@@ -164,7 +164,7 @@ def test_a_criterion_that_is_not_shown_counts_in_no_sum() -> None:
 @pytest.mark.parametrize("shown", [Shows.ALL, Shows.WITHOUT_NUMBERS])
 def test_a_criterion_that_is_not_shown_has_no_name_in_another(shown: Shows) -> None:
     """Neither where it explains a cause, nor where it names a file that both miss; the file may be named."""
-    same = {"hint": f"this has the same cause as {SECRET}: mend that first", "same_cause_as": SECRET}
+    same = {"hint": f"this has the same cause as {SECRET}: fix that first", "same_cause_as": SECRET}
     missing = {"reason": "not judged: needs a.py, which is missing", "blocked_by": SECRET, "missing_file": "a.py"}
     whole = report(
         exercise(

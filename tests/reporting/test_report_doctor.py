@@ -1,4 +1,4 @@
-"""A checkup is shown to people and to programs, with what mends each lack."""
+"""A checkup is shown to people and to programs, with a fix for what is missing."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_machine_that_is_safe_is_called_so() -> None:
     assert shown.startswith("grading is safe here, in the sandbox bubblewrap\n")
     assert "A1 bubblewrap         holds; grading uses it\n" in shown
     assert "C  landlock           not here: it does not contain net_egress\n" in shown
-    assert "mend: get bwrap" in shown
+    assert "fix: get bwrap" in shown
     assert "  net_egress*  yes   NO    sends nothing beyond this machine's loopback (m)\n" in shown
     assert "  C, net_egress: a route\n" in shown
     assert all(name in shown for name in PROPERTIES)
@@ -57,8 +57,8 @@ def test_a_machine_that_is_safe_is_called_so() -> None:
 @pytest.mark.parametrize(
     ("checkup", "problem", "remedy"),
     [
-        (NONE_HOLDS, "  sandbox: none holds on this machine\n", "    mend: get bwrap\n"),
-        (NO_ROS, "  ROS 2: none\n", "    mend: install it\n"),
+        (NONE_HOLDS, "  sandbox: none holds on this machine\n", "    fix: get bwrap\n"),
+        (NO_ROS, "  ROS 2: none\n", "    fix: install it\n"),
         (NO_DDS, "  DDS exchange: 3 of 10 messages of a trial node arrived\n", ""),
     ],
 )

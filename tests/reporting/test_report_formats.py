@@ -83,8 +83,8 @@ def test_every_report_says_what_gives_it_again(name: str, sample: str) -> None:
 @pytest.mark.parametrize("name", RENDERERS)
 def test_a_run_without_walls_says_so(name: str) -> None:
     """No platform passes it over in silence."""
-    assert "no walls" in RENDERERS[name](undecided()) or '"isolation": "none"' in RENDERERS[name](undecided())
-    assert "no walls" not in RENDERERS[name](perfect())
+    assert "no sandbox" in RENDERERS[name](undecided()) or '"isolation": "none"' in RENDERERS[name](undecided())
+    assert "no sandbox" not in RENDERERS[name](perfect())
 
 
 @pytest.mark.parametrize("name", sorted(set(RENDERERS) - {"json"}))

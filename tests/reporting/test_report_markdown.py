@@ -105,7 +105,7 @@ def test_a_fault_comes_with_its_frames() -> None:
 
 
 def test_what_is_not_final_stands_out() -> None:
-    """So does a run without walls."""
+    """So does a run without a sandbox."""
     text = render_markdown(undecided())
     assert text.index("[!WARNING]") < text.index("[!CAUTION]") < text.index("| Points |")
 

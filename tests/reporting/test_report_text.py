@@ -197,7 +197,7 @@ def test_the_report_ends_with_the_command_that_gives_it_again() -> None:
         "rubrics",
         "recording",
     ]
-    assert "no walls" in render(undecided())
+    assert "no sandbox" in render(undecided())
 
 
 def test_a_long_command_can_be_copied() -> None:

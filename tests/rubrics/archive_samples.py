@@ -20,7 +20,7 @@ def zipped(
     with zipfile.ZipFile(buffer, "w", compression) as archive:
         for name, content in files.items() if isinstance(files, Mapping) else files:
             info = zipfile.ZipInfo("x")
-            info.filename = name  # the constructor would mend some names
+            info.filename = name  # the constructor would fix some names
             info.compress_type = compression
             info.external_attr = (modes or {}).get(name, stat.S_IFREG | 0o644) << 16
             archive.writestr(info, content)

@@ -9,11 +9,10 @@ import queue
 import secrets
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from distributed import Client, Future, KilledWorker, Security
 
@@ -156,7 +155,7 @@ class Dispatcher:
         self._under_way[key] = sending
         sending.future.add_done_callback(lambda future: self._arrived.put(str(future.key)))
 
-    def _payload(self, data: bytes, *, near: bool) -> Any:
+    def _payload(self, data: bytes, *, near: bool) -> object:
         """Scatter large data to a worker if there is one; return the data or its future."""
         if not near or len(data) <= SCATTERED_BYTES:
             return data
@@ -165,10 +164,10 @@ class Dispatcher:
         except (OSError, TimeoutError):  # the target worker has just ended: send the data with the task
             return data
 
-    def _take_back_orphaned(self, alive: Any) -> None:
+    def _take_back_orphaned(self, alive: Collection[str]) -> None:
         """Queue submissions again whose allowed workers are all gone: no other worker would take them."""
         for key, sending in list(self._under_way.items()):
-            if sending.only and not set(sending.only) & set(alive) and sending.future is not None:
+            if sending.only and not set(sending.only).intersection(alive) and sending.future is not None:
                 del self._under_way[key]
                 self._client.cancel([sending.future], force=True)
                 self._waiting.appendleft(sending)
@@ -213,12 +212,12 @@ class Dispatcher:
             return None
         return failed(sending.task, problem, *filter(None, [hint]))
 
-    def _on_event(self, event: tuple[float, Any]) -> None:
+    def _on_event(self, event: tuple[float, object]) -> None:
         """Report a step, unless its submission is already finished."""
-        said = event[1]
-        if not isinstance(said, dict):
+        message = event[1]
+        if not isinstance(message, dict):
             return
-        name, step = str(said.get(remote.NAME)), str(said.get(remote.STEP))[:200]
+        name, step = str(message.get(remote.NAME)), str(message.get(remote.STEP))[:200]
         with self._lock:
             if name in self._names:
                 self._on_step(name, step)

@@ -29,7 +29,7 @@ from grader.classroom.messages import (
     unpack,
 )
 from grader.classroom.store import ResultStatus, State
-from grader.core.checkup import NO_WALLS, missing
+from grader.core.checkup import NO_SANDBOX, missing
 from grader.core.errors import EnvironmentFault, GraderError, HarnessError
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import TierChoice, choose_isolation
@@ -152,7 +152,7 @@ def _write(start: Path, name: str, content: bytes, scratch: Path) -> None:
 
 
 def _one_at_a_time(choice: TierChoice) -> bool:
-    return choice.isolation.shares_network and choice.isolation.name != NO_WALLS
+    return choice.isolation.shares_network and choice.isolation.name != NO_SANDBOX
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
 
 from distributed import Client
 
@@ -127,7 +126,7 @@ class WorkerPool:
             elif not isinstance(reply, OSError):  # the worker has left in the meantime
                 self._known[address] = Fitness(f"worker {address}", f"the grader failed: {type(reply).__name__}")
 
-    def _run(self, function: Callable[..., object], argument: str, addresses: Collection[str]) -> dict[str, Any]:
+    def _run(self, function: Callable[..., object], argument: str, addresses: Collection[str]) -> dict[str, object]:
         if not addresses:
             return {}
         try:

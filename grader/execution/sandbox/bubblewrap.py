@@ -101,14 +101,14 @@ class Bubblewrap:
         The worker has a private network with only `lo`, a private process namespace and a private /dev/shm, which all
         disappear with it. It is killed when the caller dies.
         """
-        walls = [
+        options = [
             *("--die-with-parent", "--new-session", "--unshare-net", "--unshare-pid", "--unshare-ipc"),
             *(() if self.as_root else ("--unshare-user",)),
             *(("--dev-bind", "/", "/", "--proc", "/proc") if view is None else self._workers_files(view)),
             *("--perms", "1777", "--tmpfs", "/dev/shm", "--chdir", "/"),  # noqa: S108
             *(() if view is None else ("--remount-ro", "/")),
         ]
-        return Command((str(self.bwrap), *walls, "--", *argv), dict(environment), tuple(pass_fds))
+        return Command((str(self.bwrap), *options, "--", *argv), dict(environment), tuple(pass_fds))
 
     def _workers_files(self, view: WorkerView) -> list[str]:
         """Return the options that make visible what a worker needs, including the programs that start students."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, TIERS, Fact, Property, TierReport, missing
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, TIERS, Fact, Property, TierReport, missing
 from grader.core.errors import EnvironmentFault
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox import selftest, tiers
@@ -49,7 +49,7 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
     Raises:
         EnvironmentFault: The requested tier does not exist or does not work here, or no tier does; the hint is a fix.
     """
-    if wanted == NO_WALLS:
+    if wanted == NO_SANDBOX:
         return TierChoice(isolation_from_name(wanted))
     if wanted != AUTO:
         return _named(wanted, ros, progress)
@@ -64,7 +64,7 @@ def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str]
 def inspect_tiers(ros: RosInstallation) -> tuple[TierReport, ...]:
     """Test every tier and return the reports, strongest first; the tier without isolation comes last."""
     open_ones = tuple(Property(name, holds=False, mechanism=NOTHING) for name in PROPERTIES)
-    nothing = TierReport(NO_WALLS, TIERS[NO_WALLS], usable=False, why="it contains nothing", properties=open_ones)
+    nothing = TierReport(NO_SANDBOX, TIERS[NO_SANDBOX], usable=False, why="it contains nothing", properties=open_ones)
     return (*(inspect_tier(name, ros, afresh=True) for name in ISOLATING), nothing)
 
 

@@ -1,4 +1,4 @@
-"""Seccomp filters for student processes, as the bytes that the kernel loads."""
+"""Seccomp filters for student processes, as bytes for the kernel."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ X32_BIT = 0x40000000
 
 AUDIT_ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
 
-# clone and unshare take the same flags: new mount, cgroup, uts, ipc, user, pid and network namespace; unshare also a
-# new time namespace.
+# Flags of clone and unshare: new mount, cgroup, uts, ipc, user, pid and network namespaces; unshare can also create a
+# time namespace.
 NEW_NAMESPACES = 0x00020000 | 0x02000000 | 0x04000000 | 0x08000000 | 0x10000000 | 0x20000000 | 0x40000000
 NEW_TIME_NAMESPACE = 0x00000080
 
 TIOCSTI, TIOCLINUX = 0x5412, 0x541C
 
-# fcntl: locks of a process and of a descriptor, each with and without waiting; leases and notes of what others do
+# fcntl: locks of a process and of a descriptor, each with and without waiting; leases and directory notifications
 SET_LOCKS = (6, 7, 37, 38)
 SET_LEASE, NOTIFY = 1024, 1026
-#: A call that is refused with this does nothing and says that it did.
+#: A call refused with this number does nothing but reports success.
 NO_ERROR = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The numbers of one system call, None where the architecture lacks it."""
+    """The numbers of one system call; None if an architecture does not have it."""
 
     x86_64: int | None
     aarch64: int | None
@@ -53,15 +53,15 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentRule:
-    """Refuses a call by the low 32 bits of one argument.
+    """Refuses a system call depending on the low 32 bits of one argument.
 
     Attributes:
         call: Key of `NUMBERS`.
         argument: Index of the argument.
-        only: The values allowed; empty if any is.
+        only: The values allowed; empty if all are.
         never: The values refused.
         never_bits: Refused if any of these bits is set.
-        error: What errno the caller sees.
+        error: The errno that the caller gets.
     """
 
     call: str
@@ -80,15 +80,15 @@ ARGUMENT_RULES = (
     ArgumentRule("unshare", 0, never_bits=NEW_NAMESPACES | NEW_TIME_NAMESPACE),
     ArgumentRule("ioctl", 1, never=(TIOCSTI, TIOCLINUX)),
     ArgumentRule("prlimit64", 0, only=(0,)),
-    # Files that many students see carry no word from one to another. A lock is granted and not made: whoever it would
-    # keep out sees other files.
+    # Shared files must not carry data from one student to another. Locks succeed without effect: the processes that
+    # they would exclude see different files anyway.
     ArgumentRule("flock", 1, never_bits=0xFFFFFFFF, error=NO_ERROR),
     ArgumentRule("fcntl", 1, never=SET_LOCKS, error=NO_ERROR),
     ArgumentRule("fcntl", 1, never=(SET_LEASE, NOTIFY)),
 )
 
-# Sorted by what they are for. A filter cannot look into the struct that clone3 takes, so that call does not exist:
-# the C library then uses clone.
+# Grouped by purpose. A filter cannot read the struct that clone3 takes, so clone3 is reported as missing, and the C
+# library uses clone instead.
 NUMBERS = {
     "socket": Numbers(41, 198),
     "clone": Numbers(56, 220),
@@ -130,7 +130,7 @@ NUMBERS = {
     "fanotify_init": Numbers(300, 262),
     "quotactl": Numbers(179, 60),
     "quotactl_fd": Numbers(443, 443),
-    # wide kernel surfaces
+    # large kernel interfaces
     "bpf": Numbers(321, 280),
     "perf_event_open": Numbers(298, 241),
     "userfaultfd": Numbers(323, 282),
@@ -167,24 +167,24 @@ ABSENT = ("clone3", "memfd_create", "io_uring_setup", "io_uring_enter", "io_urin
 
 
 def supports(machine: str) -> bool:
-    """Return whether a filter can be made for an architecture as `platform.machine()` names it."""
+    """Return whether there is a filter for an architecture, named as by `platform.machine()`."""
     return machine in AUDIT_ARCHITECTURES
 
 
 def student_filter(machine: str | None = None) -> bytes:
-    """Return the filter for student processes in namespaces of their own, an array of `struct sock_filter`.
+    """Return the filter for student processes with their own namespaces, an array of `struct sock_filter`.
 
     Args:
-        machine: Architecture as `platform.machine()` names it; the running one if None.
+        machine: Architecture, named as by `platform.machine()`; that of this machine if None.
 
     Raises:
-        KeyError: No filter is known for the architecture; ask `supports` first.
+        KeyError: There is no filter for the architecture; call `supports` first.
     """
     return assembled(NUMBERS, ARGUMENT_RULES, machine or platform.machine())
 
 
 def assembled(table: Mapping[str, Numbers], rules: Sequence[ArgumentRule], machine: str) -> bytes:
-    """Return a filter that refuses every call of a table, or only some of its arguments where there is a rule."""
+    """Return a filter that refuses each call in a table; calls with rules are refused only for some arguments."""
     program = [
         _instruction(LOAD, ARCHITECTURE_AT),
         _instruction(JUMP_IF_EQUAL, AUDIT_ARCHITECTURES[machine], if_true=1),
@@ -192,7 +192,7 @@ def assembled(table: Mapping[str, Numbers], rules: Sequence[ArgumentRule], machi
         _instruction(LOAD, NUMBER_AT),
     ]
     if machine == "x86_64":
-        # The x32 interface has the same architecture word and other numbers: it would walk around every rule.
+        # The x32 interface has the same architecture value but other call numbers, so it would bypass every rule.
         program += [_instruction(JUMP_IF_ANY_BIT, X32_BIT, if_false=1), _fail(errno.ENOSYS)]
     by_argument = {rule.call for rule in rules}
     for call, numbers in table.items():
@@ -208,7 +208,7 @@ def assembled(table: Mapping[str, Numbers], rules: Sequence[ArgumentRule], machi
 
 
 def _argument_rule(rule: ArgumentRule, number: int | None) -> list[bytes]:
-    """Return the instructions of one rule: it refuses, or leaves the number of the call for the next rule."""
+    """Return the instructions of a rule; if it does not refuse the call, it loads the call number for the next rule."""
     if number is None:
         return []
     refusals: list[bytes] = []
@@ -239,12 +239,12 @@ OWN_GROUP = -OWN_PROCESS & 0xFFFFFFFF
 SET_OWNER, SET_SIGNAL, SET_OWNER_EXTENDED = 8, 10, 15  # fcntl
 FIOSETOWN, SIOCSPGRP = 0x8901, 0x8902
 IOPRIO_WHO_PROCESS = 1
-# The two flags that a type of socket may carry: close on exec, and not to block.
+# The two flags that a socket type may include: close on exec, and non-blocking.
 PAIRS = tuple(socket.SOCK_STREAM | flags for flags in (0, 0x800, 0x80000, 0x80800))
 
 FLAT_NUMBERS = {
     **NUMBERS,
-    # properties of files, which need no descriptor
+    # attributes of files, which can be changed without a descriptor
     "chmod": Numbers(90, None),
     "fchmod": Numbers(91, 52),
     "fchmodat": Numbers(268, 53),
@@ -266,7 +266,7 @@ FLAT_NUMBERS = {
     "fremovexattr": Numbers(199, 16),
     "removexattrat": Numbers(466, 466),
     "file_setattr": Numbers(469, 469),
-    # other processes; whoever left the group would outlive it
+    # other processes; a process that leaves the group would outlive it
     "setsid": Numbers(112, 157),
     "setpgid": Numbers(109, 154),
     "pidfd_open": Numbers(434, 434),
@@ -284,7 +284,7 @@ FLAT_NUMBERS = {
 }
 FLAT_RULES = (
     *(rule for rule in ARGUMENT_RULES if rule.call not in ("socket", "ioctl")),
-    # A pair of streams is connected for good; a datagram could be sent to any path.
+    # A pair of stream sockets stays connected; a datagram socket could send to any path.
     ArgumentRule("socket", 0, only=(socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK), error=errno.EAFNOSUPPORT),
     ArgumentRule("socketpair", 1, only=PAIRS, error=errno.EOPNOTSUPP),
     *(
@@ -295,15 +295,16 @@ FLAT_RULES = (
     ArgumentRule("fcntl", 1, never=(SET_OWNER, SET_SIGNAL, SET_OWNER_EXTENDED)),
     *(ArgumentRule(call, 0, only=(0,)) for call in ("sched_setaffinity", "sched_setattr", "migrate_pages")),
     ArgumentRule("move_pages", 0, only=(0,)),
-    # Fast DDS gives each of its threads, by number, the scheduler that it has: done, and nothing is.
+    # Fast DDS sets each of its threads, by number, to the scheduler that it already has: this succeeds without effect.
     *(ArgumentRule(call, 0, only=(0,), error=NO_ERROR) for call in ("sched_setscheduler", "sched_setparam")),
-    # Of a process, and of the calling one: a user or a group has more members.
+    # Only for the calling process: a user or a group has more members.
     *(ArgumentRule("setpriority", argument, only=(0,), error=NO_ERROR) for argument in (0, 1)),
     ArgumentRule("ioprio_set", 0, only=(IOPRIO_WHO_PROCESS,)),
     ArgumentRule("ioprio_set", 1, only=(0,)),
 )
 
-# Where Landlock has no say over signals: to itself and its group only, also by the ways the C library does not take.
+# If Landlock cannot restrict signals: only to the process itself and its group, also by calls that the C library does
+# not use.
 SIGNAL_NUMBERS = {
     "kill": Numbers(62, 129),
     "tkill": Numbers(200, 130),
@@ -318,11 +319,11 @@ SIGNAL_RULES = (
 
 
 def flat_filter(*, signals: bool, machine: str | None = None) -> bytes:
-    """Return the filter, an array of `struct sock_filter`.
+    """Return the filter for student processes without their own namespaces, an array of `struct sock_filter`.
 
     Args:
-        signals: Whether to refuse signals to other processes; `start.load_filter` then fills in the own number.
-        machine: Architecture as `platform.machine()` names it; the running one if None.
+        signals: Whether to refuse signals to other processes; `start.load_filter` then inserts the process's number.
+        machine: Architecture, named as by `platform.machine()`; that of this machine if None.
     """
     numbers = {**FLAT_NUMBERS, **(SIGNAL_NUMBERS if signals else {})}
     return assembled(numbers, (*FLAT_RULES, *(SIGNAL_RULES if signals else ())), machine or platform.machine())

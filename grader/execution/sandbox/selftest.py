@@ -131,8 +131,8 @@ def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[
         answer = json.loads(done.stdout)
         if isinstance(answer, dict) and answer.keys() >= ANSWERED:
             return answer, ""
-    said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-    return {}, said[-1][:300] if said else f"the self-test ended with code {done.returncode}"
+    errors = done.stderr.decode("utf-8", "replace").strip().splitlines()
+    return {}, errors[-1][:300] if errors else f"the self-test ended with code {done.returncode}"
 
 
 def environment(ros: RosInstallation, bait: Bait) -> Mapping[str, str]:

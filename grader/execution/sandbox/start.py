@@ -3,10 +3,10 @@
 Usage: start.py JSON PROGRAM [ARGUMENT ...]. The object has `folder`, the working directory; `made`, whether to create
 it before the start and delete it after the end; `scratch`, its maximum size in bytes if it is created, 0 for unlimited;
 `limits`, by their names in `resource`; `user`, [user, group] to run as, or null; `processes`, how many processes and
-threads may be added to those that the user has already, 0 for unlimited; and `walls`, null or an object of `read` and
-`devices`, paths that may be read, or also written; `hidden`, folders among them that may not be read; `tcp`, whether
-TCP is allowed; `reach`, whether the paths lead through folders that are closed to the user; `filter`, a seccomp program
-in hexadecimal.
+threads may be added to those that the user has already, 0 for unlimited; and `confinement`, null or an object of `read`
+and `devices`, paths that may be read, or also written; `hidden`, folders among them that may not be read; `tcp`,
+whether TCP is allowed; `reach`, whether the paths lead through folders that are closed to the user; `filter`, a seccomp
+program in hexadecimal.
 
 It does not import grader, because it runs before grader can be found. For Landlock's calls and rights see Linux,
 Documentation/userspace-api/landlock.rst; for the filter Documentation/userspace-api/seccomp_filter.rst.
@@ -74,16 +74,16 @@ def main(arguments: list[str]) -> None:
         limit(getattr(resource, name), value)
     if request["processes"]:
         limit(resource.RLIMIT_NPROC, request["processes"] + (0 if request["user"] else running() + SPARE))
-    walls = request["walls"]
-    rules = ruleset(system, walls, request["folder"]) if walls else -1
+    confinement = request["confinement"]
+    rules = ruleset(system, confinement, request["folder"]) if confinement else -1
     if request["user"]:
-        become(system, *request["user"], reach=bool(walls and walls["reach"]))
+        become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
     # Changing the user resets this, so it has to come afterwards.
     call(system.prctl, SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
-    if walls:
-        restrict(system, rules, bytes.fromhex(walls["filter"]))
+    if confinement:
+        restrict(system, rules, bytes.fromhex(confinement["filter"]))
     os.execv(arguments[1], arguments[1:])  # noqa: S606 -- becoming the program is the purpose
 
 
@@ -221,19 +221,19 @@ def landlock_version(system: Any = None) -> int:
     return max(0, call(system.syscall, CREATE_RULESET, None, 0, ASK_VERSION))
 
 
-def ruleset(system: Any, walls: dict[str, Any], folder: str) -> int:
+def ruleset(system: Any, confinement: dict[str, Any], folder: str) -> int:
     """Create the Landlock rules, with readable paths and the writable folder, and return their descriptor."""
     version = landlock_version(system)
     if version < 1:
         raise OSError("Landlock: expected version 1 or newer, found none")
     handled = KNOWN_RIGHTS[min(version, max(KNOWN_RIGHTS))]
-    tcp = ALL_TCP if version >= 4 and not walls["tcp"] else 0
+    tcp = ALL_TCP if version >= 4 and not confinement["tcp"] else 0
     scopes = ALL_SCOPES if version >= 6 else 0
     attributes = struct.pack("=QQQ", handled, tcp, scopes)[: 24 if version >= 6 else 16 if version >= 4 else 8]
     rules = checked(call(system.syscall, CREATE_RULESET, attributes, len(attributes), 0), "Landlock")
-    for path in (*walls["read"], "/proc/self"):
-        allow(system, rules, path, READ, tuple(walls["hidden"]))
-    for path in walls["devices"]:
+    for path in (*confinement["read"], "/proc/self"):
+        allow(system, rules, path, READ, tuple(confinement["hidden"]))
+    for path in confinement["devices"]:
         allow(system, rules, path, (READ_FILE | WRITE_FILE), ())
     allow(system, rules, folder, handled & ~EXECUTE & ~MAKE_DEVICES, ())
     return int(rules)

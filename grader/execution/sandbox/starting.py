@@ -54,7 +54,7 @@ def start_command(
 ) -> tuple[str, ...]:
     """Return the beginning of a command line; the program and its arguments follow. See `start.py`."""
     request = {"folder": folder, "made": made, "scratch": 0, "limits": dict(limits or {})}
-    request |= {"user": None, "processes": 0, "walls": None, **further}
+    request |= {"user": None, "processes": 0, "confinement": None, **further}
     return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(request))
 
 
@@ -114,12 +114,12 @@ def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -
         limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
         processes=limits.processes,
         user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
-        walls=_walls(process, ground),
+        confinement=_confinement(process, ground),
     )
     return Command((*start, str(process.runtime.executable), *process.arguments), environment, tuple(process.pass_fds))
 
 
-def _walls(process: StudentProcess, ground: Ground) -> dict[str, object]:
+def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
     bound = view_of((*process.runtime.read_paths, process.runtime.executable)).bound
     host = (process.host_folder,) if process.host_folder else ()
     own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))

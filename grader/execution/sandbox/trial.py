@@ -67,16 +67,16 @@ def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
     ) as process:
         for descriptor in command.opened_fds:
             os.close(descriptor)
-        heard, kept = exchange(process, request["domain"])
+        answered, kept = exchange(process, request["domain"])
         out, err = process.communicate(timeout=EXCHANGE_S)
     lines = out.decode("utf-8", "replace").splitlines()
-    said = err.decode("utf-8", "replace").strip().splitlines()
+    errors = err.decode("utf-8", "replace").strip().splitlines()
     achieved: dict[str, list[str]] = json.loads(lines[0]) if lines else {}
-    if achieved and not (heard and kept):
+    if achieved and not (answered and kept):
         achieved[EXCHANGE].append(NO_EXCHANGE)
     if achieved and (signals or condition() != before):
         achieved["signals"].append("the worker felt it")
-    return {"achieved": achieved, "outgrown": lines[1:] == ["outgrown"], "said": said[-1][:300] if said else ""}
+    return {"achieved": achieved, "outgrown": lines[1:] == ["outgrown"], "said": errors[-1][:300] if errors else ""}
 
 
 def condition() -> Mapping[str, object]:
@@ -124,17 +124,17 @@ def exchange(process: subprocess.Popen[bytes], domain: int) -> tuple[bool, Any]:
     rclpy.init(domain_id=domain)
     node = rclpy.create_node("trial", start_parameter_services=False, enable_rosout=False)
     nonce = os.urandom(8).hex()
-    heard: list[str] = []
-    node.create_subscription(String, "probe_back", lambda message: heard.append(message.data), 10)
+    replies: list[str] = []
+    node.create_subscription(String, "probe_back", lambda message: replies.append(message.data), 10)
     forth = node.create_publisher(String, "probe_forth", 10)
     deadline, again = time.monotonic() + EXCHANGE_S, 0.0
-    while nonce not in heard and process.poll() is None and (now := time.monotonic()) < deadline:
+    while nonce not in replies and process.poll() is None and (now := time.monotonic()) < deadline:
         # An endpoint that is not matched yet does not receive messages.
         if now >= again and forth.get_subscription_count():
             forth.publish(String(data=nonce))
             again = now + AGAIN_S
         rclpy.spin_once(node, timeout_sec=0.01)
-    return nonce in heard, node
+    return nonce in replies, node
 
 
 if __name__ == "__main__":

@@ -183,8 +183,8 @@ class ActionFeedback:
         for message in mine:
             wrong = broken_rules(_feedback(message), self.fields)
             if wrong:
-                said = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
-                return f"in the feedback at {moment(message.t_ns)} {said}"
+                flaw = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
+                return f"in the feedback at {moment(message.t_ns)} {flaw}"
         if self.grows is None:
             return ""
         for before, after in pairwise(mine):
@@ -208,14 +208,14 @@ def _ends(status: str) -> str:
     return {"succeeded": "succeeds", "canceled": "is canceled", "aborted": "aborts"}.get(status, status)
 
 
-def _goal_id(value: Mapping[str, Any]) -> str:
+def _goal_id(value: Mapping[str, object]) -> str:
     try:
         return json.dumps(at_path(value, "goal_id.uuid"), default=str)
     except NoSuchField:
         return ""
 
 
-def _feedback(message: Message) -> Mapping[str, Any]:
+def _feedback(message: Message) -> Mapping[str, object]:
     found = message.value.get("feedback")
     return found if isinstance(found, Mapping) else {}
 
@@ -305,7 +305,7 @@ class LifecycleStates:
         changes, asked = self._calls(trace, "change_state"), self._calls(trace, "get_state")
         if not changes and not asked:
             return self._never_asked(trace)
-        evidence = {
+        evidence: dict[str, object] = {
             "transitions": [[seconds(c.request.t_ns), _label(c), _succeeded(c)] for c in changes],
             "states": [[seconds(c.request.t_ns), _state(c)] for c in asked],
         }
@@ -342,7 +342,7 @@ class LifecycleStates:
                 return f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
         return ""
 
-    def _publishing(self, trace: Trace, changes: Sequence[Call], evidence: dict[str, Any]) -> Finding | None:
+    def _publishing(self, trace: Trace, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         """Return a finding if the node publishes while inactive, or does not while active; None otherwise."""
         topic = self.topic or ""
         jitter = JITTER_NS[trace.clock]
@@ -360,7 +360,7 @@ class LifecycleStates:
             return explain_no_message(trace, topic)
         return not_met(f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}", evidence)
 
-    def _explain(self, trace: Trace, flaw: str, evidence: dict[str, Any]) -> Finding:
+    def _explain(self, trace: Trace, flaw: str, evidence: dict[str, object]) -> Finding:
         fault = first_fault(trace)
         if fault is None:
             hint = "return TransitionCallbackReturn.SUCCESS from the callback of the transition"

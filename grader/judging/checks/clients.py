@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
@@ -64,10 +64,10 @@ class CallsOfClient:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        said = f"{self.calls} requests on {self.service}"
+        text = f"{self.calls} requests on {self.service}"
         if self.period is None:
-            return said
-        return f"{said}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
+            return text
+        return f"{text}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if number and gaps are right; the reason names the first wrong gap."""
@@ -103,7 +103,7 @@ class CallsOfClient:
                 return place, gap
         return None
 
-    def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, Any]) -> Finding:
+    def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, object]) -> Finding:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
             return not_met(reason, evidence, hint=f"ask {self.calls} times: for i in range({self.calls})")
@@ -245,8 +245,8 @@ class ReactsToResponses:
         """What is expected, in one phrase."""
         limit = number(self.threshold)
         goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
-        said = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
-        return f"{self.process} {said}; printing alone is half of it"
+        text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
+        return f"{self.process} {text}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if the reaction to every response on this side is right."""
@@ -260,7 +260,7 @@ class ReactsToResponses:
         if not {e.kind for e in mine} >= set(sides):
             return _not_reached(trace, self.process, self.service, episodes)
         evidence = self._evidence(episodes)
-        wrong = [(e, said) for e in mine if (said := self._wrong(e, episodes))]
+        wrong = [(e, flaw) for e in mine if (flaw := self._wrong(e, episodes))]
         if not wrong:
             return self._right(trace, mine, evidence)
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
@@ -282,7 +282,7 @@ class ReactsToResponses:
             return f"{warned[0].severity} at {moment(warned[0].t_ns)}: {quote(warned[0].text, 80)}"
         return "" if episode.outputs else "nothing is written"
 
-    def _right(self, trace: Trace, mine: Sequence[Episode], evidence: dict[str, Any]) -> Finding:
+    def _right(self, trace: Trace, mine: Sequence[Episode], evidence: dict[str, object]) -> Finding:
         reason = f"{self.process}: right after each of {counted(len(mine), 'response')} "
         reason += f"({', '.join(number(e.number) for e in mine[:8] if e.number is not None)})"
         if not student_records(trace, self.process):
@@ -298,19 +298,19 @@ class ReactsToResponses:
             return ""
         return f"at or below {number(self.threshold)} it prints {quote(told[0][0].text, 80)!r}, expected a WARN record"
 
-    def _evidence(self, episodes: Sequence[Episode]) -> dict[str, Any]:
+    def _evidence(self, episodes: Sequence[Episode]) -> dict[str, object]:
         rows = [
             [seconds(e.start_ns), e.kind.value, e.number, [r.severity for r in complaints(e.sure)]]
             for e in episodes[:50]
         ]
         return {"columns": ["t_s", "response", "number", "warnings"], "rows": rows}
 
-    def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, Any]) -> Finding:
-        episode, said = wrong[0]
+    def _explain(self, trace: Trace, wrong: Sequence[tuple[Episode, str]], evidence: dict[str, object]) -> Finding:
+        episode, flaw = wrong[0]
         rule = "goes on" if episode.kind is CallKind.GOOD else "warns"
         side = "above" if episode.kind is CallKind.GOOD else "at or below"
         reason = (
-            f"{moment(episode.start_ns)}, {self.process}: {said} after {number(episode.number or 0.0)}, expected that "
+            f"{moment(episode.start_ns)}, {self.process}: {flaw} after {number(episode.number or 0.0)}, expected that "
         )
         reason += f"it {rule}, as for every number {side} {number(self.threshold)}"
         fault = first_fault(trace, self.process)
@@ -370,7 +370,8 @@ class NoGoWithoutAnswer:
         if not useless or not any(e.kind is CallKind.GOOD for e in episodes):
             return _not_reached(trace, self.process, self.service, episodes)
         going = self._going(trace, episodes)
-        evidence = {"useless": [e.kind.value for e in useless], "goes_on_with": sorted(going)[:5]}
+        kinds = [e.kind.value for e in useless]
+        evidence: dict[str, object] = {"useless": kinds, "goes_on_with": sorted(going)[:5]}
         for episode in useless:
             found = [o for o in episode.sure if shape_of(o.text) in going]
             if found and not self._due(episode, episodes, found[0], going):
@@ -400,7 +401,7 @@ class NoGoWithoutAnswer:
             return False
         return not any(shape_of(o.text) in going for o in before.sure)
 
-    def _went_on(self, episode: Episode, found: Output, evidence: dict[str, Any]) -> Finding:
+    def _went_on(self, episode: Episode, found: Output, evidence: dict[str, object]) -> Finding:
         what = _SAID[episode.kind]
         reason = f"{moment(found.t_ns)}, {self.process}: {quote(found.text, 80)!r} after {what} "
         reason += f"(request {episode.place}), as when it goes on; expected that it does not"

@@ -6,13 +6,13 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.chart import Chart, Look, Tone
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
-from grader.core.trace import ClockKind, Trace
+from grader.core.trace import ClockKind, Endpoint, Trace
 from grader.judging.charts import (
     answer_panel,
     happenings,
@@ -165,7 +165,7 @@ class ThresholdResponse:
                 return answer
         return None if came else during[-1]
 
-    def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, Any]:
+    def _evidence(self, inputs: Sequence[Held], answers: Sequence[Reading]) -> dict[str, object]:
         rows = []
         for asked in inputs:
             state = [a.value for a in answers if a.t_ns < asked.stop_ns]
@@ -179,7 +179,7 @@ class ThresholdResponse:
         violations: Sequence[_Violation],
         inputs: Sequence[Held],
         every: Sequence[Reading],
-        evidence: dict[str, Any],
+        evidence: dict[str, object],
     ) -> Finding:
         first = violations[0]
         answers = last_of_instant(every)
@@ -193,17 +193,17 @@ class ThresholdResponse:
             return faulted(fault, reason, evidence, last=True)
         both = {a.value for a in every if a.t_ns == first.t_ns and first.got is not None}
         if len(both) > 1:
-            said = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
+            cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(reason + said, evidence, hint=hint)
+            return not_met(reason + cause, evidence, hint=hint)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
-            said = f"; the answers are right for what was published {span(lag)} before"
+            cause = f"; the answers are right for what was published {span(lag)} before"
             return not_met(
-                reason + said, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
+                reason + cause, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
             )
-        said, hint = self._diagnosis(violations, inputs, answers)
-        return not_met(reason + said, evidence, hint=hint)
+        cause, hint = self._diagnosis(violations, inputs, answers)
+        return not_met(reason + cause, evidence, hint=hint)
 
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
@@ -251,15 +251,15 @@ class ThresholdResponse:
     def _silent(self, trace: Trace) -> Finding:
         """Return why the controller never answered, and whether it had subscribed."""
         why = explain_no_message(trace, self.output)
-        heard = student_endpoints(trace, "subscription", self.input)
+        ends = student_endpoints(trace, "subscription", self.input)
         if first_fault(trace) is not None or why.evidence.get("messages"):
             return why
-        if not heard:
+        if not ends:
             others = [e.topic for e in student_endpoints(trace, "subscription")]
             instead = f"; it subscribes to {quote(others[0])}" if others else ""
             hint = f"subscribe to {self.input}"
             return not_met(f"{why.reason}; nothing subscribes to {self.input}{instead}", why.evidence, hint=hint)
-        return not_met(f"{why.reason}; {quote(heard[0].node)} subscribes to {self.input}{_deaf(heard)}", why.evidence)
+        return not_met(f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}", why.evidence)
 
     def _nothing_asked(self, trace: Trace) -> Finding:
         fault = first_fault(trace)
@@ -287,7 +287,7 @@ class ThresholdResponse:
         return time_chart(f"response {self.input}", title, about, (upper, lower), happenings(trace))
 
 
-def _deaf(subscriptions: Sequence[Any]) -> str:
+def _deaf(subscriptions: Sequence[Endpoint]) -> str:
     latched = all(e.durability == "transient_local" for e in subscriptions)
     return " with transient_local durability, which a volatile publisher does not offer" if latched else ""
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
@@ -100,7 +100,7 @@ class FieldInRange:
             return values
         rule = FieldRule(low=self.low, high=self.high)
         outside = [(m, v) for m, v in zip(messages, values, strict=True) if not rule.allows(v)]
-        evidence: dict[str, Any] = {"messages": len(values), "outside": len(outside)}
+        evidence: dict[str, object] = {"messages": len(values), "outside": len(outside)}
         evidence |= {"min": min(values), "max": max(values)}
         if not outside:
             reason = f"{self.topic}: {self.field} from {number(min(values))} to {number(max(values))} in "
@@ -253,7 +253,7 @@ class FieldFunction:
         slack = self.tolerance + SLACK
         return jitter_s > 0 and min(got) - slack <= sample.value <= max(got) + slack
 
-    def _few(self, trace: Trace, samples: Sequence[Sample], evidence: dict[str, Any]) -> Finding:
+    def _few(self, trace: Trace, samples: Sequence[Sample], evidence: dict[str, object]) -> Finding:
         found = f"{self.topic}: {counted(len(samples), 'message')}, expected at least {self.at_least}"
         fault = first_fault(trace)
         if fault is None:
@@ -266,7 +266,7 @@ class FieldFunction:
         messages: Sequence[Message],
         samples: Sequence[Sample],
         found: tuple[int, Sequence[Sample]],
-        evidence: dict[str, Any],
+        evidence: dict[str, object],
     ) -> Finding:
         start, wrong = found
         first = wrong[0]
@@ -323,7 +323,7 @@ class RandomInRange:
     def _hint(self) -> str:
         return _RANDOM_HINT.format(low=f"{float(self.low)}", high=f"{float(self.high)}")
 
-    def _evidence(self, values: Sequence[Reading]) -> dict[str, Any]:
+    def _evidence(self, values: Sequence[Reading]) -> dict[str, object]:
         got = [r.value for r in values]
         return {
             "messages": len(got),

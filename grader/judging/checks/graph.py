@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
@@ -191,7 +191,7 @@ class Qos:
         return not_met(f"{self.topic}: no publisher{_seen(seen)}", {"seen": seen[:20]})
 
 
-def _qos(end: Endpoint) -> list[Any]:
+def _qos(end: Endpoint) -> list[object]:
     return [end.node, end.reliability, end.durability, seconds(end.deadline_ns), end.depth]
 
 
@@ -350,7 +350,7 @@ class GraphEdges:
         ends = student_endpoints(trace, topic=edge.topic)
         if not ends:
             return f"nothing publishes {edge.topic} and nothing subscribes to it"
-        said = [
+        found = [
             f"{quote(e.node)} {'publishes' if e.kind == 'publisher' else 'subscribes'} {quote(e.type)}" for e in ends
         ]
-        return f"{edge.topic}: {', '.join(list(dict.fromkeys(said))[:4])}"
+        return f"{edge.topic}: {', '.join(list(dict.fromkeys(found))[:4])}"

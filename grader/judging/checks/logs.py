@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.exercise import Finding, Location
 from grader.core.quantities import DurationNs, Pattern, seconds, within
@@ -30,7 +30,7 @@ from grader.judging.wording import counted, listed, moment, number, quote, span
 LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 
 
-def no_node(trace: Trace, process: str, evidence: Mapping[str, Any]) -> Finding:
+def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
     """Return no credit for output of a process without a node."""
     reason = f"{process}: no node in the ROS graph in {span(trace.stop_ns)}; what is written without one does not count"
     fault = first_fault(trace, process)
@@ -39,7 +39,7 @@ def no_node(trace: Trace, process: str, evidence: Mapping[str, Any]) -> Finding:
     return not_met(reason, evidence, hint="create the node, and log with node.get_logger()", fault=fault)
 
 
-def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[str, Any], hint: str) -> Finding:
+def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[str, object], hint: str) -> Finding:
     """Return no credit for records of severity ERROR or FATAL, at the place of the first one."""
     reason = f"{process}: {counted(len(bad), 'record')} of severity ERROR or FATAL{when}, the first at "
     reason += f"{moment(bad[0].t_ns)}: {quote(bad[0].text)}"
@@ -170,7 +170,7 @@ class LogsMatching:
             return ""
         return f"{len(found)} records, one every {average / 1e9:.3f} s on average"
 
-    def _evidence(self, found: Sequence[Output]) -> dict[str, Any]:
+    def _evidence(self, found: Sequence[Output]) -> dict[str, object]:
         return {"records": len(found), "times_s": [seconds(o.t_ns) for o in found[:60]]}
 
     def _others(self, records: Sequence[LogRecord]) -> str:
@@ -301,7 +301,7 @@ class LogsEvery:
         first = next((o for o in outputs if numbers_in(o.text)), outputs[0])
         return f"{reason} on {self.topic}: {quote(first.text, 80)}"
 
-    def _evidence(self, found: _Rhythm, messages: Sequence[Message]) -> dict[str, Any]:
+    def _evidence(self, found: _Rhythm, messages: Sequence[Message]) -> dict[str, object]:
         places = [place + 1 for place in found.places[:_MOST_IN_EVIDENCE]]
         return {"messages": len(messages), "logs": len(found.places), "with_message": places, "every": self.every}
 

@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
 from grader.core.errors import HarnessError
@@ -145,7 +144,7 @@ class LogsPosition:
         )
 
 
-def _evidence(found: Analysis) -> dict[str, Any]:
+def _evidence(found: Analysis) -> dict[str, object]:
     entries = found.right or found.wrong or tuple(e for g in found.groups for e in g.entries)
     return {
         "right": len(found.right),
@@ -199,7 +198,7 @@ class LogPeriod:
         return self._judged(trace, track, times, average_ns, evidence)
 
     def _judged(
-        self, trace: Trace, track: Track, times: Sequence[int], average_ns: float, evidence: dict[str, Any]
+        self, trace: Trace, track: Track, times: Sequence[int], average_ns: float, evidence: dict[str, object]
     ) -> Finding:
         wanted = f"expected one every {span(self.period)} ± {number(100 * self.tolerance)} %"
         if len(times) == 1:
@@ -217,7 +216,9 @@ class LogPeriod:
             f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}", evidence, fault=fault
         )
 
-    def _off(self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, Any]) -> Finding:
+    def _off(
+        self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, object]
+    ) -> Finding:
         """Return a finding that the average is wrong, with `reason`, or that each message is logged."""
         played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
         if len(times) < _ONE_A_MESSAGE * played:
@@ -382,12 +383,12 @@ def _dots(name: str, pairs: Sequence[_LoggedPair], tone: Tone) -> list[Series]:
 def _describe_path(topic: str, track: Track, pairs: Sequence[_LoggedPair], hidden: int) -> str:
     right = sum(p.right for p in pairs)
     first, last = track.pose(0), track.pose(len(track.deliveries) - 1)
-    said = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
-    said += f"{_place(last.at(X), last.at(Y))}. "
+    text = f"{topic} was played for {span(track.stop_ns - track.start_ns)}, from {_place(first.at(X), first.at(Y))} to "
+    text += f"{_place(last.at(X), last.at(Y))}. "
     if not pairs:
-        return f"{said}No pair of numbers was logged."
-    said += f"{right} of {counted(len(pairs), 'logged pair')} of numbers agree with it."
-    return f"{said} {hidden} too far away to be drawn." if hidden else said
+        return f"{text}No pair of numbers was logged."
+    text += f"{right} of {counted(len(pairs), 'logged pair')} of numbers agree with it."
+    return f"{text} {hidden} too far away to be drawn." if hidden else text
 
 
 def _place(x: float, y: float) -> str:

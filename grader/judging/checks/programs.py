@@ -76,8 +76,8 @@ class ParameterDeclared:
             reason = f"{quote(found.node)}: has no parameter {self.name}, expected {self.expected}"
             return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name))
         flaw = self._flaw(found)
-        said = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
-        return not_met(f"{said}, expected {flaw}", evidence) if flaw else met(said, evidence)
+        text = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
+        return not_met(f"{text}, expected {flaw}", evidence) if flaw else met(text, evidence)
 
     def _flaw(self, found: ReportedParameter) -> str:
         if self.type not in (None, found.type):
@@ -147,7 +147,7 @@ class ParameterTakesEffect:
         if not messages:
             return explain_no_message(trace, self.topic)
         stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
-        evidence: dict[str, Any] = {"set": [[seconds(s.t_ns), s.value, s.taken] for s in tries]}
+        evidence: dict[str, object] = {"set": [[seconds(s.t_ns), s.value, s.taken] for s in tries]}
         for one, stop_ns in zip(tries, stops, strict=True):
             flaw, hint = self._flaw(one, stop_ns, messages)
             if flaw:
@@ -317,7 +317,7 @@ class SourceUses:
             return source
         classes = source.deriving(*self.derives_from) if self.derives_from else []
         found = {name: source.calling(name) for name in self.calls}
-        evidence: dict[str, Any] = {
+        evidence: dict[str, object] = {
             "classes": [c.name for c in classes][:20],
             "calls": {name: [c.lineno for c in calls][:20] for name, calls in found.items()},
         }

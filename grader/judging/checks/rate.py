@@ -79,10 +79,10 @@ class TopicRate:
     def expected(self) -> str:
         """What is expected, in one phrase."""
         over = "over the whole observation" if self.window is None else f"over {span(self.window)}"
-        said = f"{self.topic} at {number(self.rate)} ± {number(self.tolerance)} Hz on average {over}"
+        text = f"{self.topic} at {number(self.rate)} ± {number(self.tolerance)} Hz on average {over}"
         if self.partly_tolerance is not None:
-            said += f"; half the points at {number(self.rate)} ± {number(self.partly_tolerance)} Hz"
-        return said
+            text += f"; half the points at {number(self.rate)} ± {number(self.partly_tolerance)} Hz"
+        return text
 
     def judge(self, trace: Trace) -> Finding:
         """Return full, half or no credit, depending on the difference of the rate."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from grader.core.chart import Chart, Look, Panel, Tone
 from grader.core.errors import HarnessError
@@ -159,7 +158,7 @@ class LogsValues:
             for f in self.unit_factors
         ]
 
-    def _evidence(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, Any]:
+    def _evidence(self, received: Sequence[_Received], unlogged: Sequence[_Received]) -> dict[str, object]:
         return {
             "messages": len(received),
             "logged": len(received) - len(unlogged),
@@ -183,7 +182,7 @@ class LogsValues:
         received: Sequence[_Received],
         unlogged: Sequence[_Received],
         outputs: Sequence[Output],
-        evidence: dict[str, Any],
+        evidence: dict[str, object],
     ) -> Finding:
         first = unlogged[0]
         wanted = " and ".join(number(f * first.value) for f in self.unit_factors)
@@ -193,8 +192,8 @@ class LogsValues:
             f"{self.process}: {len(unlogged)} of {counted(len(received), 'message')} of {self.topic} are not logged "
         )
         reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
-        said, hint = self._cause(received, unlogged, outputs)
-        return not_met(f"{reason}; {said}" if said else reason, evidence, hint=hint)
+        cause, hint = self._cause(received, unlogged, outputs)
+        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint)
 
     def _cause(
         self, received: Sequence[_Received], unlogged: Sequence[_Received], outputs: Sequence[Output]
@@ -205,23 +204,23 @@ class LogsValues:
             return "", rule
         if len(silent) > len(received) / 2:
             return f"nothing is logged at {len(silent)} of the messages", rule
-        heard = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
+        logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         largest = max(abs(r.value) for r in received)
-        right = [f for f in self.unit_factors if self._mostly(heard, f, _FINE * abs(f) * largest)]
+        right = [f for f in self.unit_factors if self._mostly(logged, f, _FINE * abs(f) * largest)]
         for factor in (f for f in self.unit_factors if f not in right):
-            said, hint = wrong_conversion(heard, factor, right)
-            if said:
-                return f"{times(factor)}: {said}", hint
-            if right and all(len(h.numbers) <= len(right) for h in heard):
+            cause, hint = wrong_conversion(logged, factor, right)
+            if cause:
+                return f"{times(factor)}: {cause}", hint
+            if right and all(len(h.numbers) <= len(right) for h in logged):
                 return f"{times(factor)} is not there, only {' and '.join(map(times, right))}", ""
         return "", ""
 
-    def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Any, ...]:
+    def _numbers(self, one: _Received, outputs: Sequence[Output]) -> tuple[Printed, ...]:
         return tuple(n for o in in_window(outputs, one.t_ns, one.stop_ns) for n in numbers_in(o.text))
 
-    def _mostly(self, heard: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
-        hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in heard)
-        return hits > 0.8 * len(heard)
+    def _mostly(self, logged: Sequence[LoggedNumbers], factor: float, coarsest: float) -> bool:
+        hits = sum(any(shows_about(n, factor * h.value, coarsest=coarsest) for n in h.numbers) for h in logged)
+        return hits > 0.8 * len(logged)
 
 
 def _shows(value: float, largest: float, printed: Printed) -> bool:
@@ -269,7 +268,7 @@ class LogsReceived:
         records = student_records(trace, self.process)
         sought = self._sought(values, trace)
         unlogged = _missing(values, followed(records, sought), trace)
-        evidence: dict[str, Any] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
+        evidence: dict[str, object] = {"values": [v.value for v in values], "missing": [v.value for v in unlogged]}
         if not unlogged:
             reason = f"{self.process}: all {len(values)} values of {self.topic} are logged"
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
@@ -307,7 +306,7 @@ class LogsReceived:
         subscriptions: Sequence[Endpoint],
         values: Sequence[Held],
         unlogged: Sequence[Held],
-        evidence: dict[str, Any],
+        evidence: dict[str, object],
     ) -> Finding:
         first = unlogged[0]
         reason = f"{self.process}: {len(unlogged)} of {len(values)} values of {self.topic} are never logged, "
@@ -357,7 +356,7 @@ def _shows_exactly(value: float, printed: Printed) -> bool:
 
 
 def _hidden(
-    check: LogsValues | LogsReceived, share: str, first: tuple[float, int], among: str, evidence: dict[str, Any]
+    check: LogsValues | LogsReceived, share: str, first: tuple[float, int], among: str, evidence: dict[str, object]
 ) -> Finding:
     """Return no credit for numbers that appear among others; `first` is the first of them and its time."""
     value, t_ns = first

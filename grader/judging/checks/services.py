@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
-from typing import Any
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
@@ -217,11 +216,11 @@ class ServiceSequence:
     @property
     def expected(self) -> str:
         """What is expected, in one phrase."""
-        said = (
+        text = (
             f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
         )
         again = "" if self.reset_to is None else f"; {number(self.reset_to)} instead of what lies beyond"
-        return said + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
+        return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every number is the expected one; the reason names the first that is not."""
@@ -234,7 +233,7 @@ class ServiceSequence:
         answers = min(orders, key=lambda order: len(self._wrong(order)))
         wrong = self._wrong(answers)
         got = [a.got for a in answers]
-        evidence: dict[str, Any] = {
+        evidence: dict[str, object] = {
             "service": self.service,
             "responses": len(answers),
             "numbers": got[:_MOST_IN_EVIDENCE],
@@ -288,15 +287,15 @@ class ServiceSequence:
         text = text_at(response.value, self.field)
         return None if text is None else number_in(text, self.pattern)
 
-    def _differs(self, answers: Sequence[_Answer], place: int, evidence: dict[str, Any]) -> Finding:
+    def _differs(self, answers: Sequence[_Answer], place: int, evidence: dict[str, object]) -> Finding:
         first = answers[place]
         found = self._found(first)
         before = f" after {number(answers[place - 1].wanted)}" if place else ""
         reason = f"{moment(first.response.t_ns)}, {self.service}: {found}{before} in response {place + 1}, "
         reason += f"expected {number(first.wanted)}"
-        said, hint = self._instead([a.got for a in answers], place)
+        cause, hint = self._instead([a.got for a in answers], place)
         known = evidence | {"first_wrong": place + 1, "first_wrong_s": seconds(first.response.t_ns)}
-        return not_met(f"{reason}; {said}" if said else reason, known, hint=hint)
+        return not_met(f"{reason}; {cause}" if cause else reason, known, hint=hint)
 
     def _found(self, answer: _Answer) -> str:
         if answer.got is not None:

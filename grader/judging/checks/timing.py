@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
@@ -90,8 +90,8 @@ class Period:
             "max_s": max(lengths),
             "average_s": statistics.fmean(lengths),
         }
-        said = f"{self.topic}: gaps from {min(lengths):.3f} s to {max(lengths):.3f} s, "
-        said += f"{evidence['average_s']:.3f} s on average"
+        text = f"{self.topic}: gaps from {min(lengths):.3f} s to {max(lengths):.3f} s, "
+        text += f"{evidence['average_s']:.3f} s on average"
         wrong = self._wrong(trace, gaps)
         if wrong is not None:
             t_ns, gap = wrong
@@ -99,8 +99,8 @@ class Period:
             return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)})
         average = (times[-1] - times[0]) / len(gaps)
         if self.average is not None and not within(average, self.average, self.tolerance * self.average):
-            return not_met(f"{said}; expected {self.expected}", evidence)
-        return met(said, evidence)
+            return not_met(f"{text}; expected {self.expected}", evidence)
+        return met(text, evidence)
 
     def _wrong(self, trace: Trace, gaps: Sequence[tuple[int, int]]) -> tuple[int, int] | None:
         jitter = JITTER_NS[trace.clock]
@@ -145,7 +145,7 @@ class Latency:
             return _no_input(trace, self.input)
         delays = [self._delay(t_ns, outputs, jitter) for t_ns in inputs]
         late = [(t, d) for t, d in zip(inputs, delays, strict=True) if d is None or d > self.within + jitter]
-        evidence: dict[str, Any] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
+        evidence: dict[str, object] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
         known = [d for d in delays if d is not None]
         evidence["slowest_s"] = seconds(max(known, default=0))
         if len(inputs) - len(late) >= self.share * len(inputs) - 1e-9:
@@ -260,12 +260,12 @@ class ReactionCase:
     copies: Mapping[str, str] = field(default_factory=dict)
     silent: bool = False
 
-    def rules(self, given: Mapping[str, Any]) -> dict[str, RuleOrValue]:
+    def rules(self, given: Mapping[str, object]) -> dict[str, RuleOrValue]:
         """Return the rules for the output after an input."""
         return {**self.then, **{path: _copied(given, source) for path, source in self.copies.items()}}
 
 
-def _copied(given: Mapping[str, Any], source: str) -> RuleOrValue:
+def _copied(given: Mapping[str, object], source: str) -> RuleOrValue:
     try:
         found = at_path(given, source)
     except NoSuchField:
@@ -323,8 +323,8 @@ class Reaction:
             return self._untried(trace, missing)
         if not outputs and not all(a.case.silent for a in asked):
             return self._silent(trace)
-        wrong = [(a, said) for a in asked if (said := self._wrong(trace, a))]
-        evidence = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
+        wrong = [(a, flaw) for a in asked if (flaw := self._wrong(trace, a))]
+        evidence: dict[str, object] = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
         if wrong:
             return self._explain(trace, wrong, len(asked), evidence)
         return met(f"{self.output}: right after each of {counted(len(asked), 'input')} on {self.input}", evidence)
@@ -373,11 +373,11 @@ class Reaction:
         return f"{moment(output.t_ns)}: {breach(output.value, path, as_rule(rules[path], self.tolerance))}"
 
     def _explain(
-        self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, Any]
+        self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, object]
     ) -> Finding:
-        asked, said = wrong[0]
+        asked, flaw = wrong[0]
         shown = listed([f"{path} = {_short(asked.given.value, path)}" for path in asked.case.when])
-        reason = f"{self.output}, after {shown} on {self.input} at {moment(asked.given.t_ns)}: {said}; "
+        reason = f"{self.output}, after {shown} on {self.input} at {moment(asked.given.t_ns)}: {flaw}; "
         reason += f"wrong after {len(wrong)} of {counted(total, 'input')}"
         fault = first_fault(trace)
         if fault is not None and not asked.outputs:
@@ -385,8 +385,8 @@ class Reaction:
         return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)})
 
     def _silent(self, trace: Trace) -> Finding:
-        heard = student_endpoints(trace, "subscription", self.input)
-        if not heard and trace.deliveries(self.input) and first_fault(trace) is None:
+        subscriptions = student_endpoints(trace, "subscription", self.input)
+        if not subscriptions and trace.deliveries(self.input) and first_fault(trace) is None:
             return explain_no_subscription(trace, self.input)
         return explain_no_message(trace, self.output)
 
@@ -400,5 +400,5 @@ class Reaction:
         raise HarnessError(f"{self.input}: no input with {case} was published in time")
 
 
-def _short(value: Mapping[str, Any], path: str) -> str:
+def _short(value: Mapping[str, object], path: str) -> str:
     return quote(str(value_at(value, path, "nothing")), 60)

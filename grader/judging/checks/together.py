@@ -5,10 +5,9 @@ from __future__ import annotations
 import statistics
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 from grader.core.chart import Chart, Look, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
@@ -119,7 +118,7 @@ class AnswersTogether:
     def _wrong(self) -> Problem:
         return Problem(ProblemKind.WRONG_ANSWER, (self.input, self.output))
 
-    def _evidence(self, inputs: Sequence[Reading], answers: Sequence[Reading]) -> dict[str, Any]:
+    def _evidence(self, inputs: Sequence[Reading], answers: Sequence[Reading]) -> dict[str, int]:
         changes = sum(a.value != b.value for a, b in pairwise(answers))
         return {
             "inputs": len(inputs),
@@ -138,7 +137,7 @@ class AnswersTogether:
             return found
         return replace(found, problem=Problem(ProblemKind.NO_MESSAGE, (topic,)))
 
-    def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
+    def _contradictory(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, int]) -> Finding | None:
         """Return a finding if different answers of one instant fit no current input."""
         times, jitter_ns = [r.t_ns for r in inputs], JITTER_NS[trace.clock]
         for one, following in pairwise(published_numbers(trace, self.output)):
@@ -149,15 +148,15 @@ class AnswersTogether:
             if any(within(one.value, self._expected(r.value), EXACT) for r in recent):
                 continue
             both = " and ".join(map(number, sorted((one.value, following.value))))
-            said = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
-            said += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
+            reason = f"{moment(one.t_ns)}, {self.output}: {both} at one instant for {number(recent[-1].value)}"
+            reason += f"{unit_of(self.input)} on {self.input}, expected {number(self._expected(recent[-1].value))} only"
             hint = f"publish one answer to each number on {self.input}"
             known = evidence | {"first_wrong_s": seconds(one.t_ns)}
-            return not_met(said, known, hint=hint, problem=self._wrong)
+            return not_met(reason, known, hint=hint, problem=self._wrong)
         return None
 
     def _wrong_answer(
-        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]
     ) -> Finding | None:
         times, jitter_ns, timed = [r.t_ns for r in inputs], JITTER_NS[trace.clock], _on_a_timer(answers)
         for answer in answers:
@@ -175,7 +174,7 @@ class AnswersTogether:
         return self._inconsistent(trace, inputs, answers, evidence)
 
     def _behind(
-        self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: Mapping[str, float]
     ) -> Finding:
         """Return that an answer is wrong, and by how much the answers lag if that explains all of them."""
         behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
@@ -183,10 +182,10 @@ class AnswersTogether:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers are right for what came {counted(behind, 'message')} before"
         hint = f"answer what has just come on {self.input}"
-        return not_met(reason, evidence | {"behind": behind}, hint=hint, problem=self._wrong)
+        return not_met(reason, {**evidence, "behind": behind}, hint=hint, problem=self._wrong)
 
     def _inconsistent(
-        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]
     ) -> Finding | None:
         """Return a finding if no common delay explains most answers; None if one does."""
         times = [r.t_ns for r in inputs]
@@ -208,7 +207,7 @@ class AnswersTogether:
         reason = f"{self.output}: at best {number(100 * max(shares))} % of {len(later)} answers fit {self.input}, "
         return self._behind(f"{reason}expected all of them", inputs, answers, evidence)
 
-    def _stopped_sensor(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, Any]) -> Finding | None:
+    def _stopped_sensor(self, trace: Trace, inputs: Sequence[Reading], evidence: dict[str, int]) -> Finding | None:
         gaps = [b.t_ns - a.t_ns for a, b in pairwise(inputs)]
         usual = statistics.median(gaps) if gaps else 0
         last = inputs[-1].t_ns
@@ -217,7 +216,7 @@ class AnswersTogether:
         return self._stopped(trace, self.input, last, evidence)
 
     def _stopped_controller(
-        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, trace: Trace, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]
     ) -> Finding | None:
         times = [a.t_ns for a in answers]
         for asked in inputs:
@@ -232,7 +231,7 @@ class AnswersTogether:
                 return self._stopped(trace, self.output, before[-1].t_ns, evidence)
         return None
 
-    def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, Any]) -> Finding:
+    def _stopped(self, trace: Trace, topic: str, last_ns: int, evidence: dict[str, int]) -> Finding:
         fault = next((f for f in trace.faults() if f.t_ns <= trace.stop_ns), None)
         reason = f"{topic}: nothing after {moment(last_ns)}, expected to go on to {span(trace.stop_ns)}"
         known, problem = evidence | {"last_s": seconds(last_ns)}, Problem(ProblemKind.STOPPED, (topic,))
@@ -242,7 +241,7 @@ class AnswersTogether:
         return not_met(reason, known, hint=fault_hint(fault), fault=fault, problem=problem)
 
     def _one_sided(
-        self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]
+        self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]
     ) -> Finding | None:
         expected = [self._expected(r.value) for r in inputs]
         fixed = Problem(ProblemKind.NEVER_CHANGES, (self.input, self.output))
@@ -263,7 +262,7 @@ class AnswersTogether:
         reason = f"{self.output}: never {number(lacking[0])}, though {self.input} was on both sides of "
         return not_met(f"{reason}{number(self.threshold)}{unit_of(self.input)}", evidence, problem=self._wrong)
 
-    def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, Any]) -> Finding:
+    def _all_well(self, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: dict[str, int]) -> Finding:
         reason = (
             f"{self.output}: {counted(len(answers), 'answer')} to {counted(len(inputs), 'value')} on {self.input}, "
         )
@@ -331,12 +330,12 @@ def _kept_apart(trace: Trace, topic: str) -> Finding | None:
     one, other = _speakers(trace, here, there)
     policy = _incompatible(here, there)
     if not alike or policy is None:
-        said = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
+        text = f"{one} publishes {quote(here.type)}, {other} subscribes {quote(there.type)}"
         hint = f"use the same message type for {topic} in both files"
-        return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
-    said = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
+        return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
+    text = f"{one} offers {policy[0]}, {other} asks for {policy[1]}"
     hint = "pass the queue depth 10 as QoS on both sides"
-    return not_met(f"{topic}: {said}: they cannot talk", evidence, hint=hint, problem=problem)
+    return not_met(f"{topic}: {text}: they cannot talk", evidence, hint=hint, problem=problem)
 
 
 def _incompatible(publisher: Endpoint, subscription: Endpoint) -> tuple[str, str] | None:
@@ -359,6 +358,6 @@ def _file_of(trace: Trace, endpoint: Endpoint) -> str:
     for record in trace.records():
         if record.logger == bare:
             return record.process
-    heard: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
-    named = (o.process for o in heard if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
+    written: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
+    named = (o.process for o in written if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
     return next(named, "")

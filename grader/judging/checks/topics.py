@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding
@@ -132,7 +131,7 @@ class FieldValues:
     def _differing(self, messages: Sequence[Message]) -> list[Message]:
         """Return the messages with a wrong field; a message equal to a known right one is right."""
         wrong = []
-        right: tuple[str, Mapping[str, Any]] | None = None
+        right: tuple[str, Mapping[str, object]] | None = None
         for message in messages:
             content = (message.type, message.value)
             if content == right:
@@ -260,7 +259,7 @@ class _Found:
     """One transform of a message."""
 
     t_ns: int
-    value: Mapping[str, Any]
+    value: Mapping[str, object]
 
     @property
     def frames(self) -> tuple[str, str]:
@@ -322,10 +321,10 @@ class Transform:
                 reason = f"{moment(one.t_ns)}, {self.parent} → {self.child}: {flaw}"
                 return not_met(reason, evidence | {"first_wrong_s": seconds(one.t_ns)})
         pace = self._pace_flaw(mine)
-        said = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
+        text = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
         if not pace:
-            return met(said, evidence)
-        return explain_fault(trace, f"{said}, {pace}", evidence, last=True) or not_met(f"{said}, {pace}", evidence)
+            return met(text, evidence)
+        return explain_fault(trace, f"{text}, {pace}", evidence, last=True) or not_met(f"{text}, {pace}", evidence)
 
     def _flaw(self, one: _Found) -> str:
         got = one.numbers("translation", _AXES)
@@ -363,6 +362,6 @@ class Transform:
         return not_met(reason, {"found": pairs[:20]}, hint=hint)
 
 
-def _transforms(message: Message) -> list[Mapping[str, Any]]:
+def _transforms(message: Message) -> list[Mapping[str, object]]:
     found = message.value.get("transforms")
     return [t for t in found if isinstance(t, Mapping)] if isinstance(found, (list, tuple)) else []

@@ -52,8 +52,8 @@ def diagnose(
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
     read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
-    said = _Reporter(exercise)
-    return tuple(said.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
+    reporter = _Reporter(exercise)
+    return tuple(reporter.on(v, c, traces, read_) for v, c in zip(verdicts, exercise.criteria, strict=True))
 
 
 def clue_for(case: Case) -> tuple[str, Clue] | None:
@@ -125,7 +125,7 @@ class _Reporter:
 
 
 def _same_as(criterion: str, verdict: Verdict) -> Verdict:
-    hint = f"this has the same cause as {criterion}: mend that first"
+    hint = f"this has the same cause as {criterion}: fix that first"
     return replace(verdict, hint=hint, same_cause_as=criterion)
 
 
@@ -149,10 +149,10 @@ def _placed(file: str, text: str) -> str:
     source = read(file, text)
     guard = _wrong_guard(source)
     if guard is not None:
-        said = (
+        problem = (
             f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so `python3 {file}` would"
         )
-        return f"{said} do nothing; write: if __name__ == '__main__':"
+        return f"{problem} do nothing; write: if __name__ == '__main__':"
     main = next(iter(source.functions("main")), None)
     return main_not_called(file, first_line(main) if main is not None else 0)
 

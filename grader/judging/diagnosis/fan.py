@@ -176,9 +176,9 @@ def _compared_as_text(case: Case) -> Clue | None:
     """`str(msg.data) > '25'` compares alphabetically."""
     for source, test in _compared(case):
         sides = [text(source, side) for side in (test.left, test.comparators[0])]
-        said = next((side for side in sides if side is not None), None)
+        constant = next((side for side in sides if side is not None), None)
         ordered = isinstance(test.ops[0], (ast.Gt, ast.GtE, ast.Lt, ast.LtE))
-        if said is None or not _is_number(said) or not ordered:
+        if constant is None or not _is_number(constant) or not ordered:
             continue
         limit = number(case.check.threshold)
         hint = f"{source.code(test, 50)} compares texts, letter by letter: compare the number itself with {limit}"
@@ -186,8 +186,8 @@ def _compared_as_text(case: Case) -> Clue | None:
     return None
 
 
-def _is_number(said: str) -> bool:
-    return said.strip().replace(".", "", 1).isdigit()
+def _is_number(text: str) -> bool:
+    return text.strip().replace(".", "", 1).isdigit()
 
 
 @rule(ThresholdResponse, AnswersTogether)
@@ -323,8 +323,8 @@ def _wrong_answer(controller: _Controller) -> Clue | None:
     if len(places) != 1:
         return None
     whole = isinstance(places[0], (ast.Assign, ast.keyword))
-    said = f"{source.code(places[0])} answers {number(value)}" if whole else f"{number(value)} is answered here"
-    hint = f"{said}: it must be {wanted}"
+    text = f"{source.code(places[0])} answers {number(value)}" if whole else f"{number(value)} is answered here"
+    hint = f"{text}: it must be {wanted}"
     return Clue(hint, source.place(places[0]), key=f"answer:{number(value)}")
 
 

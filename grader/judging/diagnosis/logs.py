@@ -204,10 +204,10 @@ def _log_period(case: Case) -> Clue | None:
 
 def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -> Clue | None:
     """The log is written in the callback of the subscription, each time or every n-th time."""
-    heard = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
-    if not heard or argument(call, 99, "throttle_duration_sec") is not None:
+    subscriptions = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
+    if not subscriptions or argument(call, 99, "throttle_duration_sec") is not None:
         return None
-    inside = [n for m in heard for n in reached(source, roots(source, m.callback)) if isinstance(n, ast.If)]
+    inside = [n for m in subscriptions for n in reached(source, roots(source, m.callback)) if isinstance(n, ast.If)]
     counted_by = next((n for n in inside if _counts(source, n.test) and call in set(reached(source, [n]))), None)
     if counted_by is not None:
         hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of {wanted_s} s"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import libcst as cst
 from libcst import matchers as m
@@ -23,7 +22,7 @@ from grader.mutation.operators.program import (
 )
 
 
-def lines_of(function: cst.FunctionDef) -> Sequence[Any]:
+def lines_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
     """Return the statements of a function's body, in order, without its docstring."""
     if not isinstance(function.body, cst.IndentedBlock):
         return ()

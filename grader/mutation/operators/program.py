@@ -13,7 +13,8 @@ from libcst.metadata import CodeRange, MetadataWrapper, ParentNodeProvider, Posi
 
 Node = TypeVar("Node", bound=cst.CSTNode)
 #: A node and its replacement: another node, several nodes, or nothing.
-Edit = tuple[cst.CSTNode, cst.CSTNode | cst.FlattenSentinel[Any] | cst.RemovalSentinel]
+Replacement = cst.CSTNode | cst.FlattenSentinel[cst.CSTNode] | cst.RemovalSentinel
+Edit = tuple[cst.CSTNode, Replacement]
 
 #: Parameters of the methods that create rclpy entities, in order.
 CREATORS: Mapping[str, tuple[str, ...]] = {
@@ -133,7 +134,7 @@ class Program:
 
     def changed(self, edits: Sequence[Edit]) -> str:
         """Return the source after edits."""
-        replacements: dict[cst.CSTNode, Any] = {}
+        replacements: dict[cst.CSTNode, Replacement] = {}
         for old, new in edits:
             before = replacements.get(old)
             replacements[old] = new if before is None else _joined(before, new)
@@ -141,7 +142,7 @@ class Program:
 
 
 class _Replacing(cst.CSTTransformer):
-    def __init__(self, replacements: Mapping[cst.CSTNode, Any]) -> None:
+    def __init__(self, replacements: Mapping[cst.CSTNode, Replacement]) -> None:
         super().__init__()
         self._replacements = replacements
 
@@ -149,8 +150,10 @@ class _Replacing(cst.CSTTransformer):
         return self._replacements.get(original_node, updated_node)
 
 
-def _joined(one: Any, other: Any) -> Any:
+def _joined(one: Replacement, other: Replacement) -> Replacement:
     """Merge two insertions before the same statement."""
+    assert isinstance(one, cst.FlattenSentinel)
+    assert isinstance(other, cst.FlattenSentinel)
     return cst.FlattenSentinel([*list(one)[:-1], *list(other)])
 
 
@@ -182,7 +185,7 @@ def expression(text: str) -> cst.BaseExpression:
     return cst.parse_expression(text)
 
 
-def statement(text: str) -> Any:
+def statement(text: str) -> cst.BaseStatement:
     """Parse a statement."""
     return cst.parse_statement(text)
 

@@ -48,22 +48,22 @@ def log_level(program: Program) -> Iterator[Mutation]:
 
 def log_every_message(program: Program) -> Iterator[Mutation]:
     """A report with each message instead of by a timer."""
-    for heard in program.handed_to("create_subscription"):
+    for callback in program.handed_to("create_subscription"):
         for timer in program.handed_to("create_timer"):
-            lines = lines_of(heard)
-            if lines and parameters(timer) == ["self"] and parameters(heard)[:1] == ["self"]:
+            lines = lines_of(callback)
+            if lines and parameters(timer) == ["self"] and parameters(callback)[:1] == ["self"]:
                 last = lines[-1]
                 added = cst.FlattenSentinel([last, statement(f"self.{timer.name.value}()")])
-                yield Mutation(heard, f"{heard.name.value} calls {timer.name.value}", ((last, added),))
+                yield Mutation(callback, f"{callback.name.value} calls {timer.name.value}", ((last, added),))
 
 
 def text(program: Program) -> Iterator[Mutation]:
     """A misspelt word in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
-        said = text_of(node)
-        if said is not None and not is_docstring(program, node) and _is_prose(said) and (word := _WORD.search(said)):
-            after = said[: word.start()] + word[0][:-1] + said[word.end() :]
-            yield Mutation(node, into(said, after), ((node, string(after)),))
+        old = text_of(node)
+        if old is not None and not is_docstring(program, node) and _is_prose(old) and (word := _WORD.search(old)):
+            after = old[: word.start()] + word[0][:-1] + old[word.end() :]
+            yield Mutation(node, into(old, after), ((node, string(after)),))
     for part in program.all(cst.FormattedStringText):
         if word := _WORD.search(part.value):
             after = part.value[: word.start()] + word[0][:-1] + part.value[word.end() :]
@@ -78,10 +78,10 @@ def rounding(program: Program) -> Iterator[Mutation]:
             after = part.with_changes(format_spec=[cst.FormattedStringText(".0f")])
             yield Mutation(part, into(program.code(part), program.code(after)), ((part, after),))
     for node in program.all(cst.SimpleString):
-        said = text_of(node)
-        if said is not None and (match := re.search(r"%\.[1-9]f", said)):
-            after_text = said[: match.start()] + "%.0f" + said[match.end() :]
-            yield Mutation(node, into(said, after_text), ((node, string(after_text)),))
+        old = text_of(node)
+        if old is not None and (match := re.search(r"%\.[1-9]f", old)):
+            after_text = old[: match.start()] + "%.0f" + old[match.end() :]
+            yield Mutation(node, into(old, after_text), ((node, string(after_text)),))
 
 
 def missing_value(program: Program) -> Iterator[Mutation]:
@@ -100,9 +100,9 @@ def _plain(arg: cst.Arg) -> cst.Arg:
     return arg.with_changes(comma=cst.MaybeSentinel.DEFAULT, keyword=None, equal=cst.MaybeSentinel.DEFAULT)
 
 
-def _is_prose(said: str) -> bool:
+def _is_prose(text: str) -> bool:
     """Whether a text is for people: names of topics, nodes and files have no spaces."""
-    return " " in said.strip()
+    return " " in text.strip()
 
 
 _NAMED = {

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
-from typing import Any
 
 from grader.core.exercise import Outcome
+from grader.reporting import json_report
 
 #: A report as JSON values, version 1.
-ReportData = Mapping[str, Any]
+ReportData = json_report.ReportData
 
 LOST = (Outcome.NOT_MET.value, Outcome.PARTLY.value)
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from importlib.resources import files
-from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Template
@@ -78,7 +77,7 @@ _NAME_LIMIT = 100
 
 def payload(
     page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[CommonCause], spread: Distribution
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the data of the page.
 
     Args:
@@ -100,7 +99,7 @@ def payload(
 
 def _student(
     student: StudentRow, exercises: Sequence[ExerciseCount], criteria: Sequence[tuple[str, str]]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the sort keys of a row, column by column, and the outcome of each criterion as one letter."""
     by_id = {} if student.report is None else {e["id"]: e for e in student.report["exercises"]}
     outcomes = {(e, c["id"]): LETTERS[Outcome(c["outcome"])] for e, x in by_id.items() for c in x["criteria"]}

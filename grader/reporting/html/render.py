@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable
 from fractions import Fraction
 from functools import cache
-from typing import Any
 
 from jinja2 import Environment
 from markupsafe import Markup
 
 from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Series, Stage
 from grader.core.exercise import Location, Outcome, exercise_name
+from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import ClockKind, Endpoint
 from grader.reporting import wording
@@ -25,12 +25,12 @@ _NAME_LIMIT = 60
 _MOST_BOXES = 60
 
 
-def figure_values(figure: Figure) -> dict[str, Any]:
+def figure_values(figure: Figure) -> JsonObject:
     """Return a figure as JSON values; numbers that JSON cannot represent become None."""
     return _graph(figure) if isinstance(figure, GraphFigure) else _chart(figure)
 
 
-def _chart(chart: Chart) -> dict[str, Any]:
+def _chart(chart: Chart) -> JsonObject:
     return {
         "kind": "chart",
         "title": shown(chart.title),
@@ -43,7 +43,7 @@ def _chart(chart: Chart) -> dict[str, Any]:
     }
 
 
-def _panel(panel: Panel) -> dict[str, Any]:
+def _panel(panel: Panel) -> JsonObject:
     return {
         "title": shown(panel.title, limit=_NAME_LIMIT),
         "unit": panel.unit,
@@ -58,7 +58,7 @@ def _panel(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _series(series: Series) -> dict[str, Any]:
+def _series(series: Series) -> JsonObject:
     return {
         "name": shown(series.name, limit=_NAME_LIMIT),
         "look": series.look.value,
@@ -68,7 +68,7 @@ def _series(series: Series) -> dict[str, Any]:
     }
 
 
-def _graph(figure: GraphFigure) -> dict[str, Any]:
+def _graph(figure: GraphFigure) -> JsonObject:
     return {
         "kind": "graph",
         "title": shown(figure.title),
@@ -76,7 +76,7 @@ def _graph(figure: GraphFigure) -> dict[str, Any]:
     }
 
 
-def _stage(stage: Stage) -> dict[str, Any]:
+def _stage(stage: Stage) -> JsonObject:
     """Return nodes, topics and arrows; ids tell a node from a topic of the same name."""
     endpoints = [e for e in stage.graph.endpoints if "/_" not in e.topic]
     nodes = list(dict.fromkeys((*stage.graph.nodes, *(e.node for e in endpoints))))[:_MOST_BOXES]
@@ -93,17 +93,17 @@ def _stage(stage: Stage) -> dict[str, Any]:
     }
 
 
-def _types(topic: str, endpoints: Iterable[Endpoint]) -> dict[str, Any]:
+def _types(topic: str, endpoints: Iterable[Endpoint]) -> JsonObject:
     types = list(dict.fromkeys(e.type for e in endpoints if e.topic == topic))
     return {"types": [shown(t, limit=_NAME_LIMIT) for t in types[:5]], "quarrel": len(types) > 1}
 
 
-def _edge(endpoint: Endpoint, node: str, topic: str) -> dict[str, Any]:
+def _edge(endpoint: Endpoint, node: str, topic: str) -> JsonObject:
     ends = (node, topic) if endpoint.kind == "publisher" else (topic, node)
-    said = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
-    said += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
-    said += f", depth {endpoint.depth}" if endpoint.depth else ""
-    return {"from": ends[0], "to": ends[1], "text": shown(said, limit=_TEXT_LIMIT)}
+    text = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
+    text += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
+    text += f", depth {endpoint.depth}" if endpoint.depth else ""
+    return {"from": ends[0], "to": ends[1], "text": shown(text, limit=_TEXT_LIMIT)}
 
 
 def _number(value: float) -> float | int | None:

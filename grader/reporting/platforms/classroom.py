@@ -11,9 +11,9 @@ import json
 from collections.abc import Iterator
 from fractions import Fraction
 from math import gcd, lcm
-from typing import Any
 
 from grader.core.exercise import Outcome
+from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, log_lines, shown
@@ -31,7 +31,7 @@ def render_classroom(report: Report) -> str:
     return base64.b64encode(text.encode()).decode() + "\n"
 
 
-def result(report: Report) -> dict[str, Any]:
+def result(report: Report) -> JsonObject:
     """Return the result before its encoding.
 
     A report without points has no rows; its two totals are 0.
@@ -70,9 +70,7 @@ def _greatest_unit(values: list[Fraction]) -> Fraction:
     return Fraction(numerator, denominator) if numerator else Fraction(1)
 
 
-def _tests(
-    exercise: ExerciseReport, verdict: Verdict, earned: int, rows: int, unit: Fraction
-) -> Iterator[dict[str, Any]]:
+def _tests(exercise: ExerciseReport, verdict: Verdict, earned: int, rows: int, unit: Fraction) -> Iterator[JsonObject]:
     for row in range(rows):
         got = row < earned
         yield {

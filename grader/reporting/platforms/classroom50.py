@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from grader.core.exercise import Outcome
+from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
@@ -74,7 +74,7 @@ def render_classroom50(report: Report, handed_in: HandedIn) -> str:
     )
 
 
-def _row(exercise: ExerciseReport, verdict: Verdict, score: int, max_score: int) -> dict[str, Any]:
+def _row(exercise: ExerciseReport, verdict: Verdict, score: int, max_score: int) -> JsonObject:
     reason, *more = wording.explanation(verdict)
     return {
         "test-name": f"{shown(exercise.number, limit=wording.NAME_LIMIT)}: {shown(verdict.title)}",
@@ -91,7 +91,7 @@ def _row(exercise: ExerciseReport, verdict: Verdict, score: int, max_score: int)
     }
 
 
-def _about(report: Report) -> dict[str, Any]:
+def _about(report: Report) -> JsonObject:
     return {
         "test-name": "About this result" if report.final else "This result is not final",
         "passed": report.final,

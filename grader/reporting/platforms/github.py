@@ -52,10 +52,10 @@ def _notice(report: Report) -> _Annotation:
 
 
 def _warnings(report: Report) -> list[_Annotation]:
-    said = [_Annotation("warning", "The score is not final", warning) for warning in wording.warnings(report)]
+    found = [_Annotation("warning", "The score is not final", warning) for warning in wording.warnings(report)]
     if wording.ran_without_sandbox(report):
-        said.append(_Annotation("warning", "No isolation", f"isolation: {wording.isolation(report)}"))
-    return said
+        found.append(_Annotation("warning", "No isolation", f"isolation: {wording.isolation(report)}"))
+    return found
 
 
 def _annotation(exercise: ExerciseReport, verdict: Verdict) -> _Annotation:

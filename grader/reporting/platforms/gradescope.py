@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from grader.core.exercise import DUE_DATE, OPEN, PUBLISHED, Outcome
+from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.audience import for_student
@@ -32,7 +31,7 @@ def render_gradescope(report: Report, *, day: str | None = None) -> str:
         {
             "score": json_value(report.score),
             "execution_time": json_value(round(report.duration_s, 3)),
-            "output": "\n".join(_output(seen)),
+            "output": "\n".join(wording.overview(seen)),
             "output_format": "text",
             "visibility": _VISIBLE,
             "stdout_visibility": _HIDDEN,
@@ -48,15 +47,7 @@ def render_gradescope(report: Report, *, day: str | None = None) -> str:
     )
 
 
-def _output(report: Report) -> list[str]:
-    lines = [*wording.opening(report), wording.run_line(report)]
-    for exercise in report.exercises:
-        remarks = wording.remarks(exercise)
-        lines += ["", wording.exercise_line(exercise), *remarks] if remarks else []
-    return [*lines, "", *wording.ending(report)]
-
-
-def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:
+def _tests(report: Report, seen: Report) -> list[JsonObject]:
     """Return one test per criterion, as students see it; the platform keeps the rest hidden."""
     visible = {(exercise.id, verdict.id): verdict for exercise in seen.exercises for verdict in exercise.verdicts}
     found = []
@@ -67,14 +58,14 @@ def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:
     return found
 
 
-def _unshown(exercise: ExerciseReport, number: int, verdict: Verdict) -> dict[str, Any]:
+def _unshown(exercise: ExerciseReport, number: int, verdict: Verdict) -> JsonObject:
     """Return a test that the platform hides: complete if it shows the test later, else only its points."""
     visibility = _VISIBILITIES.get(exercise.feedback.get(verdict.id, OPEN).until, _HIDDEN)
     kept = {"output": _FOR_STAFF} if visibility == _HIDDEN else {}
     return {**_test(exercise, number, verdict), **kept, "visibility": visibility}
 
 
-def _test(exercise: ExerciseReport, number: int, verdict: Verdict) -> dict[str, Any]:
+def _test(exercise: ExerciseReport, number: int, verdict: Verdict) -> JsonObject:
     return {
         "name": f"{shown(verdict.title)} ({shown(verdict.id)})",
         "name_format": "text",

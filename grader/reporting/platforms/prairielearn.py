@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
+from typing import TypedDict
 
+from grader.core.json_values import JsonValue
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
@@ -12,6 +13,23 @@ from grader.reporting.json_report import json_text
 
 #: PrairieLearn refuses a longer file; bytes.
 MOST_BYTES = 1_000_000
+
+
+class _Test(TypedDict):
+    name: str
+    description: str
+    points: JsonValue
+    max_points: JsonValue
+    message: str
+    output: str
+
+
+class _Results(TypedDict):
+    gradable: bool
+    score: JsonValue
+    message: str
+    output: str
+    tests: list[_Test]
 
 
 def render_prairielearn(report: Report, *, limit: int = MOST_BYTES) -> str:
@@ -30,26 +48,18 @@ def render_prairielearn(report: Report, *, limit: int = MOST_BYTES) -> str:
     return text
 
 
-def _results(report: Report) -> dict[str, Any]:
+def _results(report: Report) -> _Results:
     share = report.score / report.max_score if report.max_score else Fraction(0)
     return {
         "gradable": report.final,
         "score": json_value(share),
         "message": " ".join([wording.headline(report), *wording.warnings(report)]),
-        "output": "\n".join(_lines(report)),
+        "output": "\n".join(wording.overview(report)),
         "tests": [_test(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts],
     }
 
 
-def _lines(report: Report) -> list[str]:
-    lines = [*wording.opening(report), wording.run_line(report)]
-    for exercise in report.exercises:
-        remarks = wording.remarks(exercise)
-        lines += ["", wording.exercise_line(exercise), *remarks] if remarks else []
-    return [*lines, "", *wording.ending(report)]
-
-
-def _test(exercise: ExerciseReport, verdict: Verdict) -> dict[str, Any]:
+def _test(exercise: ExerciseReport, verdict: Verdict) -> _Test:
     return {
         "name": f"{shown(exercise.number, limit=wording.NAME_LIMIT)}: {shown(verdict.title)}",
         "description": f"{wording.OUTCOME_WORDS[verdict.outcome]} ({shown(verdict.id)})",
@@ -60,15 +70,15 @@ def _test(exercise: ExerciseReport, verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def _explanations(whole: dict[str, Any]) -> None:
+def _explanations(whole: _Results) -> None:
     for test in whole["tests"]:
-        test.update(message="left out: the results would be too long", output="")
+        test["message"], test["output"] = "left out: the results would be too long", ""
 
 
-def _output(whole: dict[str, Any]) -> None:
+def _output(whole: _Results) -> None:
     whole["output"] = whole["output"].splitlines()[-1]
 
 
-def _tests(whole: dict[str, Any]) -> None:
+def _tests(whole: _Results) -> None:
     # A zero-point row would hide all other rows, so all of them are dropped.
     whole["tests"] = []
