@@ -508,11 +508,36 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     looking(rclpy.context.Context, "ok", lambda: None)
     looking(rclpy.task.Future, "done", lambda: None)
     looking(rclpy.client.Client, "service_is_ready", at_the_graph)
-    looking(rclpy.publisher.Publisher, "get_subscription_count", at_the_graph)
-    looking(rclpy.subscription.Subscription, "get_publisher_count", at_the_graph)
+    _install_counts(clock, at_the_graph)
     looking(_rclpy.ActionClient, "is_action_server_available", at_the_graph)
     for name in GRAPH_LOOKS:
         looking(rclpy.node.Node, name, lambda: at_the_graph(whole=True))
+
+
+def _install_counts(clock: VirtualClock, before: Callable[[], None]) -> None:
+    """Let an endpoint count no counterparts at the instant at which it is created: discovery takes milliseconds."""
+    created_ns: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+
+    def counting(cls: Any, name: str) -> None:
+        make, count = cls.__init__, getattr(cls, name)
+
+        @functools.wraps(make)
+        def made(self: Any, *args: Any, **kwargs: Any) -> None:
+            make(self, *args, **kwargs)
+            created_ns[self] = clock.now_ns
+
+        @functools.wraps(count)
+        def counted(self: Any) -> Any:
+            before()
+            clock.idle_look()
+            found = count(self)
+            return 0 if created_ns.get(self) == clock.now_ns else found
+
+        cls.__init__ = made
+        setattr(cls, name, counted)
+
+    counting(rclpy.publisher.Publisher, "get_subscription_count")
+    counting(rclpy.subscription.Subscription, "get_publisher_count")
 
 
 #: Weak references to every node that was created, oldest first; `entry` checks whether there was any.
