@@ -267,10 +267,10 @@ class Observer:
             return Taken(topic, interface, b"", {})
         try:
             value = plain_fields(deserialize_message(cdr, message))
-            return Taken(topic, interface, without_padding(cdr, message), value)
         except Exception:  # whatever bytes a student's node sends
             self._broken[topic] += 1
             return Taken(topic, interface, cdr, {})
+        return Taken(topic, interface, without_padding(cdr, message), value)
 
     def notes(self) -> list[str]:
         """Return notes about messages whose content was not read."""

@@ -30,12 +30,15 @@ def without_padding(cdr: bytes, message: Any) -> bytes:
         cdr: The serialized message.
         message: Its class.
 
-    Raises:
-        KeyError, IndexError: The bytes are not a message of this class.
+    Returns:
+        The bytes; unchanged if they end within a field.
     """
-    walk = _Walk(cdr)
-    walk.fields(message)
-    walk.skip_to(len(walk.body))
+    try:
+        walk = _Walk(cdr)
+        walk.fields(message)
+        walk.skip_to(len(walk.body))
+    except (IndexError, KeyError):
+        return cdr
     return bytes(cdr[:HEADER_BYTES]) + bytes(walk.body)
 
 
@@ -100,4 +103,6 @@ class _Walk:
 
 @functools.cache
 def _structure(*path: str) -> Any:
-    return getattr(importlib.import_module(".".join(path[:-1])), path[-1])
+    """Return a message class; the parts of services and actions, such as `Fibonacci_Feedback`, are attributes."""
+    *package, name = path
+    return functools.reduce(getattr, name.split("_"), importlib.import_module(".".join(package)))
