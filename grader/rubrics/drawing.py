@@ -6,33 +6,36 @@ import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import Self, TypeAliasType
 
 from grader.core.scenario import AnyOrder, Between, Choose, CountBetween, InOrder, SomeOf, TimeBetween, Written
-from grader.rubrics.types import Duration, LongDuration, MatchingText, Real, Shape, Text, Whole, YesNo, build, wrong
+from grader.rubrics.types import (
+    Duration,
+    LongDuration,
+    MatchingText,
+    Real,
+    Shape,
+    Text,
+    Whole,
+    YesNo,
+    build,
+    must,
+    wrong,
+)
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9
 
 
-def rising(low_high: tuple[float, float]) -> tuple[float, float]:
-    """Reject a range that leaves nothing to draw."""
-    if not low_high[0] < low_high[1]:
-        raise wrong("two numbers, the lower one first")
-    return low_high
-
-
-def _decimals(count: int) -> int:
-    if not 0 <= count <= DECIMALS:
-        raise wrong(f"a number of decimals from 0 to {DECIMALS}")
-    return count
+def _rising(low_high: tuple[float, float]) -> bool:
+    return low_high[0] < low_high[1]
 
 
 #: Unlike the numbers of checks, a field may be `.nan` or `.inf`: sensors send them.
 FieldNumber = Annotated[float, Strict()]
 FieldName = Annotated[str, MatchingText("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
-LowHigh = Annotated[tuple[Real, Real], AfterValidator(rising)]
+LowHigh = Annotated[tuple[Real, Real], must(_rising, "two numbers, the lower one first")]
 Option = Annotated[str, Strict()] | YesNo | Whole | FieldNumber
 
 
@@ -42,7 +45,7 @@ class DrawnFieldShape(Shape):
     between: LowHigh | None = None
     choose: tuple[Option, ...] | None = Field(default=None, min_length=1)
     text: Text | None = None
-    decimals: Annotated[Whole, AfterValidator(_decimals)] = 1
+    decimals: Annotated[Whole, must(lambda n: 0 <= n <= DECIMALS, f"a number of decimals from 0 to {DECIMALS}")] = 1
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -96,28 +99,14 @@ Fields = dict[FieldName, FieldValue]
 CASES = 1_000
 
 
-def _rising(low_high: tuple[int, int]) -> tuple[int, int]:
-    if not low_high[0] < low_high[1]:
-        raise wrong("two of them, the lower one first")
-    return low_high
-
-
-def _some(low_high: tuple[int, int]) -> tuple[int, int]:
-    if not 0 <= low_high[0] < low_high[1] <= CASES:
-        raise wrong(f"two whole numbers from 0 to {CASES:,}, the lower one first")
-    return low_high
-
-
-def _no_fewer_than_0(count: int) -> int:
-    if not 0 <= count <= CASES:
-        raise wrong(f"a whole number from 0 to {CASES:,}")
-    return count
+_TWO = "two of them, the lower one first"
+_TWO_COUNTS = f"two whole numbers from 0 to {CASES:,}, the lower one first"
 
 
 class DrawnTimeShape(Shape):
     """A time that is drawn from the seed."""
 
-    between: Annotated[tuple[Duration, Duration], AfterValidator(_rising)]
+    between: Annotated[tuple[Duration, Duration], must(_rising, _TWO)]
 
     def built(self) -> TimeBetween:
         """Return the time as a scenario holds it."""
@@ -127,13 +116,13 @@ class DrawnTimeShape(Shape):
 class DrawnLongTimeShape(DrawnTimeShape):
     """A time above 0 that is drawn from the seed."""
 
-    between: Annotated[tuple[LongDuration, LongDuration], AfterValidator(_rising)]
+    between: Annotated[tuple[LongDuration, LongDuration], must(_rising, _TWO)]
 
 
 class DrawnCountShape(Shape):
     """A count that is drawn from the seed."""
 
-    between: Annotated[tuple[Whole, Whole], AfterValidator(_some)]
+    between: Annotated[tuple[Whole, Whole], must(lambda pair: 0 <= pair[0] < pair[1] <= CASES, _TWO_COUNTS)]
 
     def built(self) -> CountBetween:
         """Return the count as a scenario holds it."""
@@ -145,6 +134,7 @@ def drawn_or_not(value: object) -> str:
     return "<drawn>" if isinstance(value, Mapping) else "<fixed>"
 
 
+_Count = Annotated[Whole, must(lambda n: 0 <= n <= CASES, f"a whole number from 0 to {CASES:,}")]
 SomeTime = Annotated[
     Annotated[Duration, Tag("<fixed>")] | Annotated[DrawnTimeShape, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
@@ -153,8 +143,7 @@ SomeLongTime = Annotated[
     Discriminator(drawn_or_not),
 ]
 SomeCount = Annotated[
-    Annotated[Whole, AfterValidator(_no_fewer_than_0), Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")],
-    Discriminator(drawn_or_not),
+    Annotated[_Count, Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
 
 

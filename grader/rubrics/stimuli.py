@@ -18,7 +18,7 @@ from grader.rubrics.drawing import (
     drawn_or_not,
     list_of,
 )
-from grader.rubrics.types import Choice, LongDuration, Real, Shape, Text, Topic, Whole, build, wrong
+from grader.rubrics.types import Choice, LongDuration, Real, Shape, Text, Topic, Whole, build, must
 
 #: Default of keys that were not chosen in a choice; not a value that a rubric can contain.
 ABSENT: Any = None
@@ -41,35 +41,21 @@ class DrawnShape(Choice):
         return JustAbove(value) if kind == "just_above" else JustBelow(value)
 
 
-def _kind_of_number(value: object) -> str:
-    return "drawn" if isinstance(value, dict) else "written"
-
-
 NumberShape = Annotated[
-    Annotated[Real, Tag("written")] | Annotated[DrawnShape, Tag("drawn")], Discriminator(_kind_of_number)
+    Annotated[Real, Tag("<fixed>")] | Annotated[DrawnShape, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
 
 
 def _count_to(most: int) -> AfterValidator:
-    def check(count: int) -> int:
-        if not 1 <= count <= most:
-            raise wrong(f"a whole number from 1 to {most:,}")
-        return count
-
-    return AfterValidator(check)
+    return must(lambda count: 1 <= count <= most, f"a whole number from 1 to {most:,}")
 
 
-def _drawn_to(most: int) -> AfterValidator:
-    def check(drawn: DrawnCountShape) -> DrawnCountShape:
-        if not 1 <= drawn.between[0] < drawn.between[1] <= most:
-            raise wrong(f"two whole numbers from 1 to {most:,}, the lower one first")
-        return drawn
-
-    return AfterValidator(check)
-
-
+_DRAWN_CALLS = must(
+    lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= CALLS,
+    f"two whole numbers from 1 to {CALLS:,}, the lower one first",
+)
 Calls = Annotated[
-    Annotated[Whole, _count_to(CALLS), Tag("<fixed>")] | Annotated[DrawnCountShape, _drawn_to(CALLS), Tag("<drawn>")],
+    Annotated[Whole, _count_to(CALLS), Tag("<fixed>")] | Annotated[DrawnCountShape, _DRAWN_CALLS, Tag("<drawn>")],
     Discriminator(drawn_or_not),
 ]
 Clients = Annotated[Whole, _count_to(CLIENTS)]

@@ -16,7 +16,7 @@ from typing_extensions import Self
 
 from grader.core.exercise import Drawn, Value, Variant
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.types import Id, Shape, wrong
+from grader.rubrics.types import Id, Shape, must, wrong
 from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
 
@@ -65,26 +65,12 @@ _Scalar = Annotated[Any, AfterValidator(_scalar), WithJsonSchema({"type": ["stri
 _Amount = Annotated[Any, AfterValidator(_amount), WithJsonSchema({"type": ["string", "number"]})]
 
 
-def _several(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if len({(type(value), value) for value in values}) < max(2, len(values)):
-        raise wrong("two or more different values")
-    return values
+def _are_several(values: tuple[Any, ...]) -> bool:
+    return len({(type(value), value) for value in values}) >= max(2, len(values))
 
 
-def _two(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if len(values) != 2:
-        raise wrong("two numbers, the lower one first")
-    return values
-
-
-def _not_empty(variants: dict[str, VariantShape]) -> dict[str, VariantShape]:
-    if not variants:
-        raise wrong("at least one variant")
-    return variants
-
-
-_Choice = Annotated[tuple[_Scalar, ...], AfterValidator(_several)]
-_Pair = Annotated[tuple[_Amount, ...], AfterValidator(_two)]
+_Choice = Annotated[tuple[_Scalar, ...], must(_are_several, "two or more different values")]
+_Pair = Annotated[tuple[_Amount, ...], must(lambda pair: len(pair) == 2, "two numbers, the lower one first")]
 
 
 class VariantShape(Shape):
@@ -207,7 +193,7 @@ class _Variants(Shape):
 
     model_config = ConfigDict(extra="ignore")
 
-    variants: Annotated[VariantsField, AfterValidator(_not_empty)]
+    variants: Annotated[VariantsField, must(bool, "at least one variant")]
 
 
 def variants_model() -> type[Shape]:
