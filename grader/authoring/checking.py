@@ -26,12 +26,7 @@ _STRETCHES = ("window", "silence")
 
 
 def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
-    """Return warnings about a rubric, in the order of the file.
-
-    Args:
-        exercise: The exercise read from the rubric.
-        tree: The YAML document, for positions.
-    """
+    """Return warnings about a rubric, in the order of the file."""
     found = [*_of_points(exercise, tree), *_of_scenarios(exercise, tree), *_of_files(exercise, tree)]
     for index, criterion in enumerate(exercise.criteria):
         found += _of_criterion(criterion, exercise, ("criteria", index), tree)
@@ -85,12 +80,7 @@ def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A valid rubric.
-
-    Attributes:
-        summary: A summary in one line.
-        warnings: Warnings, one line each, with line and column.
-    """
+    """A valid rubric: a summary in one line, and warnings with line and column."""
 
     summary: str
     warnings: tuple[str, ...]

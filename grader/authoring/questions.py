@@ -54,13 +54,7 @@ _MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
 
 
 def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, Any]]:
-    """Return a case for each distinct input: its fields, and the answer within a second.
-
-    Args:
-        trace: The observed trace.
-        given: Topic of the inputs.
-        answered: Topic of the answers.
-    """
+    """Return a case for each distinct input: its fields, and the answer within a second."""
     inputs = trace.deliveries(given)
     answers = _answers(trace, inputs, answered)
     different: dict[str, tuple[Delivery, Message | None]] = {}
@@ -124,7 +118,6 @@ class Seen:
     Attributes:
         alone: Trace of the nodes without stimuli.
         driven: Trace of the nodes with the stimuli of the draft; the same as `alone` if there are none.
-        files: File names of the nodes.
         window_s: Longest time that every topic was observed after its first message.
     """
 

@@ -55,10 +55,9 @@ class Aspect(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference between what a program did on two clocks.
+    """A difference between what a program did on two clocks: a rate in Hz, a number, a count or a word on each.
 
     Attributes:
-        aspect: What differs.
         name: Topic, field, service or file.
         virtual: Result in virtual time: a rate in Hz, a number, a count, a word.
         wall: Result on the wall clock.

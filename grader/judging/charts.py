@@ -45,15 +45,7 @@ def illustrated(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> ExerciseReport:
-    """Return the report with figures, lines of the source, and the expected results.
-
-    Args:
-        report: The judged report.
-        exercise: The exercise.
-        traces: Scenario id -> trace.
-        submission: Tells which files were found.
-        sources: Wanted file name -> its text.
-    """
+    """Return the report with figures, lines of the source, and the expected results."""
     return replace(
         report,
         figures=figures_of(exercise, traces),

@@ -323,13 +323,7 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
 
 
 def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
-    """Return a summary of what the nodes of a trace did.
-
-    Args:
-        trace: The trace.
-        processes: Names of the files that ran.
-        isolation: The sandbox tier.
-    """
+    """Return a summary of what the nodes of a trace did."""
     graphs = trace.graphs()
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(

@@ -212,12 +212,7 @@ class _Record:
 
 
 def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
-    """Return the indices in `sought` of values that are logged, and not only among many other numbers.
-
-    Args:
-        outputs: The output to search.
-        sought: The values, ordered by time.
-    """
+    """Return the indices in `sought`, ordered by time, of values that are logged, not only among many other numbers."""
     places = _places(outputs, sought)
     # each number is indexed from the start and from the end, and counted once
     tried = [p for (_, index), p in places.items() if p.near and index >= 0]
@@ -338,25 +333,14 @@ _FOR_DEGREES: tuple[tuple[float, str], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class LoggedNumbers:
-    """The numbers logged for one message.
-
-    Attributes:
-        value: The value in the message.
-        numbers: The numbers logged for it.
-    """
+    """The value in a message, and the numbers logged for it."""
 
     value: float
     numbers: tuple[Printed, ...]
 
 
 def wrong_conversion(heard: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
-    """Return a clause about what is logged instead of a converted value, and a hint; both empty if unclear.
-
-    Args:
-        heard: One entry for each message with a log.
-        factor: The correct conversion factor.
-        others: Factors that are also correct, whose numbers are ignored.
-    """
+    """Return a clause about what is logged instead of `factor` times a value, and a hint; both empty if unclear."""
     largest = max((abs(h.value) for h in heard), default=0.0)
     telling = [h for h in heard if h.numbers and abs(h.value) > _SMALL * largest]
     if len(telling) < _FEWEST:

@@ -30,7 +30,6 @@ class Cause:
     Attributes:
         name: One word for evidence.
         sentence: What was found, written to follow a place and a colon.
-        hint: One thing to do; empty if nothing is very likely right.
     """
 
     name: str

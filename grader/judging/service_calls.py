@@ -56,11 +56,8 @@ class ReportedParameter:
     """A parameter as a node reported it.
 
     Attributes:
-        t_ns: Time of the response.
-        node: The node's fully qualified name.
         type: `bool`, `integer`, `double`, `string` or one of these with `_array`; empty if the node lacks the
             parameter.
-        value: Its value.
     """
 
     t_ns: int
@@ -75,9 +72,6 @@ class ParameterSetting:
 
     Attributes:
         t_ns: Time of the response, or of the request without one.
-        node: The node's fully qualified name.
-        value: The value to set.
-        answered: Whether there was a response.
         taken: Whether the node accepted the value.
         why: The node's reason if it did not.
     """
@@ -169,8 +163,6 @@ class ResponseReader:
     Attributes:
         field: Path of the number, or of the text that holds it.
         success: Path of the truth value that tells whether the number counts; empty if there is none.
-        pattern: Finds the number in a text; None for the first number.
-        threshold: Numbers above it are good.
     """
 
     field: str
@@ -184,11 +176,7 @@ class Episode:
     """A call, and the time until the next one.
 
     Attributes:
-        place: Number of the call, from 1.
-        kind: Kind of the response.
-        number: The number in the response, if any.
         text: The text that holds the number; empty if the field is a number.
-        asked_ns: Time of the request.
         start_ns: Time of the response, or of the request without one.
         stop_ns: Time of the next request, or the end of the recording.
         until_ns: `stop_ns` less the clock's jitter.

@@ -45,10 +45,7 @@ class Source:
     """One graded file.
 
     Attributes:
-        file: Path inside the submission, as in locations.
-        lines: The lines of the text, without line breaks.
         nodes: All syntax nodes with a line, in the order of the text; empty if the text cannot be parsed.
-        tree: The syntax tree, or None if the text cannot be parsed.
         parents: Node -> enclosing node.
         index: Nodes by class, in the order of the text.
         called: Calls by the last part of the called name, in the order of the text.

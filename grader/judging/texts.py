@@ -38,8 +38,6 @@ class Printed:
     Attributes:
         value: The number; not finite for a printed nan or inf.
         step: Value of one unit of its last digit.
-        start: Start index in the text.
-        stop: End index, exclusive.
     """
 
     value: float
@@ -156,7 +154,6 @@ class Layout:
 
     Attributes:
         template: The text with its numbers masked; equal for texts that differ only in their numbers.
-        numbers: The numbers in order.
         pairs: Index pairs that may be (x, y), the labelled ones first.
     """
 

@@ -211,9 +211,6 @@ class FieldRule:
     Attributes:
         equals: Expected text, number or truth value.
         items: Expected list elements, in order.
-        tolerance: Largest difference from an expected number.
-        low: Smallest number allowed.
-        high: Largest number allowed.
         pattern: Regular expression that must match the whole text.
         example: A matching text, shown instead of the pattern.
     """

@@ -27,7 +27,6 @@ class Explanation:
     """An author's note on some mutants or variants.
 
     Attributes:
-        pattern: Pattern for their ids, with `*` for anything.
         because: The explanation; empty if the note names criteria.
         criteria: Criteria that should detect such a mutant; empty if the note has an explanation.
         where: Position in the file, for messages.
@@ -48,12 +47,6 @@ class Explained:
     """All notes of an author.
 
     Attributes:
-        reference: Folder of the reference solution; None if not given.
-        template: Folder of the template; None if not given.
-        template_score: Expected score of the template; None if not given.
-        survivors: Why some mutants survive.
-        expected: Which criteria should detect other mutants.
-        variants: Why some correct variants lose points.
         criteria: Criterion id -> why it detects no mutant.
     """
 

@@ -131,8 +131,6 @@ class SelftestOptions:
         only: Pattern for the ids to run, with `*` for anything; empty for all.
         sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
         seed: Seed of the sample and of all drawn values; None derives the values from the reference solution.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto`, `none` or the name of a tier.
     """
 
     reference: Path | None = None
@@ -147,11 +145,6 @@ class SelftestOptions:
 
 def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progress) -> Iterator[SelftestResult]:
     """Test rubrics, and yield the result of each as it is ready.
-
-    Args:
-        rubrics: Rubric files.
-        options: How to test them.
-        progress: Called at the start of each step.
 
     Raises:
         GraderError: Something that the test needs cannot be used; the class of the error tells who must act.

@@ -210,13 +210,7 @@ def _at_least(least: int, unit: Unit | None, value: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Manual:
-    """The parts of a docstring.
-
-    Attributes:
-        summary: The first paragraph, on one line.
-        details: The other paragraphs before the attributes, one per line.
-        parameters: Attribute -> its meaning, on one line.
-    """
+    """The first paragraph of a docstring, the others, one per line, and the meaning of each attribute."""
 
     summary: str
     details: str

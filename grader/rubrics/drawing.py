@@ -197,12 +197,7 @@ def _spelt(value: object) -> object:
 
 
 def cases_model(case: Any, name: str) -> Any:
-    """Return the model of an entry in a list of cases: one case, or several with an order keyword.
-
-    Args:
-        case: Model of one case.
-        name: Name of the shapes in the JSON Schema.
-    """
+    """Return the model of an entry in a list of cases: one case, or several with an order keyword."""
     listed = (list_of(case), Field(min_length=1))
     in_order = create_model(f"{name}InOrder", __base__=InOrderShape, __doc__=InOrderShape.__doc__, in_order=listed)
     some_of = create_model(f"Some{name}", __base__=SomeOfShape, __doc__=SomeOfShape.__doc__, some_of=listed)

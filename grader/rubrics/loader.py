@@ -48,12 +48,7 @@ from grader.submissions.collected import listed, shown
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
-    """Return the mistakes between the parts of a rubric, each of which is well formed by itself.
-
-    Args:
-        rubric: The rubric.
-        tree: The document it was read from, for places.
-    """
+    """Return the mistakes between the parts of a rubric, each of which is well formed by itself."""
     scenario_ids = [scenario.id for scenario in rubric.scenarios]
     criterion_ids = [criterion.id for criterion in rubric.criteria]
     return [
@@ -170,12 +165,7 @@ MAX_MISTAKES = 10
 
 
 class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
-    """A rubric has mistakes.
-
-    Args:
-        where: The file's name in messages.
-        mistakes: All mistakes; the message lists the first ones.
-    """
+    """A rubric has mistakes; the message lists the first ones."""
 
     def __init__(self, where: str, mistakes: Iterable[Mistake]) -> None:
         self.where = where

@@ -30,11 +30,7 @@ _FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
 
 
 def rubric_schema(checks: Mapping[str, type] = CHECKS) -> dict[str, Any]:
-    """Return the JSON Schema (2020-12) of rubric files.
-
-    Args:
-        checks: Checks that rubrics may use.
-    """
+    """Return the JSON Schema (2020-12) of rubric files."""
     schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
     tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}

@@ -94,8 +94,6 @@ class MatchingText:
 
     Attributes:
         pattern: Regular expression with the same meaning in Python and JavaScript.
-        expected: What was expected, for messages.
-        example: A matching text.
     """
 
     pattern: str

@@ -11,12 +11,7 @@ from grader.submissions.collected import listed, shown
 
 
 class QuantityError(ValueError):
-    """A quantity cannot be read.
-
-    Args:
-        expected: What was expected, e.g. ``a duration with its unit, such as `10 s```.
-        hint: One thing to do; empty if nothing is very likely right.
-    """
+    """A quantity cannot be read."""
 
     def __init__(self, expected: str, hint: str = "") -> None:
         super().__init__(expected)

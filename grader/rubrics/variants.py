@@ -108,12 +108,7 @@ def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
 
 @dataclass(frozen=True, slots=True)
 class VariantOptions:
-    """The possible values of a variant.
-
-    Attributes:
-        name: Its name.
-        count: Number of values.
-    """
+    """The possible values of a variant."""
 
     name: str
     count: int
@@ -164,11 +159,7 @@ class First:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """The values used in an earlier run, for judging its recording.
-
-    Attributes:
-        drawn: The values.
-    """
+    """The values used in an earlier run, for judging its recording."""
 
     drawn: Drawn
 

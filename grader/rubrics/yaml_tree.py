@@ -52,7 +52,6 @@ class YamlTree:
     """A parsed document.
 
     Attributes:
-        data: Mappings with text keys, lists and scalars.
         values: Position of each value.
         keys: Position of the key of each value in a mapping.
         mistakes: Invalid parts: duplicate keys, keys that are not text, unknown tags.
@@ -73,10 +72,7 @@ class YamlSyntaxError(Exception):
 
 
 def read_yaml(text: str) -> YamlTree:
-    """Parse one YAML 1.2 document.
-
-    Args:
-        text: The document; the caller limits its size.
+    """Parse one YAML 1.2 document, whose size the caller limits; the data of an empty document is None.
 
     Returns:
         The tree; `data` is None for an empty document.

@@ -36,11 +36,7 @@ MAX_ALL_BYTES = 2 * MAX_BYTES
 
 
 def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
-    """Read the Python files of a submission, and list those that cannot be compared; never raises for a bad submission.
-
-    Args:
-        path: A folder, an archive or one file.
-    """
+    """Read a submission's Python files, and list those that cannot be compared; a bad submission raises nothing."""
     try:
         with tempfile.TemporaryDirectory() as nothing:  # nothing is written
             return programs_of(collect_submission(str(path), (), Path(nothing)))
@@ -111,12 +107,7 @@ class _File:
 
 
 def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> Similar:
-    """Find the similar submissions of a class.
-
-    Args:
-        handed: The submissions.
-        given: The files that were handed out.
-    """
+    """Find the similar submissions of a class."""
     as_given = {program.digest for program in given}
     kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
     files, kept = _prints(kept)

@@ -47,8 +47,6 @@ class Member:
     Attributes:
         name: Name in the archive, with `/` between the parts and none at the end; may be hostile.
         kind: `FILE`, `FOLDER`, or words for anything else, such as `a link`.
-        size: Size that the archive declares, in bytes.
-        read: Unpacks the member and returns at most the given number of bytes.
     """
 
     name: str
@@ -58,12 +56,7 @@ class Member:
 
 
 class UnusableArchiveError(Exception):
-    """An archive cannot be used; the caller adds its name.
-
-    Args:
-        problem: What was expected and what was found.
-        hint: One thing to do.
-    """
+    """An archive cannot be used; the caller adds its name."""
 
     def __init__(self, problem: str, hint: str = REPACK) -> None:
         super().__init__(problem)
@@ -117,13 +110,7 @@ def is_tar(head: bytes) -> bool:
 
 
 def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
-    """Return the decompressed data.
-
-    Args:
-        data: The whole compressed file.
-        compression: `gzip`, `bzip2` or `xz`.
-        most: Maximum size of the result, in bytes; nothing is decompressed beyond it.
-        limit: That limit in words.
+    """Return the decompressed data; nothing is decompressed beyond `most` bytes, which is `limit` in words.
 
     Raises:
         UnusableArchiveError: The data is damaged or cut off, or its content is larger than `most`.
@@ -146,11 +133,7 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
 
 
 def tar_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of an uncompressed tar archive, in order.
-
-    Args:
-        data: The whole archive.
-        most: Maximum number of members.
+    """Return the members of an uncompressed tar archive, at most so many, in order.
 
     Raises:
         UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses unusual features.
@@ -244,11 +227,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, Valu
 
 
 def zip_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of a zip archive, in the order of its directory.
-
-    Args:
-        data: The whole archive.
-        most: Maximum number of members.
+    """Return the members of a zip archive, at most so many, in the order of its directory.
 
     Raises:
         UnusableArchiveError: The archive is damaged, encrypted, uses an uncommon compression, or has too many members.
@@ -340,10 +319,7 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 
 def archive_kind(head: bytes) -> str | None:
-    """Return the kind of archive or compressed file that begins with these bytes, or None.
-
-    Args:
-        head: The first `HEAD_BYTES` of a file, or all of a shorter one.
+    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None.
 
     Returns:
         `zip`, `tar`, `gzip`, `bzip2` or `xz`, which can be read, or the name of another kind, which cannot.
@@ -358,10 +334,6 @@ def collect_archive(data: bytes, *, where: str) -> Collected:
     """Return the files of an archive.
 
     The same files are skipped as in a folder, so a submission gives the same result packed or not.
-
-    Args:
-        data: The whole archive, at most `MAX_ARCHIVE_BYTES`.
-        where: The archive's name in messages.
 
     Raises:
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could

@@ -13,12 +13,7 @@ SHOWN_LENGTH = 80
 
 
 def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
-    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle.
-
-    Args:
-        text: Any text: file names and YAML scalars may hold line breaks, escapes and undecodable bytes.
-        limit: Maximum length of the result, in characters.
-    """
+    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle."""
     kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
     if len(line) <= limit and len(kept) == len(text):

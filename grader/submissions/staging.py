@@ -29,12 +29,7 @@ _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
-    """Read the files of a folder.
-
-    Args:
-        folder: The student's folder.
-        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
-        where: The folder's name in messages.
+    """Read the files of a student's folder; `into`, the destination of the copy, is not part of the submission.
 
     Returns:
         The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out

@@ -50,13 +50,7 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
-    """Read a submission without writing anything; raises what `stage_submission` raises.
-
-    Args:
-        path: As for `stage_submission`.
-        wanted: As for `stage_submission`.
-        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
-    """
+    """Read a submission without writing anything; arguments and errors are those of `stage_submission`."""
     where = shown(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
@@ -65,13 +59,7 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 
 
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
-    """Write the files that were read, and find the wanted ones among them.
-
-    Args:
-        collected: The files, read here or on another machine.
-        path: Name of the submission; it need not exist any more.
-        wanted: As for `stage_submission`.
-        into: As for `stage_submission`.
+    """Write files that were read, here or on another machine, and find the wanted ones among them.
 
     Raises:
         HarnessError: The copy cannot be written.

@@ -37,15 +37,7 @@ def diagnose(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> tuple[Verdict, ...]:
-    """Return the verdicts with a place and one hint wherever a cause is very likely.
-
-    Args:
-        verdicts: In rubric order; outcomes, points and reasons stay unchanged.
-        exercise: The exercise.
-        traces: Scenario id -> trace.
-        submission: Gives the path at which each wanted file was found.
-        sources: Wanted file name -> its text.
-    """
+    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely."""
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
     if not asked:
         return verdicts

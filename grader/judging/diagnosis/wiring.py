@@ -46,12 +46,7 @@ _NAMED = {"math.pi": math.pi, "np.pi": math.pi, "numpy.pi": math.pi}
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number, and the expression in the text that determines it.
-
-    Attributes:
-        value: The number.
-        origin: The expression to change for another number.
-    """
+    """A number, and the expression in the text to change for another number."""
 
     value: float
     origin: ast.AST
@@ -214,11 +209,8 @@ class Made:
 
     Attributes:
         kind: `publisher`, `subscription` or `timer`.
-        call: The call that creates it.
         type: Last part of the message type's name; empty if unknown.
         topic: Topic as written; None if it cannot be read from the text.
-        callback: The callback argument.
-        period: The period argument of a timer.
         qos: The depth or profile argument.
     """
 

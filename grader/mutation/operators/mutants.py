@@ -81,11 +81,8 @@ class Mutant:
     """A program with one mistake.
 
     Attributes:
-        file: Name of the file.
         line: Line of the original that was changed, from 1.
         operator: Key of `OPERATORS`.
-        detail: The change.
-        source: The complete changed program.
         number: Distinguishes mutants with the same file, line, operator and detail, starting at 1.
     """
 
@@ -107,11 +104,6 @@ def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERA
     """Return the mutants of a program, in the order of operators and lines.
 
     Mutants that are equivalent to the original or to an earlier mutant are skipped, and so are invalid programs.
-
-    Args:
-        source: The program.
-        file: Its name, for the ids.
-        operators: The operators to apply.
     """
     program = Program(source)
     seen = {meaning(source)}

@@ -32,13 +32,7 @@ LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
 
 @dataclass(frozen=True, slots=True)
 class Mutation:
-    """One way to change a program.
-
-    Attributes:
-        at: The node that gives the line.
-        detail: The change, in one line.
-        edits: Nodes of the program and their replacements.
-    """
+    """One way to change a program: the node that gives the line, the change in one line, and its edits."""
 
     at: cst.CSTNode
     detail: str

@@ -334,13 +334,7 @@ VARIANTS: Mapping[str, Rewriter] = {
 
 @dataclass(frozen=True, slots=True)
 class ProgramVariant:
-    """A correct program beside the reference solution.
-
-    Attributes:
-        file: Name of the file.
-        name: Key of `VARIANTS`.
-        source: The whole program.
-    """
+    """A correct program beside the reference solution; its name is a key of `VARIANTS`."""
 
     file: str
     name: str
@@ -353,13 +347,7 @@ class ProgramVariant:
 
 
 def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[ProgramVariant, ...]:
-    """Return the variants that differ from a program, in the order of the table.
-
-    Args:
-        source: The program.
-        file: Its name, for the ids.
-        rewriters: What makes them.
-    """
+    """Return the variants that differ from a program, in the order of the table."""
     program = Program(source)
     written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
     return tuple(
