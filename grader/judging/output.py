@@ -12,6 +12,7 @@ from functools import lru_cache
 from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
+from grader.judging.values import per_trace
 from grader.judging.wording import counted, number, quote
 
 #: Warnings that rclpy writes through the node's own logger when QoS policies are incompatible.
@@ -31,12 +32,9 @@ _INTERPRETER = re.compile(
 )
 
 
+@per_trace
 def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     """Return the records of a process without those of rclpy and the layers below it."""
-    return trace.once((student_records, process), lambda: _student_records(trace, process))
-
-
-def _student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     return tuple(r for r in trace.records(process) if r.t_ns < trace.stop_ns and not _of_ros(r))
 
 
@@ -46,12 +44,9 @@ def _of_ros(record: LogRecord) -> bool:
     return bool(_RCLPY_TEXT.match(record.text[:400]) or _MIDDLEWARE.match(record.logger))
 
 
+@per_trace
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     """Return the lines that a process printed, without tracebacks, interpreter warnings and blank lines."""
-    return trace.once((printed_lines, process), lambda: _printed_lines(trace, process))
-
-
-def _printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     faults = [" ".join(f.text.split()) for f in trace.faults(process)]
     lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
     # the text of an exception may continue over several lines, without indentation like printed ones

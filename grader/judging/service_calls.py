@@ -84,8 +84,8 @@ class ParameterSetting:
     why: str
 
 
-def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]:
-    """Return the grader's calls of a parameter service of one node, or of all nodes."""
+def calls_of_node(trace: Trace, node: str | None, service: str) -> list[Call]:
+    """Return the grader's calls of a service that each node has, such as `get_parameters`, of one node or all."""
     asked = (r.service for r in trace.of(Request) if r.sender == "grader" and r.service.endswith(f"/{service}"))
     names = [name for name in dict.fromkeys(asked) if node in (None, name.rpartition("/")[0])]
     return [call for name in names for call in calls_of(trace, name, "grader")]
@@ -93,7 +93,7 @@ def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]
 
 def asked_for(trace: Trace, name: str, node: str | None = None) -> list[Call]:
     """Return the calls that asked for a parameter."""
-    return [c for c in _parameter_calls(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
+    return [c for c in calls_of_node(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
 
 
 def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
@@ -111,7 +111,7 @@ def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
 def settings(trace: Trace, name: str, node: str | None = None) -> list[ParameterSetting]:
     """Return the attempts to set a parameter, in order."""
     found = []
-    for call in _parameter_calls(trace, node, "set_parameters"):
+    for call in calls_of_node(trace, node, "set_parameters"):
         for place, parameter in enumerate(_list(call.request.value, "parameters")):
             if isinstance(parameter, Mapping) and parameter.get("name") == name:
                 found.append(_set(call, place, parameter))
