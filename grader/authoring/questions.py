@@ -24,14 +24,14 @@ _OVERRIDES = "qos_overrides."
 def parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
     """Yield node, name and value of each parameter, with an empty node if only one has any; lists become None."""
     offers = [(o.name.partition(":"), o.detail) for o in trace.of(Offer) if o.kind == "parameter"]
-    own = {(node, name): value for (node, _, name), value in offers if not _is_everybodys(name)}
+    own = {
+        (node, name): value
+        for (node, _, name), value in offers
+        if name not in _EVERYBODYS and not name.startswith(_OVERRIDES)
+    }
     several = len({node for node, _ in own}) > 1
     for (node, name), value in own.items():
         yield node if several else "", name, _read(value)
-
-
-def _is_everybodys(name: str) -> bool:
-    return name in _EVERYBODYS or name.startswith(_OVERRIDES)
 
 
 def _read(text: str) -> str | float | bool | None:

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.submissions.collected import listed
+
 
 @dataclass(frozen=True, slots=True)
 class DraftQuantity:
@@ -81,9 +83,8 @@ def rubric_text(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]] = (
 
 
 def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iterator[str]:
-    yield from _comment(
-        f"A skeleton, made of what {_and(draft.files)} did. What is marked `decide:` only you can know."
-    )
+    files = listed(draft.files, "and")
+    yield from _comment(f"A skeleton, made of what {files} did. What is marked `decide:` only you can know.")
     yield from _comment("`grade rubric check` says whether it can be used, `grade rubric explain` what it asks.")
     for remark in draft.remarks:
         yield from _comment(f"{remark[:1].upper()}{remark[1:]}.")
@@ -202,7 +203,3 @@ def _scalar(text: str) -> str:
 
 def _title(id_: str) -> str:
     return _scalar(id_.replace("_", " ").capitalize())
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

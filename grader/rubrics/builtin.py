@@ -22,19 +22,9 @@ def shipped(name: str) -> Path:
     return inside if inside.is_dir() else package.parent / name
 
 
-def shipped_folder() -> Path:
-    """Return the folder of the built-in rubrics and of the /odom recording."""
-    return shipped("rubrics")
-
-
-def shipped_templates() -> Path:
-    """Return the folder of the templates for students."""
-    return shipped("student_template")
-
-
 def builtin_odometry() -> Path:
     """Return the project's own /odom recording."""
-    return shipped_folder() / "odometry"
+    return shipped("rubrics") / "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +52,7 @@ def builtin_headers() -> tuple[Header, ...]:
     Raises:
         RubricError: The rubrics are missing from this installation.
     """
-    folder = shipped_folder()
+    folder = shipped("rubrics")
     paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
     if not paths:
         raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")

@@ -89,8 +89,6 @@ _BY_KIND: Mapping[str, Any] = {
     "fields": Fields,
 }
 
-_ALIKE: Mapping[str, str] = {}
-
 _PARAMETER = re.compile(r"^ {4}(?P<name>\w+): (?P<meaning>.*)$")
 _HEADING = "Attributes:"
 
@@ -132,7 +130,7 @@ def _parameters(cls: Any) -> type[Shape]:
     return _model(cls, cls.__name__, fields)
 
 
-def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usual: Any) -> type[Shape]:
+def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:
     """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
     Args:
@@ -145,7 +143,7 @@ def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usua
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
-        key = aliases.get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
+        key = (aliases or {}).get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
         default = usual.get(key, ... if _is_required(field) else field.default)
         words, least = _mark(hints[field.name], str), _mark(hints[field.name], Least)
         minimum: Any = {"minimum": least.value} if least and not _mark(hints[field.name], Unit) else None

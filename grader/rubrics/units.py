@@ -104,11 +104,12 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         raise QuantityError(f"{kind.noun} of at least 0")
     factor = _factor(found["number"], found["unit"], unit.symbol)
     value = Fraction(found["number"].rstrip(".")) * factor
-    if not kind.whole:
-        return _finite(value, kind)
-    if value.denominator != 1:
+    if kind.whole and value.denominator != 1:
         raise QuantityError(f"a whole number of {kind.whole}")
-    return int(value)
+    try:
+        return int(value) if kind.whole else float(value)
+    except OverflowError:
+        raise QuantityError(f"{kind.noun} that a float can hold") from None
 
 
 def _factor(number: str, written: str, symbol: str) -> Fraction:
@@ -121,13 +122,6 @@ def _factor(number: str, written: str, symbol: str) -> Fraction:
     nearest = known.get(written.casefold())
     hint = f"write `{shown(number, 30)} {nearest}`" if nearest else ""
     raise QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
-
-
-def _finite(value: Fraction, kind: _Kind) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        raise QuantityError(f"{kind.noun} that a float can hold") from None
 
 
 def missing_unit(number: str, symbol: str) -> QuantityError:

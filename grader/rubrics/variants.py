@@ -179,7 +179,7 @@ def tried(options: Sequence[VariantOptions], usual: Mapping[str, Value]) -> Iter
         yield from ({**usual, option.name: value} for value in option.tried())
 
 
-class _Variants(Shape):
+class Variants(Shape):
     """A rubric, reduced to its variants."""
 
     model_config = ConfigDict(extra="ignore")
@@ -187,14 +187,8 @@ class _Variants(Shape):
     variants: Annotated[VariantsField, must(bool, "at least one variant")]
 
 
-def variants_model() -> type[Shape]:
-    """Return the model that validates the variants of a rubric and ignores the rest."""
-    return _Variants
-
-
-def options_of(validated: Shape) -> tuple[VariantOptions, ...]:
-    """Return the possible values of variants in a rubric validated by `variants_model`."""
-    assert isinstance(validated, _Variants)
+def options_of(validated: Variants) -> tuple[VariantOptions, ...]:
+    """Return the possible values of the variants of a rubric."""
     return tuple(
         VariantOptions(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
         for name, shape in validated.variants.items()

@@ -47,6 +47,11 @@ class Position:
 TOP = Position(1, 1)
 
 
+def end_of(text: str) -> Position:
+    """Return the position after a text from the top of a file."""
+    return Position(text.count("\n") + 1, len(text) - text.rfind("\n"))
+
+
 @dataclass(slots=True)
 class YamlTree:
     """A parsed document.
@@ -121,12 +126,8 @@ def _position(mark: StreamMark | None) -> Position:
 
 
 def _unreadable_character(text: str, error: ReaderError) -> Mistake:
-    before = text[: error.position]
-    line = before.count("\n") + 1
-    column = len(before) - (before.rfind("\n") + 1) + 1
-    return Mistake(
-        line, column, f"expected text, found the control character {shown(text[error.position : error.position + 1])}"
-    )
+    character = shown(text[error.position : error.position + 1])
+    return end_of(text[: error.position]).mistake(f"expected text, found the control character {character}")
 
 
 def _syntax_mistake(error: MarkedYAMLError) -> Mistake:

@@ -209,12 +209,12 @@ def _same(handed: Sequence[Handed]) -> list[SameText]:
             if program.text.strip():
                 holders[digest].append((one, program))
     found = [
-        SameText(who[0][1].name, tuple(h for h, _ in who), len({_all_of(h) for h, _ in who}) == 1)
+        SameText(
+            file=who[0][1].name,
+            holders=tuple(h for h, _ in who),
+            whole=len({tuple(sorted(program.digest for program in h.programs)) for h, _ in who}) == 1,
+        )
         for who in holders.values()
         if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
     ]
     return sorted(found, key=lambda same: (-len(same.holders), same.file, same.holders[0].name))
-
-
-def _all_of(handed: Handed) -> tuple[str, ...]:
-    return tuple(sorted(program.digest for program in handed.programs))

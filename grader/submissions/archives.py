@@ -121,11 +121,11 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
         try:
             whole += stream.decompress(data, most - len(whole) + 1)
         except (zlib.error, OSError, lzma.LZMAError, EOFError, ValueError):
-            raise _damaged_tar() from None
+            raise _damaged("tar") from None
         if len(whole) > most:
             raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
         if not stream.eof:
-            raise _damaged_tar()
+            raise _damaged("tar")
         data = stream.unused_data.lstrip(b"\0")
         if not data:
             return bytes(whole)
@@ -143,7 +143,7 @@ def tar_members(data: bytes, *, most: int) -> list[Member]:
         with tarfile.open(fileobj=io.BytesIO(data), mode="r:", encoding=_ENCODING, errors=_ERRORS) as archive:
             found = archive.getmembers()
     except (tarfile.TarError, ValueError, OSError, EOFError, OverflowError):
-        raise _damaged_tar() from None
+        raise _damaged("tar") from None
     return [_tar_member(data, info, places) for info in found]
 
 
@@ -165,16 +165,16 @@ def _places(data: bytes, most: int) -> set[tuple[int, int]]:
     while True:
         block = data[at : at + BLOCK]
         if len(block) < BLOCK:
-            raise _damaged_tar()
+            raise _damaged("tar")
         if not any(block):
             return places
         headers += 1
         if headers > 3 * most:  # a member may have two extended headers
-            raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+            raise _too_many(most, "entries")
         at += BLOCK
         size = _size(block)
         if at + size > len(data):
-            raise _damaged_tar()
+            raise _damaged("tar")
         if block[156:157] in _EXTENDED:
             _check_extended(data[at : at + size], pax=block[156:157] in _PAX)
         else:
@@ -186,7 +186,7 @@ def _size(block: bytes) -> int:
     try:
         info = tarfile.TarInfo.frombuf(block, _ENCODING, _ERRORS)
     except (tarfile.HeaderError, ValueError):
-        raise _damaged_tar() from None
+        raise _damaged("tar") from None
     if info.type == tarfile.GNUTYPE_SPARSE or info.size < 0:
         raise _unusual()
     if info.type in _EXTENDED and info.size > MAX_EXTENDED_BYTES:
@@ -206,12 +206,16 @@ def _check_extended(header: bytes, *, pax: bool) -> None:
         length = header[at : at + 8].partition(b" ")[0]
         record = header[at : at + int(length)] if length.isdigit() else b""
         if not record.endswith(b"\n") or b"=" not in record or len(record) != int(length):
-            raise _damaged_tar()
+            raise _damaged("tar")
         at += len(record)
 
 
-def _damaged_tar() -> UnusableArchiveError:
-    return UnusableArchiveError("expected a whole tar archive, found a damaged or incomplete one")
+def _damaged(kind: str) -> UnusableArchiveError:
+    return UnusableArchiveError(f"expected a whole {kind} archive, found a damaged or incomplete one")
+
+
+def _too_many(most: int, what: str) -> UnusableArchiveError:
+    return UnusableArchiveError(f"expected at most {most} {what}, found more", FEWER)
 
 
 def _unusual() -> UnusableArchiveError:
@@ -234,14 +238,14 @@ def zip_members(data: bytes, *, most: int) -> list[Member]:
     """
     # Checked before zipfile creates an object for each member: a few megabytes could become gigabytes.
     if data.count(_DIRECTORY_ENTRY) > most:
-        raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+        raise _too_many(most, "entries")
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _DAMAGE:
-        raise _damaged_zip() from None
+        raise _damaged("zip") from None
     # Unpacking members that share their bytes could take hours, however small the result.
     if sum(info.compress_size for info in archive.infolist()) > len(data):
-        raise _damaged_zip()
+        raise _damaged("zip")
     return [_zip_member(archive, info) for info in archive.infolist()]
 
 
@@ -257,7 +261,7 @@ def _zip_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Member:
             with archive.open(info) as file:
                 return file.read(most)
         except _DAMAGE:
-            raise _damaged_zip() from None
+            raise _damaged("zip") from None
 
     name = _name(info)
     return Member(name.rstrip("/") or name, _kind(info, name), info.file_size, read)
@@ -280,10 +284,6 @@ def _kind(info: zipfile.ZipInfo, name: str) -> str:
     if stat.S_IFMT(mode) and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         return "a device, pipe or socket"
     return FOLDER if name.endswith("/") else FILE
-
-
-def _damaged_zip() -> UnusableArchiveError:
-    return UnusableArchiveError("expected a whole zip archive, found a damaged or incomplete one")
 
 
 #: Largest archive, in bytes.
@@ -363,9 +363,8 @@ def _members(data: bytes) -> list[Member]:
         limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
         data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, allowed), limit=limit)
         if not is_tar(data[:HEAD_BYTES]):
-            raise UnusableArchiveError(
-                f"expected a tar archive inside the {kind}, found another kind of file", HAND_IN_ZIP
-            )
+            found = f"expected a tar archive inside the {kind}, found another kind of file"
+            raise UnusableArchiveError(found, HAND_IN_ZIP)
     return tar_members(data, most=MAX_ENTRIES)
 
 
@@ -382,9 +381,7 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
         problem = name_problem(name)
         if problem:
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
-        if is_skipped(name if member.kind != FOLDER else f"{name}/x"):
-            continue
-        if member.kind == FOLDER:
+        if member.kind == FOLDER or is_skipped(name):
             continue
         if member.kind != FILE:
             hint = "replace it by the file itself" if member.kind == "a link" else REPACK
@@ -412,9 +409,9 @@ def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> li
         else:
             left.add(f"it holds {generated[folder]}, so a tool made it", folder)
     if len(kept) > MAX_FILES:
-        raise UnusableArchiveError(f"expected at most {MAX_FILES} files, found more", FEWER)
+        raise _too_many(MAX_FILES, "files")
     if any(name.count("/") > MAX_DEPTH for name, _ in kept):
-        raise UnusableArchiveError(f"expected at most {MAX_DEPTH} folders inside each other, found more", FEWER)
+        raise _too_many(MAX_DEPTH, "folders inside each other")
     twins = collision([name for name, _ in kept])
     if twins is not None:
         found = f"found {shown(twins[0])} and {shown(twins[1])}" if twins[0] != twins[1] else f"found {shown(twins[0])}"
