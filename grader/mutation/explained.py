@@ -129,7 +129,7 @@ def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
         template=None if read.template is None else path.parent / read.template,
         template_score=None if read.template_score is None else Fraction(str(read.template_score)),
         survivors=tuple(
-            Explanation(one.mutants, because=_line(one.because), where=_where(path, tree, ("survivors", n)))
+            Explanation(one.mutants, _line(one.because), where=_where(path, tree, ("survivors", n)))
             for n, one in enumerate(read.survivors)
         ),
         expected=tuple(

@@ -39,6 +39,25 @@ class Mutation:
     edits: tuple[Edit, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A changed program: a mutant or a correct variant.
+
+    Attributes:
+        id: Stays the same as long as the reference solution does.
+        file: Name of the file.
+        operator: Key of `OPERATORS` or of `VARIANTS`.
+        source: The whole program.
+        detail: The change of a mutant, in one line.
+    """
+
+    id: str
+    file: str
+    operator: str
+    source: str
+    detail: str = ""
+
+
 class Program:
     """A parsed program.
 
