@@ -101,12 +101,7 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
 
 
 def sentence(difference: Difference, clock: ClockKind) -> str:
-    """Return a sentence about a difference, for the report's reason of a clock.
-
-    Args:
-        difference: The difference.
-        clock: Clock of the first recording; on the wall clock, the difference comes from what runs beside the program.
-    """
+    """Return a sentence about a difference for the report's reason of a clock, given the first recording's clock."""
     name = difference.name[:200]
     first, second = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
     where = ("in virtual time", "on the wall clock")

@@ -52,9 +52,7 @@ def judge_run(
 
 
 def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> ExerciseReport:
-    own: Mapping[str, Trace] = {
-        scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id
-    }
+    own = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     report = judge_exercise(exercise, own, run.submission, run.sources)
     return illustrated(report, exercise, own, run.submission, run.sources) if pictures else report
 
@@ -273,9 +271,8 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
 def _without_points(
     criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, Any] | None = None
 ) -> Verdict:
-    points = criterion.points
-    known = evidence or {}
-    return Verdict(criterion.id, criterion.title, outcome, Fraction(0), points, reason, hint=hint, evidence=known)
+    known, none = evidence or {}, Fraction(0)
+    return Verdict(criterion.id, criterion.title, outcome, none, criterion.points, reason, hint=hint, evidence=known)
 
 
 def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
@@ -288,9 +285,7 @@ def _fault_of(finding: Finding) -> tuple[Any, ...] | None:
 
 def not_graded_yet(exercise: Exercise) -> ExerciseReport:
     """Return a report with every criterion undecided, so that no part of it looks like a result."""
-    verdicts = (
-        Verdict(c.id, c.title, Outcome.UNDECIDED, Fraction(0), c.points, "not graded yet") for c in exercise.criteria
-    )
+    verdicts = (_without_points(c, Outcome.UNDECIDED, "not graded yet") for c in exercise.criteria)
     return ExerciseReport(
         id=exercise.id,
         number=exercise.number,

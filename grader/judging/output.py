@@ -302,9 +302,8 @@ def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str]
     """Return the text around the numbers as a shape; lists and bars of any length have the same one."""
     starts = [0, *(n.stop for n in numbers)]
     stops = [*(n.start for n in numbers), len(text)]
-    parts = [
-        _REPEATED.sub(r"\1", _DIGITS.sub("0", "".join(text[a:b].split()))) for a, b in zip(starts, stops, strict=True)
-    ]
+    bare = ("".join(text[a:b].split()) for a, b in zip(starts, stops, strict=True))
+    parts = [_REPEATED.sub(r"\1", _DIGITS.sub("0", part)) for part in bare]
     return parts[0], frozenset(parts[1:-1]), parts[-1]
 
 

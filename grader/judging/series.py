@@ -80,11 +80,7 @@ class Curve:
 
 @lru_cache(maxsize=64)
 def curve(text: str) -> Curve:
-    """Return the formula in a text.
-
-    Raises:
-        FormulaError: The text is not a formula.
-    """
+    """Return the formula in a text; raises FormulaError if it is none."""
     if len(text) > _MOST_CHARACTERS:
         raise FormulaError(f"at most {_MOST_CHARACTERS} characters")
     try:
@@ -155,11 +151,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """What the values follow, as a clause, and what to do; both may be empty.
-
-    Attributes:
-        start: First number of the count, if only that differs.
-    """
+    """What the values follow, as a clause, and a hint; both may be empty. `start` is set if only that differs."""
 
     said: str = ""
     hint: str = ""
@@ -251,11 +243,7 @@ Right = Callable[[float, float], bool]
 
 
 def lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int | None:
-    """Return by how much the answers lag behind the inputs that they are right for; None if they do not.
-
-    Returns:
-        A positive multiple of a tenth of a second, or None if there is no lag or none explains the answers.
-    """
+    """Return by how much the answers lag behind the inputs that they are right for; None if they do not."""
     found: int | None = None
     for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
         fits = _fits(inputs, answers, right, lag)

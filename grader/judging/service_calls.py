@@ -242,14 +242,7 @@ def _read(response: Response | None, reading: ResponseReader) -> tuple[CallKind,
 
 
 def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
-    """Return the shapes of the texts that a process wrote before its first response.
-
-    Args:
-        trace: What was observed.
-        process: File name of the client.
-        service: Service name as on the wire.
-        cautious: Whether output at the instant of a response without delay may have come before it.
-    """
+    """Return the shapes of the texts before the first response; `cautious` adds its instant if it came at once."""
     first = next((c for c in calls_of(trace, service, "student") if c.response is not None), None)
     if first is None or first.response is None:
         return frozenset()

@@ -232,9 +232,8 @@ def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str],
     stars: list[str] = []
     for node in index.get(ast.Import, ()):
         for name in node.names:
-            aliases[name.asname or name.name.partition(".")[0]] = (
-                name.name if name.asname else name.name.partition(".")[0]
-            )
+            top = name.name.partition(".")[0]
+            aliases[name.asname or top] = name.name if name.asname else top
     for imported in index.get(ast.ImportFrom, ()):
         for name in imported.names:
             if name.name == "*":

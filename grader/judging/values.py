@@ -158,11 +158,7 @@ class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never end
 
 
 def at_path(value: Mapping[str, Any], path: str) -> Any:
-    """Return the part of a value at a path; list elements are counted from 0.
-
-    Raises:
-        NoSuchField: The path does not exist.
-    """
+    """Return the part of a value at a path, with list elements counted from 0; raises NoSuchField if there is none."""
     here: Any = value
     for name in _names(path):
         if isinstance(here, Mapping) and name in here:

@@ -44,11 +44,7 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """All notes of an author.
-
-    Attributes:
-        criteria: Criterion id -> why it detects no mutant.
-    """
+    """All notes of an author; `criteria` tells for a criterion's id why it detects no mutant."""
 
     reference: Path | None = None
     template: Path | None = None
@@ -100,11 +96,7 @@ def beside(rubric: Path) -> Path:
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:
-    """Read the notes on the self-test of an exercise; a missing file counts as empty.
-
-    Raises:
-        RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
-    """
+    """Read the notes on the self-test of an exercise, empty without a file; raises RubricError with every mistake."""
     if not path.exists():
         return Explained()
     tree = _tree(path)

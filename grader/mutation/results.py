@@ -141,10 +141,8 @@ class SelftestResult:
     @property
     def never_turned(self) -> tuple[str, ...]:
         """Criteria that detected no mutant, without an explanation; empty if only some mutants were run."""
-        turned = {id_ for trial in self.mutants for id_ in trial.standing.turned}
-        return (
-            tuple(id_ for id_ in self.criteria if id_ not in turned and id_ not in self.unturned) if self.whole else ()
-        )
+        known = {*self.unturned, *(id_ for trial in self.mutants for id_ in trial.standing.turned)}
+        return tuple(id_ for id_ in self.criteria if id_ not in known) if self.whole else ()
 
     @property
     def template_fits(self) -> bool:

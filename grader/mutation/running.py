@@ -134,11 +134,7 @@ class SelftestOptions:
 
 
 def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progress) -> Iterator[SelftestResult]:
-    """Test rubrics, and yield the result of each as it is ready.
-
-    Raises:
-        GraderError: Something that the test needs cannot be used; the class of the error tells who must act.
-    """
+    """Test rubrics, and yield the result of each as it is ready; raises GraderError if something cannot be used."""
     prepared = [_prepared(path, options) for path in rubrics]
     workers = options.jobs or len(os.sched_getaffinity(0))
     with open_session(options.isolation, workers) as session:

@@ -38,20 +38,12 @@ class Header:
 
 
 def builtin_rubrics() -> Mapping[str, Path]:
-    """Return the built-in rubrics: exercise id -> YAML file, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
+    """Return the built-in rubrics as exercise id -> YAML file, ordered by number; raises RubricError without any."""
     return {header.id: header.path for header in builtin_headers()}
 
 
 def builtin_headers() -> tuple[Header, ...]:
-    """Return the headers of the built-in rubrics, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
+    """Return the headers of the built-in rubrics, ordered by exercise number; raises RubricError without any."""
     folder = shipped("rubrics")
     paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
     if not paths:

@@ -14,14 +14,16 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, 
 from pydantic import AfterValidator, Field, create_model
 
 from grader.core.quantities import DurationNs, Hertz, Kind, Least, Unit
-from grader.rubrics.drawing import Fields, SomeLongTime, SomeTime
-from grader.rubrics.stimuli import (
+from grader.rubrics.drawing import (
     Calls,
     CallsOrNever,
     Clients,
+    Fields,
     MessageCases,
     MessageCasesOrNone,
     NumberCases,
+    SomeLongTime,
+    SomeTime,
     TimeOrNever,
 )
 from grader.rubrics.types import (
@@ -99,11 +101,7 @@ class _Parameters(Shape):
     made: ClassVar[type]
 
     def built(self) -> Any:
-        """Return the dataclass that the mapping describes; omitted fields keep their defaults.
-
-        Raises:
-            ValueError: The dataclass itself rejects the values.
-        """
+        """Return the dataclass, with defaults for what is left out; raises ValueError if it rejects the values."""
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
         return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
 

@@ -23,9 +23,8 @@ from grader.core.scenario import (
     Span,
 )
 from grader.rubrics.check_parameters import choice_model, part_model
-from grader.rubrics.drawing import SomeLongTime
+from grader.rubrics.drawing import ParameterShape, SomeLongTime, StateShape, TransitionShape
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.stimuli import ParameterShape, StateShape, TransitionShape
 from grader.rubrics.types import (
     CheckFile,
     Choice,

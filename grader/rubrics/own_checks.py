@@ -58,11 +58,7 @@ def named_files(data: object) -> tuple[str, ...]:
 
 
 def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]:
-    """Run check files, and return their checks by name; the names in `known` are taken.
-
-    Raises:
-        RubricError: A file cannot be imported, or its table holds something that is not a check; one line for each.
-    """
+    """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
         table = _table(file)

@@ -84,12 +84,7 @@ def _is_scalar(node: dict[str, Any]) -> bool:
 
 
 def _tidy(node: Any, *, names: bool = False) -> Any:
-    """Remove details of Python: generated titles, and defaults that a rubric could not write.
-
-    Args:
-        node: Part of a schema.
-        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not schema keywords.
-    """
+    """Remove titles and defaults that describe Python; `names` tells that the keys are names, not schema keywords."""
     if isinstance(node, list):
         return [_tidy(item) for item in node]
     if not isinstance(node, dict):

@@ -90,11 +90,7 @@ def build(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class MatchingText:
-    """Marks a text that must match a pattern as a whole.
-
-    Attributes:
-        pattern: Regular expression with the same meaning in Python and JavaScript.
-    """
+    """Marks a text that must match a pattern, which means the same in Python and in JavaScript, as a whole."""
 
     pattern: str
     expected: str

@@ -135,12 +135,7 @@ def missing_unit(number: str, symbol: str) -> QuantityError:
 
 
 def format_quantity(value: int | float, unit: Unit) -> str:
-    """Return a quantity in the form that `parse_quantity` reads, without loss.
-
-    Args:
-        value: Nanoseconds for `Unit("s")`, bytes for `Unit("B")`, hertz for `Unit("Hz")`; finite and at least 0.
-        unit: The dimension, named by its base unit.
-    """
+    """Return nanoseconds, bytes or hertz, finite and at least 0, in the form that `parse_quantity` reads."""
     kind = _KINDS[unit.symbol]
     if not kind.whole:
         digits = format(Decimal(repr(float(value))), "f")

@@ -111,14 +111,11 @@ def _refuse_excess(text: str) -> None:
     for count, event in enumerate(_yaml().parse(text)):
         kind = type(event).__name__
         depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
-        if count > MAX_VALUES:
-            raise YamlSyntaxError(
-                _position(event.start_mark).mistake(f"expected at most {MAX_VALUES} values, found more")
-            )
-        if depth > MAX_DEPTH + 2:  # the stream and the document count as well
-            raise YamlSyntaxError(
-                _position(event.start_mark).mistake(f"expected at most {MAX_DEPTH} levels, found more")
-            )
+        deep = depth > MAX_DEPTH + 2  # the stream and the document count as well
+        if count > MAX_VALUES or deep:
+            limit = f"{MAX_VALUES} values" if count > MAX_VALUES else f"{MAX_DEPTH} levels"
+            where = _position(event.start_mark)
+            raise YamlSyntaxError(where.mistake(f"expected at most {limit}, found more"))
 
 
 def _position(mark: StreamMark | None) -> Position:

@@ -92,11 +92,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class SameText:
-    """Submissions with the same file, byte for byte.
-
-    Attributes:
-        whole: Whether all of their files are the same.
-    """
+    """Submissions with the same file, byte for byte; `whole` if all of their files are the same."""
 
     file: str
     holders: tuple[Handed, ...]
@@ -170,11 +166,7 @@ class Overlap:
 
 
 def make_print(text: str) -> Print:
-    """Make the fingerprint of a program from its tokens; the program is never run.
-
-    Raises:
-        TooSlow: It takes longer than any program does.
-    """
+    """Make the fingerprint of a program from its tokens, without running it; raises TooSlow if that takes too long."""
     import numpy as np  # noqa: PLC0415  comes with the library
     from copydetect import CodeFingerprint  # noqa: PLC0415  a heavy, optional library
 

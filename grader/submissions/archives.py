@@ -133,11 +133,7 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
 
 
 def tar_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of an uncompressed tar archive, at most so many, in order.
-
-    Raises:
-        UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses unusual features.
-    """
+    """Return the members of an uncompressed tar archive in order; raises UnusableArchiveError for more than `most`."""
     places = _places(data, most)
     try:
         with tarfile.open(fileobj=io.BytesIO(data), mode="r:", encoding=_ENCODING, errors=_ERRORS) as archive:
@@ -231,11 +227,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, Valu
 
 
 def zip_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of a zip archive, at most so many, in the order of its directory.
-
-    Raises:
-        UnusableArchiveError: The archive is damaged, encrypted, uses an uncommon compression, or has too many members.
-    """
+    """Return the members of a zip archive in its order; raises UnusableArchiveError if it is damaged or unusual."""
     # Checked before zipfile creates an object for each member: a few megabytes could become gigabytes.
     if data.count(_DIRECTORY_ENTRY) > most:
         raise _too_many(most, "entries")

@@ -29,6 +29,12 @@ def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
     return f"{', '.join(names[:-1])} {conjunction} {names[-1]}"
 
 
+def first_of(names: Sequence[str]) -> str:
+    """Return the first three names as a phrase that ends in `and 2 more`, if there are more."""
+    more = [f"{len(names) - 3} more"] if len(names) > 3 else []
+    return listed([*map(shown, names[:3]), *more], "and")
+
+
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
 
@@ -176,12 +182,5 @@ class LeftOut:
 
     def notes(self) -> tuple[str, ...]:
         """Return one sentence per reason, in an order that does not depend on the file system."""
-        return tuple(
-            self._note(reason, sorted(names, key=os.fsencode)) for reason, names in sorted(self.by_reason.items())
-        )
-
-    @staticmethod
-    def _note(reason: str, names: Sequence[str]) -> str:
-        first = [shown(name) for name in names[:3]]
-        more = [f"{len(names) - 3} more"] if len(names) > 3 else []
-        return f"not copied: {listed([*first, *more], 'and')} ({reason})"
+        items = sorted(self.by_reason.items())
+        return tuple(f"not copied: {first_of(sorted(names, key=os.fsencode))} ({reason})" for reason, names in items)

@@ -60,11 +60,7 @@ def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
 
 
 def read_start(file: Path, most: int, *, where: str) -> bytes:
-    """Return at most `most` bytes from the start of a named file; a link to it is followed.
-
-    Raises:
-        SubmissionError: The file cannot be read, or is not a regular file.
-    """
+    """Return at most `most` bytes from the start of a regular file, or of a link to one; raises SubmissionError."""
     try:
         with os.fdopen(os.open(file, _OPEN_FLAGS & ~os.O_NOFOLLOW), "rb") as opened:
             if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
@@ -161,9 +157,8 @@ class _Walk:
 
 
 def _too_much(where: str, limit: str) -> SubmissionError:
-    return SubmissionError(
-        f"{where}: expected at most {limit}, found more", "name the folder that holds only your work"
-    )
+    hint = "name the folder that holds only your work"
+    return SubmissionError(f"{where}: expected at most {limit}, found more", hint)
 
 
 def _identity(info: os.stat_result) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from grader.core.errors import SubmissionError
 from grader.core.submission import StudentFile, Submission
 from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
-from grader.submissions.collected import MAX_FILE_BYTES, Collected, listed, shown
+from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
@@ -59,11 +59,7 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 
 
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
-    """Write files that were read, here or on another machine, and find the wanted ones among them.
-
-    Raises:
-        HarnessError: The copy cannot be written.
-    """
+    """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
     names = [name for name, _ in collected.files]
     files = {name: _look_for(name, names, wanted) for name in wanted}
@@ -160,9 +156,7 @@ def _nearest_the_top(relative: str) -> tuple[int, bytes]:
 
 
 def _several(file: StudentFile) -> str:
-    others = [shown(name) for name in file.others[:3]]
-    more = [f"{len(file.others) - 3} more"] if len(file.others) > 3 else []
-    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {listed([*others, *more], 'and')}"
+    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {first_of(file.others)}"
 
 
 def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:

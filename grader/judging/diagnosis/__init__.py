@@ -141,10 +141,8 @@ def _placed(file: str, text: str) -> str:
     source = read(file, text)
     guard = _wrong_guard(source)
     if guard is not None:
-        said = (
-            f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so `python3 {file}` would"
-        )
-        return f"{said} do nothing; write: if __name__ == '__main__':"
+        said = f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so "
+        return f"{said}`python3 {file}` would do nothing; write: if __name__ == '__main__':"
     main = next(iter(source.functions("main")), None)
     return main_not_called(file, first_line(main) if main is not None else 0)
 

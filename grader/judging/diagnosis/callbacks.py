@@ -286,9 +286,8 @@ def _timer_arguments(crash: Crash, item: Made) -> Clue | None:
     if not crash.said(r"must be a string or a real number, not '(method|function)'|operand type.*'(method|function)'"):
         return None
     period = crash.source.code(item.call.args[1]) if len(item.call.args) > 1 else "..."
-    return Clue(
-        f"the period comes first, then the callback: create_timer({period}, {crash.source.code(item.call.args[0])})"
-    )
+    callback = crash.source.code(item.call.args[0])
+    return Clue(f"the period comes first, then the callback: create_timer({period}, {callback})")
 
 
 def _topic_arguments(crash: Crash, item: Made) -> Clue | None:

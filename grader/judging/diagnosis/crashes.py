@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 from grader.core.trace import FaultKind
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
@@ -121,9 +122,7 @@ def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     publishers = [t for m in items if m.kind == "publisher" and (t := target_of(source, m.call)).startswith("self.")]
     if f"self.{name}.publish(" in source.line(crash.line) and len(publishers) == 1:
         return Clue(f"the publisher is called {publishers[0]}: write {publishers[0]}.publish(...)")
-    stored = [
-        n.attr for n in source.all(ast.Attribute) if chain(n) == f"self.{n.attr}" and isinstance(n.ctx, ast.Store)
-    ]
+    stored = [dotted.removeprefix("self.") for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
     methods = [f.name for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
     near = closest(name, [*stored, *methods], 0.8) or closest(name, NODE_METHODS, 0.85)
     return Clue(f"self.{name} should be self.{near}") if near else None

@@ -233,9 +233,8 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
 def _inverted(controller: _Controller) -> Clue | None:
     """The answers are exchanged."""
     source, check = controller.source, controller.check
-    away = [
-        (v, got) for v, got, _ in _rows(controller.case) if not within(v, check.threshold, EXACT) and got is not None
-    ]
+    known = ((v, got) for v, got, _ in _rows(controller.case) if got is not None)
+    away = [(v, got) for v, got in known if not within(v, check.threshold, EXACT)]
     flipped = [within(got, check.otherwise if v > check.threshold else check.above, EXACT) for v, got in away]
     both = len({v > check.threshold for v, _ in away}) == 2
     switches = _switches(source, check.threshold)
@@ -273,10 +272,8 @@ def _rounded(controller: _Controller) -> Clue | None:
         calls = [n for n in subtree(switch.tested) if isinstance(n, ast.Call)]
         calls = [c for c in calls if last_name(c.func) in ("int", "round", "floor", "ceil", "trunc")]
         if calls:
-            hint = (
-                f"{source.code(calls[0], 40)} changes values near {number(check.threshold)}: compare the value itself"
-            )
-            return Clue(hint, source.place(switch.node), key="rounded")
+            hint = f"{source.code(calls[0], 40)} changes values near {number(check.threshold)}"
+            return Clue(f"{hint}: compare the value itself", source.place(switch.node), key="rounded")
     return None
 
 

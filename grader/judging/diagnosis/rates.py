@@ -162,16 +162,13 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
     source = paced.source
     for timer in paced.timers():
         inside = runs(source, timer)
+        advice = "ends the publishing: it has to go on until the node is stopped"
         for node in inside:
             if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
-                hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
-                return Clue(hint, source.place(node))
+                return Clue(f"{source.code(node)} {advice}", source.place(node))
         tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
         if len(tests) == 1:
-            hint = (
-                f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"
-            )
-            return Clue(hint, source.place(tests[0]))
+            return Clue(f"'if {source.code(tests[0].test, 40)}' {advice}", source.place(tests[0]))
     return None
 
 
@@ -212,10 +209,8 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
         return _no_pause(paced, loop)
     call = pauses[0].origin
     if len(pauses) == 1 and _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
-        hint = (
-            f"{source.code(call)} makes {number(1 / total)} Hz; {number(paced.wanted_hz)} Hz is a pause of {wanted} s"
-        )
-        return Clue(hint, source.place(call))
+        hint = f"{source.code(call)} makes {number(1 / total)} Hz"
+        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz is a pause of {wanted} s", source.place(call))
     if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
         hint = f"{source.code(call)} comes on top of the time that the rest of the loop takes: a timer keeps the pace"
         return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))

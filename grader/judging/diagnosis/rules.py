@@ -183,13 +183,7 @@ def rule(
 
 
 def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
-    """Turn a function into a rule that explains a fault.
-
-    Args:
-        text: Pattern to search in the text of the fault.
-        kinds: Kinds of faults; exceptions if there are none.
-        in_file: Whether it must have arisen in a submitted file.
-    """
+    """Turn a function into a rule for faults of some kinds, exceptions if none are given, whose text has a pattern."""
     return rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
 
 

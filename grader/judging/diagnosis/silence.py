@@ -227,9 +227,7 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     waits = made(source, "timer") or made(source, "subscription")
     if node is None or spins(source) or not waits or "asyncio" in "".join(source.lines[:60]):
         return None
-    hint = (
-        f"nothing spins the node: without rclpy.spin({variable_of(source, node, 'node')}) no timer and no subscription"
-    )
+    hint = f"nothing spins the node: without rclpy.spin({variable_of(source, node)}) no timer and no subscription"
     return Clue(f"{hint} is ever called", source.place(node))
 
 
@@ -422,9 +420,8 @@ def _shared_callback_group(case: Case) -> Clue | None:
     source = case.source
     grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
     clients = list(source.calls("create_client"))
-    waits = [
-        w for w in source.all(ast.Await) if isinstance(w.value, ast.Call) and last_name(w.value.func) == "call_async"
-    ]
+    answers = source.calls("call_async")
+    waits = [source.parents[call] for call in answers if isinstance(source.parents.get(call), ast.Await)]
     if grouped or not waits or len(clients) != 1:
         return None
     hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "

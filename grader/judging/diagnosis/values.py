@@ -115,9 +115,8 @@ def _misplaced_field(wrong: _Wrong) -> Clue | None:
     numbers = leaves(wrong.message.value)
     for path, value in wrong.found.items():
         want = wrong.wanted[path]
-        there = [
-            p for p, v in numbers.items() if p != path and _is(v, want) and not _is(wrong.wanted.get(p, 0.0), want)
-        ]
+        alike = [p for p, v in numbers.items() if p != path and _is(v, want)]
+        there = [p for p in alike if not _is(wrong.wanted.get(p, 0.0), want)]
         if _is(want, 0.0) or len(there) != 1:
             continue
         places = [g for g in _given_values(wrong.source, there[0]) if g.worth is None or _is(g.worth.value, want)]
@@ -337,9 +336,8 @@ def _draw_limits(case: Case) -> Clue | None:
     call, low, high = calls[0], number(check.low), number(check.high)
     right = f"random.uniform({float(check.low)}, {float(check.high)})"
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
-        return Clue(
-            f"{source.code(call)} has no limits, some values lie far out: {right}", source.place(call), key="draw"
-        )
+        hint = f"{source.code(call)} has no limits, some values lie far out: {right}"
+        return Clue(hint, source.place(call), key="draw")
     limits = [number_at(source, a) for a in call.args]
     if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
         if limits == [check.low, check.high]:

@@ -56,6 +56,7 @@ def alone(program: Program, node: cst.CSTNode) -> bool:
 
 #: Statements that people repeat by accident, and where this changes the behaviour.
 _REPEATED = ("publish", "call_async", "call", *LEVELS)
+_ENTITIES = ("create_timer", "create_subscription")
 
 
 def missing_call(program: Program) -> Iterator[Mutation]:
@@ -141,9 +142,7 @@ def repeated_call(program: Program) -> Iterator[Mutation]:
 def repeated_entity(program: Program) -> Iterator[Mutation]:
     """A second timer or subscription beside the first, with the same callback."""
     for line in program.all(cst.SimpleStatementLine):
-        calls = [
-            call for call in program.all(cst.Call, line) if called(call) in ("create_timer", "create_subscription")
-        ]
+        calls = [call for call in program.all(cst.Call, line) if called(call) in _ENTITIES]
         if calls:
             twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
             yield Mutation(line, f"two of {short(program.code(calls[0]))}", ((line, twice),))

@@ -59,14 +59,7 @@ class Candidate:
 
 
 class Program:
-    """A parsed program.
-
-    Args:
-        source: Its text.
-
-    Raises:
-        libcst.ParserSyntaxError: The source is not valid Python.
-    """
+    """A parsed program; raises libcst.ParserSyntaxError for one that is not valid Python."""
 
     def __init__(self, source: str) -> None:
         wrapper = MetadataWrapper(cst.parse_module(source))

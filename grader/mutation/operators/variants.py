@@ -172,9 +172,8 @@ def qos_object(program: Program) -> str:
         arg = argument(call, "qos_profile")
         if arg is not None and isinstance(arg.value, cst.Integer):
             edits.append((arg.value, expression(f"QoSProfile(depth={arg.value.value})")))
-    return (
-        program.changed([*edits, *program.importing("from rclpy.qos import QoSProfile")]) if edits else _same(program)
-    )
+    imported = program.importing("from rclpy.qos import QoSProfile")
+    return program.changed([*edits, *imported]) if edits else _same(program)
 
 
 def lambda_callbacks(program: Program) -> str:
@@ -266,9 +265,8 @@ def _formatted(program: Program, style: _Style) -> str:
 
 def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
     """Whether every style can format a field."""
-    return (
-        part.conversion is None and part.equal is None and _PLAIN.fullmatch(_specification(program, part)) is not None
-    )
+    bare = part.conversion is None and part.equal is None
+    return bare and _PLAIN.fullmatch(_specification(program, part)) is not None
 
 
 def _specification(program: Program, part: cst.BaseFormattedStringContent) -> str:

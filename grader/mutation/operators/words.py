@@ -246,10 +246,8 @@ def rate_as_period(program: Program) -> Iterator[Mutation]:
     """The rate instead of the period, or the other way round."""
     for given in _periods(program):
         before = program.code(given)
-        is_inverse = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
-        after = (
-            program.code(given.right) if is_inverse and isinstance(given, cst.BinaryOperation) else f"1 / ({before})"
-        )
+        quotient = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
+        after = program.code(given.right) if quotient else f"1 / ({before})"  # type: ignore[attr-defined]
         yield Mutation(given, into(before, after), ((given, expression(after)),))
 
 
