@@ -115,7 +115,7 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.classroom.outputs import platforms  # noqa: PLC0415  as above
     from grader.classroom.request import ClassRequest  # noqa: PLC0415  as above
     from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
-    from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
+    from grader.rubrics.builtin import shipped  # noqa: PLC0415  as above
     from grader.similarity.finding import read_given  # noqa: PLC0415  as above
 
     if canvas_gradebook is not None and canvas is None:
@@ -147,7 +147,7 @@ def command(  # noqa: PLR0913  one parameter an option
         seed_key=drawn_with(seed, seed_key),
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
-        given=read_given(templates or (shipped_templates(),)) if similarity else None,
+        given=read_given(templates or (shipped("student_template"),)) if similarity else None,
     )
     try:
         with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:

@@ -13,6 +13,7 @@ from grader.core.quantities import NS_PER_S, DurationNs, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT, complained
 from grader.judging.findings import (
+    explain_fault,
     explain_no_client,
     fault_hint,
     fault_sentence,
@@ -63,7 +64,6 @@ class CallsOfClient:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         text = f"{self.calls} requests on {self.service}"
         if self.period is None:
             return text
@@ -107,9 +107,8 @@ class CallsOfClient:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
             return not_met(reason, evidence, hint=f"ask {self.calls} times: for i in range({self.calls})")
-        fault = first_fault(trace)
-        if fault is not None:
-            return faulted(fault, reason, evidence, last=True)
+        if crashed := explain_fault(trace, reason, evidence, last=True):
+            return crashed
         last = calls[-1]
         waiting = "; the last one got no response" if last.response is None else ""
         ended = trace.marks("exited")
@@ -138,7 +137,6 @@ class WaitsForService:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} waits for {self.service}, logs that it does, and asks once it is there"
 
     def judge(self, trace: Trace) -> Finding:
@@ -173,10 +171,9 @@ class WaitsForService:
         return complained(self.process, bad, f" {when}", {}, "waiting is no error: say it with info or warn")
 
     def _never_asked(self, trace: Trace, appears_ns: int, asked: Sequence[int]) -> Finding:
-        fault = first_fault(trace, self.process)
         there = f"{self.service} appeared at {moment(appears_ns)}"
-        if fault is not None:
-            return faulted(fault, f"{there}, no request came")
+        if crashed := explain_fault(trace, f"{there}, no request came", process=self.process):
+            return crashed
         if not trace.requests(self.service, "student") and not trace.service_ends("client", self.service):
             return waiting_for("service_calls", explain_no_client(trace, self.service))
         when = f"the first request came at {moment(asked[0])}" if asked else "no request came"
@@ -242,7 +239,6 @@ class ReactsToResponses:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         limit = number(self.threshold)
         goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
         text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
@@ -358,7 +354,6 @@ class NoGoWithoutAnswer:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
 
     def judge(self, trace: Trace) -> Finding:
@@ -425,9 +420,8 @@ def _quotes(output: Output, episode: Episode) -> bool:
 
 
 def _not_asked(trace: Trace, process: str, service: str) -> Finding:
-    fault = first_fault(trace, process)
-    if fault is not None:
-        return faulted(fault, f"it had not asked {service} by then")
+    if crashed := explain_fault(trace, f"it had not asked {service} by then", process=process):
+        return crashed
     return waiting_for("service_calls", explain_no_client(trace, service))
 
 
@@ -439,9 +433,8 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
     """
     last = episodes[-1]
     asked = f"{service}: {process} asked {counted(len(episodes), 'time')}"
-    fault = first_fault(trace, process)
-    if fault is not None:
-        return faulted(fault, f"{asked} and did not get to the answer in question")
+    if crashed := explain_fault(trace, f"{asked} and did not get to the answer in question", process=process):
+        return crashed
     ended = trace.marks("exited", process)
     stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
     if ended or stopped or last.kind is CallKind.UNANSWERED:

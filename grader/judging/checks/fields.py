@@ -12,7 +12,7 @@ from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, Formula, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart
+from grader.judging.charts import plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
@@ -48,7 +48,6 @@ class FieldEqual:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -87,7 +86,6 @@ class FieldInRange:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -131,7 +129,6 @@ class FieldMonotone:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} on {self.topic} only {self.direction}{', never equal' if self.strictly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -204,7 +201,6 @@ class FieldFunction:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
 
     def judge(self, trace: Trace) -> Finding:
@@ -304,7 +300,6 @@ class RandomInRange:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         span_ = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
@@ -386,10 +381,5 @@ class RandomInRange:
         label = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
         dots = series(plain_topic(self.topic), points_of(values), look=Look.LINE)
         band = Band(self.low, self.high, f"{label}: accepted")
-        return time_chart(
-            f"range {self.topic}",
-            f"Values on {self.topic}",
-            f"{about}{label}.",
-            (Panel(plain_topic(self.topic), unit, (dots,), bands=(band,)),),
-            happenings(trace),
-        )
+        panel = Panel(plain_topic(self.topic), unit, (dots,), bands=(band,))
+        return time_chart(trace, f"range {self.topic}", f"Values on {self.topic}", f"{about}{label}.", panel)

@@ -62,7 +62,6 @@ class UsesLogger:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a record of {self.process} through its logger; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -117,7 +116,6 @@ class LogsMatching:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         most = f" and at most {self.at_most}" if self.at_most is not None else ""
         text = f" matching {self.pattern}" if self.pattern else ""
         level = "" if self.level == "DEBUG" else f" of severity {self.level}{'' if self.exactly else ' or higher'}"
@@ -219,7 +217,6 @@ class LogsEvery:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return (
             f"one log of {self.process} for every {self.every} messages on {self.topic}; printing alone is half of it"
         )

@@ -12,14 +12,13 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.checks.logs import complained
 from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
     Analysis,
-    Group,
     Track,
     X,
     Y,
@@ -74,7 +73,6 @@ class LogsPosition:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -109,14 +107,11 @@ class LogsPosition:
         evidence = _evidence(found) | {"cause": cause.name}
         if fault is not None and cause.name in ("no_pair", "few"):
             return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
-        if not found.groups and not self._wrote_after(trace, track):
+        if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
             return not_met(reason, evidence | {"cause": "nothing"})
         return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint)
-
-    def _wrote_after(self, trace: Trace, track: Track) -> bool:
-        return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the driven path with the logged positions on it, or None without odometry."""
@@ -175,7 +170,6 @@ class LogPeriod:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         share = number(100 * self.tolerance)
         return f"one log every {number(seconds(self.period))} s ± {share} % on average while {self.topic} is played"
 
@@ -242,8 +236,9 @@ class LogPeriod:
             return printed.times_ns
         for outputs in (student_records(trace, self.process), printed_lines(trace, self.process)):
             during = [o for o in outputs if track.start_ns <= o.t_ns < track.stop_ns]
-            commonest = _commonest(grouped(blocks(during, trace.clock)))
-            if commonest is not None:
+            groups = grouped(blocks(during, trace.clock))
+            if groups:  # of equally frequent templates, the one with two numbers
+                commonest = max(groups, key=lambda group: (len(group.entries), bool(group.pairs)))
                 return tuple(dict.fromkeys(e.t_ns for e in commonest.entries))
         return ()
 
@@ -263,20 +258,13 @@ class LogPeriod:
         share = self.tolerance * period_s
         label = f"{number(period_s)} s ± {number(100 * self.tolerance)} % on average"
         return time_chart(
+            trace,
             f"period {self.topic}",
             "When positions were logged",
             _describe_period(times, self),
-            (
-                Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
-                Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
-            ),
-            happenings(trace),
+            Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
+            Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
         )
-
-
-def _commonest(groups: Sequence[Group]) -> Group | None:
-    """Return the most frequent template; of equally frequent ones, the one with two numbers."""
-    return max(groups, key=lambda g: (len(g.entries), bool(g.pairs)), default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +283,6 @@ class WaitsGracefully:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         silence = number(seconds(self.silence))
         return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
 

@@ -12,6 +12,7 @@ from grader.core.exercise import Finding, Location
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
 from grader.judging.findings import (
+    explain_fault,
     explain_no_message,
     fault_hint,
     fault_sentence,
@@ -59,7 +60,6 @@ class ParameterDeclared:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         kind = f" of type {self.type}" if self.type else ""
         value = "" if self.value is None else f", by default {shown(self.value)}"
         return f"the parameter {self.name}{kind}{value}"
@@ -93,9 +93,8 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     Raises:
         HarnessError: The node was there, but nobody asked it.
     """
-    fault = first_fault(trace)
-    if fault is not None:
-        return faulted(fault, f"the parameter {name} could not be asked for")
+    if crashed := explain_fault(trace, f"the parameter {name} could not be asked for"):
+        return crashed
     nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
     if node is not None and node not in nodes:
         reason = f"{node}: not in the ROS graph, so it was not asked for {name}; found {listed(nodes) or 'no node'}"
@@ -134,7 +133,6 @@ class ParameterTakesEffect:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         what = self.field if self.effect == "field" else f"the {self.effect}"
         return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
 
@@ -220,7 +218,6 @@ class NoFault:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process or 'every process'} runs to the end without an exception"
 
     def judge(self, trace: Trace) -> Finding:
@@ -250,7 +247,6 @@ class CleanShutdown:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
     def judge(self, trace: Trace) -> Finding:
@@ -283,8 +279,18 @@ class CleanShutdown:
         return not_met(reason, {"asked_s": seconds(asked_ns)}, hint=_SHUTDOWN_HINT)
 
 
+class _OfSource:
+    """A check of a file's text, which is in no recording."""
+
+    __slots__ = ()
+    process: str
+
+    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
+        raise HarnessError(f"{self.process}: its text was not kept")
+
+
 @dataclass(frozen=True, slots=True)
-class SourceUses:
+class SourceUses(_OfSource):
     """A student's file contains a class that derives from a given one, and calls of given functions or methods.
 
     The file is read, not run: imports under other names are followed, and unreachable lines count.
@@ -302,13 +308,8 @@ class SourceUses:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"a class that derives from {' or '.join(self.derives_from)}"] if self.derives_from else []
         return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
-
-    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise HarnessError: the recording does not contain the file."""
-        raise HarnessError(f"{self.process}: its text was not kept")
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Return full credit if everything is there; the reason names what is missing."""
@@ -332,7 +333,7 @@ class SourceUses:
 
 
 @dataclass(frozen=True, slots=True)
-class SourceAvoids:
+class SourceAvoids(_OfSource):
     """A file does not call given functions, anywhere or in callbacks, and optionally has no `global` statement.
 
     The file is read, not run: imports under other names are followed. A callback is a function passed to a timer,
@@ -352,13 +353,8 @@ class SourceAvoids:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"no call of {name}" for name in self.calls] + ["no global"] * self.globals
         return f"in {self.process}{' in callbacks' if self.where == 'callbacks' else ''} {' and '.join(parts)}"
-
-    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise HarnessError: the recording does not contain the file."""
-        raise HarnessError(f"{self.process}: its text was not kept")
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Return full credit if nothing forbidden is there; the reason names the first place."""

@@ -12,7 +12,7 @@ from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import counted, moment, number, quote, span
@@ -77,7 +77,6 @@ class TopicRate:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         over = "over the whole observation" if self.window is None else f"over {span(self.window)}"
         text = f"{self.topic} at {number(self.rate)} ± {number(self.tolerance)} Hz on average {over}"
         if self.partly_tolerance is not None:
@@ -200,13 +199,8 @@ class TopicRate:
         if len(times) < 2 or times[0] == times[-1]:
             return None
         inside = [t for t in times if self.window is None or t < times[0] + self.window]
-        return time_chart(
-            f"rate {self.topic}",
-            f"How often {self.topic} came",
-            _describe_rate(self, inside),
-            (_rate_panel(self, times), _interval_panel(self, times)),
-            happenings(trace),
-        )
+        title, panels = f"How often {self.topic} came", (_rate_panel(self, times), _interval_panel(self, times))
+        return time_chart(trace, f"rate {self.topic}", title, _describe_rate(self, inside), *panels)
 
 
 def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:

@@ -11,7 +11,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.core.trace import Endpoint, Trace
-from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart, written_in_lane
+from grader.judging.charts import plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
 from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
 from grader.judging.output import (
@@ -83,7 +83,6 @@ class LogsValues:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         products = " and ".join(map(times, self.unit_factors))
         return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
 
@@ -249,7 +248,6 @@ class LogsReceived:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -297,7 +295,7 @@ class LogsReceived:
         scale = max(abs(v.value) for v in values)
         stops = [v.stop_ns + (_LATE_NS if v.stop_ns < trace.stop_ns else 1) for v in values]
         return [
-            Sought(v.start_ns, stop_ns, v.value, scale, partial(_shows_exactly, v.value))
+            Sought(v.start_ns, stop_ns, v.value, scale, partial(Printed.shows, value=v.value))
             for v, stop_ns in zip(values, stops, strict=True)
         ]
 
@@ -334,25 +332,15 @@ class LogsReceived:
         distinct = list(dict.fromkeys(number(r.value) for r in sent))
         about = f"{counted(len(sent), 'message')} on {self.topic} ({', '.join(distinct[:8])}); meanwhile "
         about += f"{counted(len(records), 'log record')} and {counted(len(lines), 'printed line')}."
-        return time_chart(
-            f"received {self.topic}",
-            f"What came on {self.topic} and what was logged",
-            about,
-            (
-                Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,)),
-                Panel("written", "", tuple(rows), lanes=tuple(lanes)),
-            ),
-            happenings(trace),
-        )
+        came = Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,))
+        wrote = Panel("written", "", tuple(rows), lanes=tuple(lanes))
+        title = f"What came on {self.topic} and what was logged"
+        return time_chart(trace, f"received {self.topic}", title, about, came, wrote)
 
 
 def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
     """Return the values that are not logged, except for one that came too late."""
     return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
-
-
-def _shows_exactly(value: float, printed: Printed) -> bool:
-    return printed.shows(value)
 
 
 def _hidden(

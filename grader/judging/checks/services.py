@@ -33,7 +33,6 @@ class ServiceAvailable:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"the service {self.service} with type {self.type}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -65,7 +64,6 @@ class ServiceAnswersAll:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a response to every request on {self.service} within {number(seconds(self.within))} s"
 
     def judge(self, trace: Trace) -> Finding:
@@ -121,7 +119,6 @@ class ServiceResponse:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -215,7 +212,6 @@ class ServiceSequence:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         text = (
             f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
         )
@@ -225,11 +221,11 @@ class ServiceSequence:
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every number is the expected one; the reason names the first that is not."""
         calls = calls_of(trace, self.service, "grader")
-        answered = sorted((c for c in calls if c.response is not None), key=answered_ns)
+        answered = sorted((c for c in calls if c.response is not None), key=_answered_ns)
         if len(answered) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(answered), self.at_least)
         # A server that lags behind may lose requests, or process them in another order.
-        orders = (self._answers(calls, asked_ns), self._answers(answered, answered_ns))
+        orders = (self._answers(calls, lambda c: c.request.t_ns), self._answers(answered, _answered_ns))
         answers = min(orders, key=lambda order: len(self._wrong(order)))
         wrong = self._wrong(answers)
         got = [a.got for a in answers]
@@ -327,11 +323,5 @@ class ServiceSequence:
         return "", ""
 
 
-def asked_ns(call: Call) -> int:
-    """Return when a call was sent."""
-    return call.request.t_ns
-
-
-def answered_ns(call: Call) -> int:
-    """Return when a call was answered; without a response, when it was sent."""
+def _answered_ns(call: Call) -> int:
     return call.request.t_ns if call.response is None else call.response.t_ns

@@ -10,7 +10,7 @@ from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
 from grader.core.exercise import Finding
 from grader.core.quantities import SLACK, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
 from grader.judging.values import field, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote
@@ -30,7 +30,6 @@ class Publishes:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"at least one {self.type} message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -58,7 +57,6 @@ class Subscribes:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher reaches"
 
     def judge(self, trace: Trace) -> Finding:
@@ -112,7 +110,6 @@ class FieldValues:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         wanted = ", ".join(f"{path} = {number(value)}" for path, value in self.values.items())
         return f"{wanted} in every message on {self.topic}"
 
@@ -194,13 +191,8 @@ class FieldValues:
             return None
         group = next(iter(self.values)).partition(".")[0]
         title = "Commanded velocities" if group in _UNITS else "Values"
-        return time_chart(
-            f"fields {self.topic}",
-            f"{title} on {self.topic}",
-            _describe_fields(self, messages),
-            (_field_panel(self, messages, group),),
-            happenings(trace),
-        )
+        title, about = f"{title} on {self.topic}", _describe_fields(self, messages)
+        return time_chart(trace, f"fields {self.topic}", title, about, _field_panel(self, messages, group))
 
 
 def _sign_or_unit(path: str, got: float, want: float) -> str:
@@ -299,7 +291,6 @@ class Transform:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         rate = "" if self.rate is None else f" at {number(self.rate)} ± {number(self.rate_tolerance)} Hz"
         return f"the transform {self.parent} → {self.child} on {' or '.join(self._topics)}{rate}"
 
