@@ -14,19 +14,42 @@ from grader.core.trace import Trace
 
 
 class ProblemKind(Enum):
-    """The kinds of problems that diagnosis tells apart; a check names one only where a diagnosis needs it."""
+    """The kinds of problems that checks find; diagnosis and the page of a class tell problems apart by them."""
 
+    ABSENT = "absent"  # there is no such publisher, subscription, server, node or parameter
+    OTHER_NAME = "other_name"  # there is one of another name
+    OTHER_TYPE = "other_type"  # there is one of another type
+    SILENT = "silent"  # it is there, and sends nothing
+    TOO_FEW = "too_few"  # fewer messages, requests or responses than asked for
+    TOO_MANY = "too_many"  # more of them
+    TOO_LATE = "too_late"  # what is asked for comes, but late
+    WRONG_RATE = "wrong_rate"  # the time between messages, requests or logs is wrong
+    RATE_CHANGES = "rate_changes"  # the rate is right on average, but not to the end
     BURSTS = "bursts"  # several messages come at once
     STOPPED = "stopped"  # messages came, and then no more
     NO_MESSAGE = "no_message"  # none ever came
+    NO_FIELD = "no_field"  # the type of the messages has no such field
     NO_NUMBER = "no_number"  # the type of the messages has no number in it
+    WRONG_VALUE = "wrong_value"  # a value is another than asked for
+    NOT_RANDOM = "not_random"  # the values follow a pattern
     CONSTANT = "constant"  # the values are all the same
     NEVER_CHANGES = "never_changes"  # the answer cannot change, because the input stays on one side of the threshold
     WRONG_ANSWER = "wrong_answer"  # an answer does not fit its input, or one of the two is never given
+    NO_ANSWER = "no_answer"  # an input or a request is never answered
+    REFUSED = "refused"  # a goal or a transition is refused
+    BEHIND = "behind"  # each answer fits an earlier input
+    CONTRADICTION = "contradiction"  # two answers come at one instant
     KEPT_APART = "kept_apart"  # types or QoS keep publisher and subscription from talking to each other
     NO_EDGE = "no_edge"  # two processes are not joined in the graph
     COUNT_START = "count_start"  # a count starts at another number
     ONE_PER_MESSAGE = "one_per_message"  # there is a log for every message
+    NO_NODE = "no_node"  # a program writes, but has no node
+    NOT_LOGGED = "not_logged"  # nothing is logged, or not all of it
+    PRINTED = "printed"  # it is printed instead of logged
+    AMONG_OTHERS = "among_others"  # the right values are logged among so many others that they show nothing
+    ERRORS_LOGGED = "errors_logged"  # records say that something failed
+    ENDED = "ended"  # a program ends by itself too early
+    STILL_RUNNING = "still_running"  # a program does not end when it is stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +59,7 @@ class Problem:
     Attributes:
         kind: What is wrong.
         topics: The topics that it is about, where a check looks at several.
-        start: The number that a count starts at; None for problems of other kinds.
+        start: The number that a count starts at; None for problems of other kinds; no report shows this.
     """
 
     kind: ProblemKind
@@ -176,7 +199,7 @@ class Finding:
         location: Place in the student's file, if the trace names one.
         hint: One thing to do; empty if nothing is very likely right.
         blocked_by: Id of the criterion without which this question cannot be asked; credit is then 0.
-        problem: What is wrong, where diagnosis can say more about it; no report shows this.
+        problem: What is wrong, where a check tells several problems apart.
     """
 
     credit: Fraction

@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Any
 
 from grader.core.checkup import Property, described
-from grader.core.exercise import Location, Variant
+from grader.core.exercise import Location, Problem, Variant
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
 from grader.reporting.escape import command_line, valid_unicode
@@ -139,7 +139,15 @@ def _criterion(verdict: Verdict) -> dict[str, Any]:
         "location": _location(verdict.location),
         "evidence": _plain(verdict.evidence),
         **{name: id_ for name, id_ in links.items() if id_},
+        **_problem(verdict.problem),
     }
+
+
+def _problem(problem: Problem | None) -> dict[str, Any]:
+    """Return what is wrong, where a check tells several problems apart."""
+    if problem is None:
+        return {}
+    return {"problem": {"kind": problem.kind.value, "topics": [valid_unicode(topic) for topic in problem.topics]}}
 
 
 def _location(location: Location | None) -> dict[str, Any] | None:

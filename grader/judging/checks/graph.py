@@ -188,7 +188,7 @@ class Qos:
         if fault is not None:
             return faulted(fault, f"no publisher on {self.topic}")
         seen = list(dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")))
-        return not_met(f"{self.topic}: no publisher{_seen(seen)}", {"seen": seen[:20]})
+        return not_met(f"{self.topic}: no publisher{_seen(seen)}", {"seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
 def _qos(end: Endpoint) -> list[Any]:
@@ -232,7 +232,8 @@ class NodeName:
         found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
         near = nearest(wanted, nodes) or (nodes[0] if len(nodes) == 1 else None)
         hint = f"name the node {wanted.rsplit('/', 1)[-1]!r} instead of {quote(near)}" if near else ""
-        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint)
+        kind = ProblemKind.OTHER_NAME if nodes else ProblemKind.ABSENT
+        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint, problem=kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,7 +336,7 @@ class GraphEdges:
         if missing is None:
             return not_met("every edge is there, but never all of them at once", evidence)
         return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}", evidence
+            f"no edge {missing}; {self._instead(trace, missing)}", evidence, problem=ProblemKind.NO_EDGE
         )
 
     def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:
