@@ -13,6 +13,7 @@ from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, 
 from grader.classroom.roster import Person, fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
+from grader.core.checkup import NO_WALLS
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 
 
@@ -90,7 +91,7 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[Mapping[str, Any]]
 def _warnings(run: RunOfClass, reports: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     if run.stopped:
         yield "This run was stopped before everybody was graded; the same command goes on where it was."
-    bare = sum(_isolation(report).startswith("none") for report in reports)
+    bare = sum(_isolation(report) == NO_WALLS for report in reports)
     if bare:
         yield f"No sandbox: {bare} of {len(reports)} submissions ran without walls around them."
 
