@@ -59,11 +59,13 @@ class Problem:
     Attributes:
         kind: What is wrong.
         topics: The topics that it is about, where a check looks at several.
+        detail: What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does.
         start: The number that a count starts at; None for problems of other kinds; no report shows this.
     """
 
     kind: ProblemKind
     topics: tuple[str, ...] = ()
+    detail: str = ""
     start: int | None = None
 
 

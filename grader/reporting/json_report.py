@@ -147,7 +147,8 @@ def _problem(problem: Problem | None) -> dict[str, Any]:
     """Return what is wrong, where a check tells several problems apart."""
     if problem is None:
         return {}
-    return {"problem": {"kind": problem.kind.value, "topics": [valid_unicode(topic) for topic in problem.topics]}}
+    topics = [valid_unicode(topic) for topic in problem.topics]
+    return {"problem": {"kind": problem.kind.value, "topics": topics, "detail": valid_unicode(problem.detail) or None}}
 
 
 def _location(location: Location | None) -> dict[str, Any] | None:

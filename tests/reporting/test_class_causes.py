@@ -109,9 +109,14 @@ def test_a_reason_plays_no_part() -> None:
 
 
 def test_a_problem_of_another_topic_is_another_one() -> None:
-    """Where a criterion is about several."""
-    kinds = [kind_of(criterion(problem={"kind": "stopped", "topics": [topic]})) for topic in ("/a_b", "/c")]
-    assert [kind.label for kind in kinds] == ["stopped /a_b", "stopped /c"]
+    """Where a criterion is about several; and so is one with another detail."""
+    problems: list[dict[str, Any]] = [
+        {"kind": "stopped", "topics": ["/a_b"], "detail": None},
+        {"kind": "stopped", "topics": ["/c"], "detail": None},
+        {"kind": "wrong_value", "topics": [], "detail": "swapped"},
+    ]
+    labels = [kind_of(criterion(problem=problem)).label for problem in problems]
+    assert labels == ["stopped /a_b", "stopped /c", "wrong value swapped"]
 
 
 def test_what_the_diagnosis_named_goes_before_everything() -> None:

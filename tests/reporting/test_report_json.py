@@ -153,7 +153,7 @@ def test_the_problem_is_told_where_a_check_names_one() -> None:
     data = report_to_json(report(exercise("e", "1", "E", *verdicts)))
     validator().validate(data)
     first, second = data["exercises"][0]["criteria"]
-    assert first["problem"] == {"kind": "stopped", "topics": ["/temperature"]}
+    assert first["problem"] == {"kind": "stopped", "topics": ["/temperature"], "detail": None}
     assert "problem" not in second
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from grader.core.chart import Band, Chart, Look, Panel, Point, Series, Tone
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, ProblemKind
+from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import happenings, series, time_chart
@@ -122,7 +122,8 @@ class LogsPosition:
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
             return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED)
-        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=ProblemKind.WRONG_VALUE)
+        problem = Problem(ProblemKind.WRONG_VALUE, detail=cause.name)
+        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem)
 
     def _wrote_after(self, trace: Trace, track: Track) -> bool:
         return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))

@@ -19,7 +19,7 @@ class CauseKind:
     Attributes:
         source: Where it is known from: `diagnosis`, `missing`, `fault`, `problem`, or `criterion` if nothing else is.
         key: Id of the diagnosis, name of the file, or kind of the fault or problem.
-        parts: The type of the exception, or the topics of the problem.
+        parts: The type of the exception, or topics and detail of the problem.
     """
 
     source: str
@@ -57,8 +57,9 @@ def _problem_of(criterion: Mapping[str, Any]) -> CauseKind:
     problem = _mapping(criterion.get("problem"))
     if not problem:
         return CauseKind("criterion")
-    topics = problem.get("topics")
-    return CauseKind("problem", str(problem.get("kind")), tuple(map(str, topics)) if isinstance(topics, list) else ())
+    topics, detail = problem.get("topics"), problem.get("detail")
+    parts = [*(topics if isinstance(topics, list) else ()), *([detail] if detail else ())]
+    return CauseKind("problem", str(problem.get("kind")), tuple(map(str, parts)))
 
 
 def _mapping(value: object) -> Mapping[str, Any]:
