@@ -53,8 +53,6 @@ OF_PROGRAMS = r"o|t|side\.program|log|line|lines\[n\]|output|record|episode|valu
 #: Modules that look into such texts all the same, and why.
 READS_TEXT = {
     "reporting/audience.py": "takes the parts with numbers out of what a student sees",
-    # Reasons are grouped without numbers and names.
-    "reporting/class_page/causes.py": "reports of earlier versions name another criterion in their sentences only",
     "reporting/text.py": "does not name a place twice",
     "reporting/wording.py": "leaves out how every reason of a blocked criterion begins",
 }

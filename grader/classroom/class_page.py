@@ -12,6 +12,7 @@ from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercise
 from grader.classroom.roster import Person, fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
+from grader.core.checkup import NO_SANDBOX
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 from grader.reporting.json_report import ReportData
 
@@ -90,7 +91,7 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> It
 def _warnings(run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[str]:
     if run.stopped:
         yield "This run was stopped before everybody was graded; the same command goes on where it was."
-    bare = sum(_isolation(report).startswith("none") for report in reports)
+    bare = sum(_isolation(report) == NO_SANDBOX for report in reports)
     if bare:
         yield f"No isolation: {bare} of {len(reports)} submissions ran without a sandbox."
 

@@ -14,19 +14,42 @@ from grader.core.trace import Trace
 
 
 class ProblemKind(Enum):
-    """The kinds of problems that diagnosis distinguishes; a check states one only if a diagnosis needs it."""
+    """The kinds of problems that checks find; diagnosis and the page of a class tell problems apart by them."""
 
+    ABSENT = "absent"  # there is no such publisher, subscription, server, node or parameter
+    OTHER_NAME = "other_name"  # there is one of another name
+    OTHER_TYPE = "other_type"  # there is one of another type
+    SILENT = "silent"  # it is there, and sends nothing
+    TOO_FEW = "too_few"  # fewer messages, requests or responses than expected
+    TOO_MANY = "too_many"  # more of them
+    TOO_LATE = "too_late"  # what is expected comes, but late
+    WRONG_RATE = "wrong_rate"  # the time between messages, requests or logs is wrong
+    RATE_CHANGES = "rate_changes"  # the rate is right on average, but not to the end
     BURSTS = "bursts"  # several messages arrive at once
     STOPPED = "stopped"  # messages arrived, then stopped
     NO_MESSAGE = "no_message"  # no message arrived
+    NO_FIELD = "no_field"  # the message type has no such field
     NO_NUMBER = "no_number"  # the message type contains no number
+    WRONG_VALUE = "wrong_value"  # a value differs from the expected one
+    NOT_RANDOM = "not_random"  # the values follow a pattern
     CONSTANT = "constant"  # the values are all the same
     NEVER_CHANGES = "never_changes"  # the answer cannot change, because the input stays on one side of the threshold
     WRONG_ANSWER = "wrong_answer"  # an answer does not fit its input, or one of the two answers never occurs
+    NO_ANSWER = "no_answer"  # an input or a request is never answered
+    REFUSED = "refused"  # a goal or a transition is refused
+    BEHIND = "behind"  # each answer fits an earlier input
+    CONTRADICTION = "contradiction"  # two answers come at one instant
     KEPT_APART = "kept_apart"  # types or QoS of publisher and subscription are incompatible
     NO_EDGE = "no_edge"  # two processes are not connected in the graph
     COUNT_START = "count_start"  # a count starts at the wrong number
     ONE_PER_MESSAGE = "one_per_message"  # every message is logged
+    NO_NODE = "no_node"  # a program writes, but has no node
+    NOT_LOGGED = "not_logged"  # nothing is logged, or not all of it
+    PRINTED = "printed"  # it is printed instead of logged
+    AMONG_OTHERS = "among_others"  # the right values are logged among so many others that they show nothing
+    ERRORS_LOGGED = "errors_logged"  # records say that something failed
+    ENDED = "ended"  # a program ends by itself too early
+    STILL_RUNNING = "still_running"  # a program does not end when it is stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +59,13 @@ class Problem:
     Attributes:
         kind: What is wrong.
         topics: The topics concerned, if a check looks at several.
-        start: The number that a count starts at; None for problems of other kinds.
+        detail: What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does.
+        start: The number that a count starts at; None for problems of other kinds; not shown in reports.
     """
 
     kind: ProblemKind
     topics: tuple[str, ...] = ()
+    detail: str = ""
     start: int | None = None
 
 
@@ -176,7 +201,7 @@ class Finding:
         location: Place in the student's file, if the trace names one.
         hint: One thing to do; empty if no advice is very likely to be right.
         blocked_by: Id of the criterion that must be met before this one can be judged; credit is then 0.
-        problem: The problem found, if diagnosis can explain it further; not shown in reports.
+        problem: The problem found, if the check tells several problems apart.
     """
 
     credit: Fraction

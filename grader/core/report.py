@@ -34,7 +34,7 @@ class Verdict:
         blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
         missing_file: The missing file that both need, if that is the reason; empty otherwise.
         same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
-        problem: The problem that its check found, for diagnosis; not shown in reports.
+        problem: The problem that its check found, for programs; None if the check finds only one, or a fault.
     """
 
     id: str

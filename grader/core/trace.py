@@ -258,6 +258,11 @@ class Fault:
     signal: str = ""
     python: tuple[int, int] | None = None
 
+    @property
+    def exception(self) -> str:
+        """Name of the type of an exception or syntax error, which begins its text; empty for other faults."""
+        return self.text.partition(":")[0] if self.kind in (FaultKind.EXCEPTION, FaultKind.SYNTAX_ERROR) else ""
+
     def said(self, pattern: str) -> re.Match[str] | None:
         """Search Python's text of an exception or syntax error for a pattern; None for other faults."""
         by_python = self.kind in (FaultKind.EXCEPTION, FaultKind.SYNTAX_ERROR)

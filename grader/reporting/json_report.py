@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 from typing_extensions import NotRequired
 
 from grader.core.checkup import Property, described
-from grader.core.exercise import Location
+from grader.core.exercise import Location, Problem
 from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
@@ -38,6 +38,7 @@ class CriterionData(TypedDict):
     evidence: Mapping[str, Any]
     blocked_by: NotRequired[str]
     same_cause_as: NotRequired[str]
+    problem: NotRequired[JsonObject]
 
 
 class FaultData(TypedDict):
@@ -194,7 +195,15 @@ def _criterion(verdict: Verdict) -> CriterionData:
         data["blocked_by"] = verdict.blocked_by
     if verdict.same_cause_as:
         data["same_cause_as"] = verdict.same_cause_as
+    if verdict.problem is not None:
+        data["problem"] = _problem(verdict.problem)
     return data
+
+
+def _problem(problem: Problem) -> JsonObject:
+    """Return what is wrong, where a check tells several problems apart."""
+    topics = [valid_unicode(topic) for topic in problem.topics]
+    return {"kind": problem.kind.value, "topics": topics, "detail": valid_unicode(problem.detail) or None}
 
 
 def _location(location: Location | None) -> JsonObject | None:

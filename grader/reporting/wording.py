@@ -106,8 +106,13 @@ def opening(report: Report) -> list[str]:
         *warnings(report),
         summary(report),
         *(["Blocked criteria are judged once what they need is met."] if blocked else []),
-        *_capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes"),
+        *notes(report),
     ]
+
+
+def notes(report: Report) -> list[str]:
+    """Return the notes on the whole run; each safe to show as a line of text."""
+    return _capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes")
 
 
 def remarks(exercise: ExerciseReport) -> list[str]:

@@ -33,7 +33,7 @@ from grader.submissions.collected import (
     shown,
 )
 
-FILE, FOLDER = "a file", "a folder"
+FILE, FOLDER, LINK = "a file", "a folder", "a link"
 
 REPACK = "pack the folder again with your system's own zip and hand that in"
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
@@ -80,7 +80,7 @@ _PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
 _EXTENDED = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
 # In older versions of Python, tarfile needs quadratic time for such a run.
 _MANY_DIGITS = re.compile(rb"[0-9]{40}")
-_KINDS = {tarfile.LNKTYPE: "a link", tarfile.SYMTYPE: "a link", tarfile.DIRTYPE: FOLDER}
+_KINDS = {tarfile.LNKTYPE: LINK, tarfile.SYMTYPE: LINK, tarfile.DIRTYPE: FOLDER}
 
 
 class _Stream(Protocol):
@@ -272,7 +272,7 @@ def _name(info: zipfile.ZipInfo) -> str:
 def _kind(info: zipfile.ZipInfo, name: str) -> str:
     mode = info.external_attr >> 16
     if stat.S_ISLNK(mode):
-        return "a link"
+        return LINK
     if stat.S_IFMT(mode) and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         return "a device, pipe or socket"
     return FOLDER if name.endswith("/") else FILE
@@ -376,7 +376,7 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
         if member.kind == FOLDER or is_skipped(name):
             continue
         if member.kind != FILE:
-            hint = "replace it by the file itself" if member.kind == "a link" else REPACK
+            hint = "replace it by the file itself" if member.kind == LINK else REPACK
             raise UnusableArchiveError(f"expected plain files, found {member.kind}: {shown(member.name)}", hint)
         yield name, member
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -19,7 +18,6 @@ from grader.core.trace import (
     Delivery,
     Endpoint,
     Fault,
-    FaultKind,
     GraphSnapshot,
     LogRecord,
     Mark,
@@ -85,10 +83,8 @@ def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
 
 #: Exit code, signal and Python version of a fault, as `Fault` has them.
 _FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
-# The texts of faults in recordings without these details.
-_EXITED = re.compile(r"exited with code (-?\d{1,9})")
-_KILLED = re.compile(r"ended by (SIG[A-Z0-9]+|signal \d+)")
-_PYTHON = re.compile(r"\(read by Python (\d{1,3})\.(\d{1,3})\)")
+# Early recordings of version 1 do not have them.
+_NO_DETAILS: _FaultDetails = (None, "", None)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 #: Placeholder for bytes that are a message of the recording.
 THERE = "*"
@@ -183,22 +179,7 @@ def _graph(row: Any) -> GraphSnapshot:
 
 def _fault(row: Any) -> Fault:
     *values, details = msgspec.structs.astuple(row)
-    return Fault(*values, *(_details_from_text(row.kind, row.text) if details is msgspec.UNSET else details))
-
-
-def _details_from_text(kind: FaultKind, text: str) -> _FaultDetails:
-    """Return exit code, signal and Python version of a fault whose recording has only the text.
-
-    Early recordings of version 1 have these three only in the text. No other code parses them from it.
-    """
-    exited = _EXITED.fullmatch(text) if kind is FaultKind.EXITED else None
-    killed = _KILLED.fullmatch(text) if kind is FaultKind.KILLED else None
-    version = _PYTHON.search(text) if kind is FaultKind.SYNTAX_ERROR else None
-    return (
-        int(exited[1]) if exited else None,
-        killed[1] if killed else "",
-        (int(version[1]), int(version[2])) if version else None,
-    )
+    return Fault(*values, *details)
 
 
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
@@ -232,9 +213,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
         endpoints=tuple[_row_of(Endpoint), ...],  # type: ignore[misc]
         last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
     ),
-    Fault: _row_of(
-        Fault, "exit_code", "signal", "python", last=("details", _FaultDetails | msgspec.UnsetType, msgspec.UNSET)
-    ),
+    Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),
 }
 _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     **{_EXACT_ROWS[kind]: partial(_carrying, kind) for kind in (Message, Delivery, Request, Response)},

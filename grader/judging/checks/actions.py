@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import DurationNs, seconds
 from grader.core.trace import Message, Trace
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
@@ -248,7 +248,12 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
     found = f"; seen: {listed(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
-    return not_met(f"{action}: no action server in {span(trace.stop_ns)}{found}", {"seen": seen[:20]}, hint=hint)
+    return not_met(
+        f"{action}: no action server in {span(trace.stop_ns)}{found}",
+        {"seen": seen[:20]},
+        hint=hint,
+        problem=ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT,
+    )
 
 
 #: Numbers of lifecycle_msgs/msg/Transition -> label.
@@ -306,9 +311,10 @@ class LifecycleStates:
             "transitions": [[seconds(c.request.t_ns), _label(c), _succeeded(c)] for c in changes],
             "states": [[seconds(c.request.t_ns), _state(c)] for c in asked],
         }
-        flaw = self._transition_flaw(changes) or self._state_flaw(asked)
-        if flaw:
-            return self._explain(trace, flaw, evidence)
+        flawed = self._transition_flaw(changes, evidence) or self._state_flaw(asked, evidence)
+        if flawed is not None:
+            fault = first_fault(trace)
+            return flawed if fault is None else faulted(fault, flawed.reason, evidence)
         if self.topic is not None:
             silent = self._publishing(trace, changes, evidence)
             if silent is not None:
@@ -316,23 +322,27 @@ class LifecycleStates:
         told = ", ".join(_state(c) for c in asked) or "none asked for"
         return met(f"{counted(len(changes), 'transition')} made; states: {told}", evidence)
 
-    def _transition_flaw(self, changes: Sequence[Call]) -> str:
+    def _transition_flaw(self, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         for call in changes:
             if call.response is None:
-                return f"{moment(call.request.t_ns)}: no answer to the transition {_label(call)}"
+                reason = f"{moment(call.request.t_ns)}: no answer to the transition {_label(call)}"
+                return not_met(reason, evidence, problem=ProblemKind.NO_ANSWER)
             if not _succeeded(call):
-                return f"{moment(call.response.t_ns)}: the transition {_label(call)} failed"
-        return ""
+                reason = f"{moment(call.response.t_ns)}: the transition {_label(call)} failed"
+                hint = "return TransitionCallbackReturn.SUCCESS from the callback of the transition"
+                return not_met(reason, evidence, hint=hint, problem=ProblemKind.REFUSED)
+        return None
 
-    def _state_flaw(self, asked: Sequence[Call]) -> str:
+    def _state_flaw(self, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         if not self.states:
-            return ""
+            return None
         if len(asked) < len(self.states):
             raise HarnessError(f"the state was asked for {len(asked)} times, expected {len(self.states)}")
         for call, wanted in zip(asked, self.states, strict=False):
             if _state(call) != wanted:
-                return f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
-        return ""
+                reason = f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
+                return not_met(reason, evidence, problem=ProblemKind.WRONG_VALUE)
+        return None
 
     def _publishing(self, trace: Trace, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         """Return a finding if the node publishes while inactive, or does not while active; None otherwise."""
@@ -344,31 +354,39 @@ class LifecycleStates:
         if stray is not None:
             reason = f"{moment(stray)}, {topic}: a message though the node is not active"
             hint = "create the publisher with create_lifecycle_publisher, and call super().on_activate(state)"
-            return not_met(reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint)
+            return not_met(
+                reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint, problem=ProblemKind.TOO_MANY
+            )
         mute = next(((a, b) for a, b in spans if not any(a <= t <= b for t in times)), None)
         if mute is None:
             return None
         if not times:
             return explain_no_message(trace, topic)
-        return not_met(f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}", evidence)
-
-    def _explain(self, trace: Trace, flaw: str, evidence: dict[str, object]) -> Finding:
-        fault = first_fault(trace)
-        if fault is None:
-            hint = "return TransitionCallbackReturn.SUCCESS from the callback of the transition"
-            return not_met(flaw, evidence, hint=hint if "failed" in flaw else "")
-        return faulted(fault, flaw, evidence)
+        return not_met(
+            f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}",
+            evidence,
+            problem=ProblemKind.SILENT,
+        )
 
     def _never_asked(self, trace: Trace) -> Finding:
         if crashed := explain_fault(trace, "no transition could be asked for"):
             return crashed
         nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
         if self.node is not None and self.node not in nodes:
-            return not_met(f"{self.node}: not in the ROS graph", {"nodes": nodes[:20]}, blocked_by="node_name")
+            return not_met(
+                f"{self.node}: not in the ROS graph",
+                {"nodes": nodes[:20]},
+                blocked_by="node_name",
+                problem=ProblemKind.OTHER_NAME,
+            )
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording asks for no transition and no state")
         hint = "derive it from rclpy.lifecycle.Node"
-        return not_met("no node of the program can be asked for a transition: none has a lifecycle", hint=hint)
+        return not_met(
+            "no node of the program can be asked for a transition: none has a lifecycle",
+            hint=hint,
+            problem=ProblemKind.ABSENT,
+        )
 
 
 def _label(call: Call) -> str:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT, complained
@@ -21,7 +21,7 @@ from grader.judging.findings import (
     first_fault,
     met,
     not_met,
-    partly,
+    only_printed,
     waiting_for,
 )
 from grader.judging.output import Output, printed_lines, shape_of, student_records
@@ -90,7 +90,12 @@ class CallsOfClient:
         place, gap = wrong
         wanted = f"{span(self.period or 0)} ± {number(seconds(self.tolerance))} s"
         reason = f"{asked}; {seconds(gap):.3f} s from number {place} to number {place + 1}, expected {wanted}"
-        return not_met(reason, evidence, hint=f"wait {span(self.period or 0)} after each answer before asking again")
+        return not_met(
+            reason,
+            evidence,
+            hint=f"wait {span(self.period or 0)} after each answer before asking again",
+            problem=ProblemKind.WRONG_RATE,
+        )
 
     def _wrong_gap(self, trace: Trace, calls: Sequence[Call]) -> tuple[int, int] | None:
         """Return the number of the first call whose gap to the next is wrong, and the gap."""
@@ -106,7 +111,12 @@ class CallsOfClient:
     def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, object]) -> Finding:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
-            return not_met(reason, evidence, hint=f"ask {self.calls} times: for i in range({self.calls})")
+            return not_met(
+                reason,
+                evidence,
+                hint=f"ask {self.calls} times: for i in range({self.calls})",
+                problem=ProblemKind.TOO_MANY,
+            )
         if crashed := explain_fault(trace, reason, evidence, last=True):
             return crashed
         last = calls[-1]
@@ -115,7 +125,7 @@ class CallsOfClient:
         ended_said = f"; {ended[0].detail} ended at {moment(ended[0].t_ns)}" if ended else ""
         if not ended and not waiting and last.request.t_ns + (self.period or 0) + self.tolerance >= trace.stop_ns:
             raise HarnessError(f"{self.service}: the recording ends before {self.calls} requests could be sent")
-        return not_met(reason + waiting + ended_said, evidence)
+        return not_met(reason + waiting + ended_said, evidence, problem=ProblemKind.TOO_FEW)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +173,7 @@ class WaitsForService:
         ended = next((m for m in trace.marks("exited", self.process) if m.t_ns < appears_ns), None)
         if ended is not None:
             reason = f"{self.process} ended at {moment(ended.t_ns)}, {when}"
-            return not_met(reason, {"ended_s": seconds(ended.t_ns)}, hint=_WAIT_HINT)
+            return not_met(reason, {"ended_s": seconds(ended.t_ns)}, hint=_WAIT_HINT, problem=ProblemKind.ENDED)
         records = [r for r in student_records(trace, self.process) if r.t_ns < appears_ns]
         bad = [r for r in records if r.severity in ("ERROR", "FATAL")]
         if not bad:
@@ -180,7 +190,8 @@ class WaitsForService:
         if not asked and trace.stop_ns - appears_ns <= self.within:
             raise HarnessError(f"{self.service}: the recording ends too soon after the server appeared")
         reason = f"{there}, {when}, expected one within {span(self.within)}"
-        return not_met(reason, {"appears_s": seconds(appears_ns)}, hint=_WAIT_HINT)
+        problem = ProblemKind.TOO_LATE if asked else ProblemKind.SILENT
+        return not_met(reason, {"appears_s": seconds(appears_ns)}, hint=_WAIT_HINT, problem=problem)
 
     def _said(self, trace: Trace, appears_ns: int, asked_ns: int) -> Finding:
         records = [r for r in student_records(trace, self.process) if r.t_ns < appears_ns]
@@ -197,8 +208,10 @@ class WaitsForService:
                 f"{waited}; {counted(len(records), 'record')} meanwhile: {quote(records[-1].text, 80)}", evidence
             )
         if lines:
-            return partly(f"{waited}; that it waits is printed, not logged", evidence, hint=LOGGER_HINT)
-        return not_met(f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT)
+            return only_printed(f"{waited}; that it waits is printed, not logged", evidence, LOGGER_HINT)
+        return not_met(
+            f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT, problem=ProblemKind.NOT_LOGGED
+        )
 
 
 #: A client that has sent no request for this long is not expected to send another.
@@ -262,7 +275,7 @@ class ReactsToResponses:
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
             printed = self._by_printing(mine, episodes)
             if printed:
-                return partly(f"{self.process}: {printed}", evidence, hint=LOGGER_HINT)
+                return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
         return self._explain(trace, wrong, evidence)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
@@ -282,7 +295,7 @@ class ReactsToResponses:
         reason = f"{self.process}: right after each of {counted(len(mine), 'response')} "
         reason += f"({', '.join(number(e.number) for e in mine[:8] if e.number is not None)})"
         if not student_records(trace, self.process):
-            return partly(f"{reason}, printed and not logged", evidence, hint=LOGGER_HINT)
+            return only_printed(f"{reason}, printed and not logged", evidence, LOGGER_HINT)
         return met(reason, evidence)
 
     def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
@@ -312,7 +325,7 @@ class ReactsToResponses:
         fault = first_fault(trace, self.process)
         if fault is not None and episode.start_ns <= fault.t_ns <= episode.stop_ns:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence, hint=self._hint(wrong))
+        return not_met(reason, evidence, hint=self._hint(wrong), problem=ProblemKind.WRONG_ANSWER)
 
     def _hint(self, wrong: Sequence[tuple[Episode, str]]) -> str:
         kinds = {e.kind for e, _ in wrong}
@@ -440,5 +453,9 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
     if ended or stopped or last.kind is CallKind.UNANSWERED:
         why = "waits for a response that never comes" if last.kind is CallKind.UNANSWERED else "then asked no more"
         why = f"ended at {moment(ended[0].t_ns)}" if ended else why
-        return not_met(f"{asked} and {why}; the answer in question never came", blocked_by="service_calls")
+        return not_met(
+            f"{asked} and {why}; the answer in question never came",
+            blocked_by="service_calls",
+            problem=ProblemKind.ENDED if ended else ProblemKind.STOPPED,
+        )
     raise HarnessError(f"{service}: no answer of the kind in question was sent")

@@ -10,7 +10,7 @@ from typing import Literal
 
 from grader.core.chart import Chart, Look
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
 from grader.judging.charts import (
@@ -97,7 +97,7 @@ class ThresholdResponse:
         answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
-            reason, problem = f"{self.output}: {quote(type_)} carries no number", Problem(ProblemKind.NO_NUMBER)
+            reason, problem = f"{self.output}: {quote(type_)} carries no number", ProblemKind.NO_NUMBER
             return self._once(not_met(reason, {"type": type_}, problem=problem))
         grace_ns = _grace(answers)
         prompt = answers if _answers_at_once(trace, self.input, answers) else ()
@@ -188,15 +188,19 @@ class ThresholdResponse:
         if len(both) > 1:
             cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(reason + cause, evidence, hint=hint)
+            return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             cause = f"; the answers are right for what was published {span(lag)} before"
             return not_met(
-                reason + cause, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
+                reason + cause,
+                evidence | {"lag_s": seconds(lag)},
+                hint=f"answer what has just come on {self.input}",
+                problem=ProblemKind.BEHIND,
             )
         cause, hint = self._diagnosis(violations, inputs, answers)
-        return not_met(reason + cause, evidence, hint=hint)
+        kind = ProblemKind.NO_ANSWER if first.got is None else ProblemKind.WRONG_ANSWER
+        return not_met(reason + cause, evidence, hint=hint, problem=kind)
 
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
@@ -251,8 +255,17 @@ class ThresholdResponse:
             others = [e.topic for e in student_endpoints(trace, "subscription")]
             instead = f"; it subscribes to {quote(others[0])}" if others else ""
             hint = f"subscribe to {self.input}"
-            return not_met(f"{why.reason}; nothing subscribes to {self.input}{instead}", why.evidence, hint=hint)
-        return not_met(f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}", why.evidence)
+            return not_met(
+                f"{why.reason}; nothing subscribes to {self.input}{instead}",
+                why.evidence,
+                hint=hint,
+                problem=ProblemKind.ABSENT,
+            )
+        return not_met(
+            f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}",
+            why.evidence,
+            problem=why.problem,
+        )
 
     def _nothing_asked(self, trace: Trace) -> Finding:
         fault = first_fault(trace)

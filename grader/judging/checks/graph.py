@@ -177,7 +177,7 @@ class Qos:
             return crashed
         seen = list(dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")))
         ending = f"; seen: {listed(seen)}" if seen else ""
-        return not_met(f"{self.topic}: no publisher{ending}", {"seen": seen[:20]})
+        return not_met(f"{self.topic}: no publisher{ending}", {"seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
 def _policies(end: Endpoint) -> str:
@@ -212,7 +212,8 @@ class NodeName:
         found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
         near = nearest(wanted, nodes) or (nodes[0] if len(nodes) == 1 else None)
         hint = f"name the node {wanted.rsplit('/', 1)[-1]!r} instead of {quote(near)}" if near else ""
-        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint)
+        kind = ProblemKind.OTHER_NAME if nodes else ProblemKind.ABSENT
+        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint, problem=kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,7 +314,7 @@ class GraphEdges:
         if missing is None:
             return not_met("every edge is there, but never all of them at once", evidence)
         return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}", evidence
+            f"no edge {missing}; {self._instead(trace, missing)}", evidence, problem=ProblemKind.NO_EDGE
         )
 
     def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:

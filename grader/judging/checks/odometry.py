@@ -14,7 +14,15 @@ from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import series, time_chart
 from grader.judging.checks.logs import complained
-from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
+from grader.judging.findings import (
+    fault_hint,
+    fault_sentence,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    only_printed,
+)
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
@@ -85,7 +93,7 @@ class LogsPosition:
             return met(self._right(logged), _evidence(logged))
         printed = printed_positions(trace, self.process, track)
         if self._shows(trace, printed):
-            return partly(f"{self._right(printed)}, printed and not logged", _evidence(printed), hint=_LOGGER_HINT)
+            return only_printed(f"{self._right(printed)}, printed and not logged", _evidence(printed), _LOGGER_HINT)
         chosen = logged if logged.groups or not printed.groups else printed
         return self._explain(trace, track, chosen)
 
@@ -110,8 +118,9 @@ class LogsPosition:
         if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
-            return not_met(reason, evidence | {"cause": "nothing"})
-        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint)
+            return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED)
+        problem = Problem(ProblemKind.WRONG_VALUE, detail=cause.name)
+        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem)
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the driven path with the logged positions on it, or None without odometry."""
@@ -177,11 +186,11 @@ class LogPeriod:
         """Return full credit if the average is right and there is no long gap."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
-            return not_met(track.reason, track.evidence, blocked_by="logs_position")
+            return not_met(track.reason, track.evidence, blocked_by="logs_position", problem=track.problem)
         times = [t for t in self.log_times(trace, track) if track.start_ns <= t < track.stop_ns]
         if not times:
             reason = f"{self.process}: nothing with a number was logged while {self.topic} was played"
-            return not_met(reason, blocked_by="logs_position")
+            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
         average_ns = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 0.0
         evidence = {
             "logs": len(times),
@@ -197,7 +206,9 @@ class LogPeriod:
         wanted = f"expected one every {span(self.period)} ± {number(100 * self.tolerance)} %"
         if len(times) == 1:
             only = f"{self.process}: 1 log in {span(track.stop_ns - track.start_ns)}, at {moment(times[0])}; {wanted}"
-            return not_met(only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process))
+            return not_met(
+                only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process), problem=ProblemKind.TOO_FEW
+            )
         average = f"{self.process}: {len(times)} logs, one every {average_ns / 1e9:.3f} s on average"
         if not within(average_ns, self.period, self.tolerance * self.period):
             return self._off(track, times, f"{average}; {wanted}", wanted, evidence)
@@ -207,7 +218,10 @@ class LogPeriod:
         fault = first_fault(trace, self.process)
         ended = f"; {fault_sentence(fault)}" if fault else ""
         return not_met(
-            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}", evidence, fault=fault
+            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}",
+            evidence,
+            fault=fault,
+            problem=ProblemKind.STOPPED,
         )
 
     def _off(
@@ -216,10 +230,10 @@ class LogPeriod:
         """Return a finding that the average is wrong, with `reason`, or that each message is logged."""
         played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
         if len(times) < _ONE_A_MESSAGE * played:
-            return not_met(reason, evidence, hint=_TIMER_HINT)
+            return not_met(reason, evidence, hint=_TIMER_HINT, problem=ProblemKind.WRONG_RATE)
         rate = len(times) / seconds(track.stop_ns - track.start_ns)
         each = f"{self.process}: {rate:.0f} logs a second: one for every message; {wanted}"
-        return not_met(each, evidence, hint=_TIMER_HINT, problem=Problem(ProblemKind.ONE_PER_MESSAGE))
+        return not_met(each, evidence, hint=_TIMER_HINT, problem=ProblemKind.ONE_PER_MESSAGE)
 
     def _long_gap(self, track: Track, times: Sequence[int]) -> tuple[int, int] | None:
         ends = [track.start_ns, *times, track.stop_ns]
@@ -320,7 +334,11 @@ class WaitsGracefully:
         after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
-            return not_met(f"{alive}, but no sign that the data arrived", blocked_by="logs_position")
+            return not_met(
+                f"{alive}, but no sign that the data arrived",
+                blocked_by="logs_position",
+                problem=ProblemKind.NOT_LOGGED,
+            )
         evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
 

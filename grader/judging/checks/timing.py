@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.checks.fields import too_few_messages
@@ -157,7 +157,8 @@ class Latency:
         fault = first_fault(trace)
         if fault is not None and delay is None:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)})
+        problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
+        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
 
     def _inputs(self, trace: Trace, jitter: int) -> list[int]:
         from_ns = heard_from_ns(trace, self.input)
@@ -378,7 +379,8 @@ class Reaction:
         fault = first_fault(trace)
         if fault is not None and not asked.outputs:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)})
+        problem = ProblemKind.WRONG_ANSWER if asked.outputs else ProblemKind.NO_ANSWER
+        return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)}, problem=problem)
 
     def _silent(self, trace: Trace) -> Finding:
         subscriptions = student_endpoints(trace, "subscription", self.input)

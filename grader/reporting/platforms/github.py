@@ -46,8 +46,8 @@ def render_github(report: Report, *, folder: str | None) -> str:
 
 
 def _notice(report: Report) -> _Annotation:
-    notes = [line for line in wording.opening(report) if line.startswith("note: ")]
-    message = "\n".join([wording.headline(report), wording.summary(report), *notes, *wording.ending(report)])
+    lines = [wording.headline(report), wording.summary(report), *wording.notes(report), *wording.ending(report)]
+    message = "\n".join(lines)
     return _Annotation("notice", f"Score: {wording.score_line(report)}", message)
 
 
