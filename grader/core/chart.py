@@ -32,21 +32,13 @@ class Tone(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One row of points.
+    """One row of points."""
 
-    Attributes:
-        name: What a reader sees in the legend.
-        points: (x, y), units of the axes; NaN breaks a line.
-        look: How they are joined.
-        tone: What they mean.
-        texts: What each point says beyond its numbers; empty, or one a point. Student-controlled.
-    """
-
-    name: str
-    points: tuple[Point, ...]
-    look: Look = Look.LINE
-    tone: Tone = Tone.MAIN
-    texts: tuple[str, ...] = ()
+    name: str  # what a reader sees in the legend
+    points: tuple[Point, ...]  # (x, y), units of the axes; NaN breaks a line
+    look: Look = Look.LINE  # how they are joined
+    tone: Tone = Tone.MAIN  # what they mean
+    texts: tuple[str, ...] = ()  # what each point says beyond its numbers; empty, or one a point. Student-controlled.
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,52 +70,32 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One coordinate system of a chart.
+    """One coordinate system of a chart."""
 
-    Attributes:
-        title: What is drawn on the vertical axis.
-        unit: Its unit; empty for none.
-        series: In drawing order.
-        bands: What is accepted.
-        levels: Thresholds and expected values.
-        lanes: If set, the vertical axis has these rows instead of numbers, from the top; y counts them from 0.
-        grid: Lines of the horizontal axis: (first, distance); None leaves them to the renderer.
-    """
-
-    title: str
-    unit: str
-    series: tuple[Series, ...]
-    bands: tuple[Band, ...] = ()
-    levels: tuple[Level, ...] = ()
+    title: str  # what is drawn on the vertical axis
+    unit: str  # its unit; empty for none
+    series: tuple[Series, ...]  # in drawing order
+    bands: tuple[Band, ...] = ()  # what is accepted
+    levels: tuple[Level, ...] = ()  # thresholds and expected values
+    # If set, the vertical axis has these rows instead of numbers, from the top; y counts them from 0
     lanes: tuple[str, ...] = ()
+    # Lines of the horizontal axis: (first, distance); None leaves them to the renderer
     grid: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels under each other that share the horizontal axis.
+    """Panels under each other that share the horizontal axis."""
 
-    Attributes:
-        id: Unique within the exercise.
-        title: What a reader sees.
-        about: The picture in words, for whoever cannot see it.
-        criteria: Ids of the criteria that it belongs to.
-        x_title: What is drawn on the horizontal axis.
-        x_unit: Its unit.
-        panels: From the top.
-        moments: Lines through all panels.
-        square: Whether one metre is as long upwards as sideways.
-    """
-
-    id: str
-    title: str
-    about: str
-    criteria: tuple[str, ...]
-    x_title: str
-    x_unit: str
-    panels: tuple[Panel, ...]
-    moments: tuple[Moment, ...] = ()
-    square: bool = False
+    id: str  # unique within the exercise
+    title: str  # what a reader sees
+    about: str  # the picture in words, for whoever cannot see it
+    criteria: tuple[str, ...]  # ids of the criteria that it belongs to
+    x_title: str  # what is drawn on the horizontal axis
+    x_unit: str  # its unit
+    panels: tuple[Panel, ...]  # from the top
+    moments: tuple[Moment, ...] = ()  # lines through all panels
+    square: bool = False  # whether one metre is as long upwards as sideways
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,16 +122,9 @@ Figure = Chart | GraphFigure
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """A few lines around a place in a student's file.
+    """A few lines around a place in a student's file."""
 
-    Attributes:
-        file: Relative to the submission.
-        line: The line that is meant, from 1.
-        first: Number of the first line shown.
-        lines: The text, student-controlled, without line ends.
-    """
-
-    file: str
-    line: int
-    first: int
-    lines: tuple[str, ...]
+    file: str  # relative to the submission
+    line: int  # the line that is meant, from 1
+    first: int  # number of the first line shown
+    lines: tuple[str, ...]  # the text, student-controlled, without line ends

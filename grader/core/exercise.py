@@ -31,17 +31,11 @@ class ProblemKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One problem.
-
-    Attributes:
-        kind: What is wrong.
-        topics: The topics that it is about, where a check looks at several.
-        start: The number that a count starts at; None for problems of other kinds.
-    """
+    """One problem."""
 
     kind: ProblemKind
-    topics: tuple[str, ...] = ()
-    start: int | None = None
+    topics: tuple[str, ...] = ()  # the topics that it is about, where a check looks at several
+    start: int | None = None  # the number that a count starts at; None for problems of other kinds
 
 
 #: What `until` may name besides a date; only a platform knows when it comes.
@@ -71,15 +65,11 @@ ORDER = tuple(Shows)
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What a student sees of one criterion.
+    """What a student sees of one criterion."""
 
-    Attributes:
-        shows: How much.
-        until: The last day on which that holds, as `2026-12-01`, after which all is shown; `due_date` or `published`
-            for what only a platform knows; empty for ever.
-    """
-
-    shows: Shows = Shows.ALL
+    shows: Shows = Shows.ALL  # how much
+    # The last day on which that holds, as `2026-12-01`, after which all is shown; `due_date` or `published` for what
+    # only a platform knows; empty for ever.
     until: str = ""
 
     def on(self, day: str) -> Shows:
@@ -103,15 +93,10 @@ Value = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """The values of one exercise for one student.
+    """The values of one exercise for one student."""
 
-    Attributes:
-        student: Whose they are, as staff wrote it; empty for nobody's.
-        values: Name and value, in the order of the rubric.
-    """
-
-    student: str
-    values: tuple[tuple[str, Value], ...]
+    student: str  # whose they are, as staff wrote it; empty for nobody's
+    values: tuple[tuple[str, Value], ...]  # name and value, in the order of the rubric
 
     @property
     def said(self) -> str:
@@ -121,15 +106,10 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """The values of all exercises for one student.
+    """The values of all exercises for one student."""
 
-    Attributes:
-        student: Whose they are.
-        values: Exercise id -> name -> value.
-    """
-
-    student: str
-    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    student: str  # whose they are
+    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)  # exercise id -> name -> value
 
 
 def variant_notes(variant: Variant | None) -> tuple[str, ...]:
@@ -167,25 +147,16 @@ class Location:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check found in a trace.
+    """What a check found in a trace."""
 
-    Attributes:
-        credit: Share of the points earned, in [0, 1].
-        reason: One sentence in the form `where: what was found, what was expected`; no markup.
-        evidence: Plain JSON values behind the reason; keys in a fixed order.
-        location: Place in the student's file, if the trace names one.
-        hint: One thing to do; empty if nothing is very likely right.
-        blocked_by: Id of the criterion without which this question cannot be asked; credit is then 0.
-        problem: What is wrong, where diagnosis can say more about it; no report shows this.
-    """
-
-    credit: Fraction
-    reason: str
+    credit: Fraction  # share of the points earned, in [0, 1]
+    reason: str  # one sentence in the form `where: what was found, what was expected`; no markup
+    # Plain JSON values behind the reason; keys in a fixed order
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    location: Location | None = None
-    hint: str = ""
-    blocked_by: str | None = None
-    problem: Problem | None = None
+    location: Location | None = None  # place in the student's file, if the trace names one
+    hint: str = ""  # one thing to do; empty if nothing is very likely right
+    blocked_by: str | None = None  # id of the criterion without which this question cannot be asked; credit is then 0
+    problem: Problem | None = None  # what is wrong, where diagnosis can say more about it; no report shows this
 
 
 class Check(Protocol):
@@ -207,57 +178,34 @@ class SourceCheck(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """One row of a rubric.
+    """One row of a rubric."""
 
-    Attributes:
-        id: Unique within the exercise, fixed for ever.
-        title: What a reader sees.
-        points: Above 0.
-        scenario: Id of the scenario whose trace is judged.
-        check: The question.
-        needs: Ids of criteria that must be met or partly met for this one to make sense.
-        hint: What to tell a student who did not meet it, if the check has nothing better.
-        chapter: Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
-        feedback: How much of its result a student is shown.
-        check_name: What the rubric calls its check; says nothing that the check does not.
-    """
-
-    id: str
-    title: str
-    points: Fraction
-    scenario: str
-    check: Check
-    needs: tuple[str, ...] = ()
-    hint: str = ""
+    id: str  # unique within the exercise, fixed for ever
+    title: str  # what a reader sees
+    points: Fraction  # above 0
+    scenario: str  # id of the scenario whose trace is judged
+    check: Check  # the question
+    needs: tuple[str, ...] = ()  # ids of criteria that must be met or partly met for this one to make sense
+    hint: str = ""  # what to tell a student who did not meet it, if the check has nothing better
+    # Which part of the text asks for it, e.g. `Exercise 1, acceptance criterion 2`; empty if none does.
     chapter: str = ""
-    feedback: Feedback = OPEN
+    feedback: Feedback = OPEN  # how much of its result a student is shown
+    # What the rubric calls its check; says nothing that the check does not
     check_name: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Exercise:
-    """One rubric file.
+    """One rubric file."""
 
-    Attributes:
-        id: Unique, e.g. `velocity_publisher`.
-        number: Number in the chapter, as text.
-        title: What a reader sees.
-        required: Whether the chapter requires it.
-        files: File names a submission must hold, in order.
-        scenarios: What is recorded, in order.
-        criteria: What is judged, in order.
-        digest: `sha256:` over the bytes of the rubric file and of the checks of its own.
-        by_request: Whether it is graded only where somebody asks for it.
-        variant: The values that differ from student to student, as they are in here; None if none do.
-    """
-
-    id: str
-    number: str
-    title: str
-    required: bool
-    files: tuple[str, ...]
-    scenarios: tuple[Scenario, ...]
-    criteria: tuple[Criterion, ...]
-    digest: str
-    by_request: bool = False
+    id: str  # unique, e.g. `velocity_publisher`
+    number: str  # number in the chapter, as text
+    title: str  # what a reader sees
+    required: bool  # whether the chapter requires it
+    files: tuple[str, ...]  # file names a submission must hold, in order
+    scenarios: tuple[Scenario, ...]  # what is recorded, in order
+    criteria: tuple[Criterion, ...]  # what is judged, in order
+    digest: str  # `sha256:` over the bytes of the rubric file and of the checks of its own
+    by_request: bool = False  # whether it is graded only where somebody asks for it
+    # The values that differ from student to student, as they are in here; None if none do
     variant: Variant | None = None
