@@ -18,29 +18,17 @@ from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, 
 
 @dataclass(frozen=True, slots=True)
 class RunOfClass:
-    """One run of the command over a class.
+    """One run of the command over a class."""
 
-    Attributes:
-        conditions: What the results depend on.
-        title: Title of the class.
-        written: When the run ended, as text.
-        jobs: Submissions graded in parallel.
-        took_s: How long grading took.
-        graded: Number of submissions graded in this run.
-        kept: Number of submissions that already had results.
-        stopped: Whether the run was stopped before all submissions were graded.
-        folders: Absolute paths of this machine, to be removed from the page.
-    """
-
-    conditions: Conditions
+    conditions: Conditions  # what the results depend on
     title: str = ""
-    written: str = ""
-    jobs: int = 1
-    took_s: float = 0.0
-    graded: int = 0
-    kept: int = 0
-    stopped: bool = False
-    folders: tuple[str, ...] = ()
+    written: str = ""  # when the run ended, as text
+    jobs: int = 1  # submissions graded in parallel
+    took_s: float = 0.0  # how long grading took
+    graded: int = 0  # number of submissions graded in this run
+    kept: int = 0  # number of submissions that already had results
+    stopped: bool = False  # whether the run was stopped before all submissions were graded
+    folders: tuple[str, ...] = ()  # absolute paths of this machine, to be removed from the page
 
 
 def title_of(sources: Sequence[Path]) -> str:

@@ -50,34 +50,22 @@ _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """The information in the name of a folder or file in a download.
+    """The information in the name of a folder or file in a download."""
 
-    Attributes:
-        identity: Group -> matched text.
-        file: Original name of the student's file; empty if this is the complete submission.
-        late: Whether the platform marked it as late.
-        recognised: Whether the name fits the layout.
-    """
-
-    identity: Mapping[str, str]
-    file: str = ""
-    late: bool = False
-    recognised: bool = True
+    identity: Mapping[str, str]  # group -> matched text
+    file: str = ""  # original name of the student's file; empty if this is the complete submission
+    late: bool = False  # whether the platform marked it as late
+    recognised: bool = True  # whether the name fits the layout
 
 
 @dataclass(frozen=True, slots=True)
 class DownloadLayout:
-    """How the entries of one download are named.
+    """How the entries of one download are named."""
 
-    Attributes:
-        name: One of `LAYOUTS`, or `pattern`.
-        pattern: Regular expression for names; None if the name identifies the student by itself.
-        prefix: Prefix of the user name in the names of cloned repositories.
-    """
-
-    name: str
+    name: str  # one of `LAYOUTS`, or `pattern`
+    # Regular expression for names; None if the name identifies the student by itself
     pattern: re.Pattern[str] | None = None
-    prefix: str = ""
+    prefix: str = ""  # prefix of the user name in the names of cloned repositories
 
     def read(self, label: str) -> Named:
         """Interpret the name of a folder, or of a file including its suffix."""
@@ -166,17 +154,11 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 @dataclass(slots=True)
 class Unpacked:
-    """An unpacked download.
+    """An unpacked download."""
 
-    Attributes:
-        folder: The folder with the submissions, below a folder around all of them if there is one.
-        refused: Name of a folder or file in it -> why it was not unpacked.
-        strays: Entries that belong to no submission, with the reason.
-    """
-
-    folder: Path
-    refused: dict[str, str] = field(default_factory=dict)
-    strays: list[str] = field(default_factory=list)
+    folder: Path  # the folder with the submissions, below a folder around all of them if there is one
+    refused: dict[str, str] = field(default_factory=dict)  # name of a folder or file in it -> why it was not unpacked
+    strays: list[str] = field(default_factory=list)  # entries that belong to no submission, with the reason
 
 
 def unpack_download(archive: Path, into: Path) -> Unpacked:

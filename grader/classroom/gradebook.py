@@ -34,35 +34,20 @@ class Status(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One submission, or one person without one.
+    """One submission, or one person without one."""
 
-    Attributes:
-        name: Name of the entry and of its results folder; empty for a person without a submission.
-        label: Its name in the source.
-        person: Who handed it in; None if nobody on the roster matches.
-        status: See Status.
-        problem: Why there is no report, or why the last attempt failed; may be empty.
-        result: The stored result; None if there is nothing.
-        report: Its report; None if there is none.
-        handed_back: The report with what students may see; None if there is none.
-        adjusted: The score after the instructor's decisions.
-        marked_late: Whether the platform marked it as late.
-        outdated: Whether the result belongs to different files or another rubric than the current ones.
-        twin_of: Names of other submissions by the same person.
-    """
-
-    name: str
-    label: str
-    person: Person | None
+    name: str  # name of the entry and of its results folder; empty for a person without a submission
+    label: str  # its name in the source
+    person: Person | None  # who handed it in; None if nobody on the roster matches
     status: Status
-    problem: str = ""
-    result: ResultStatus | None = None
-    report: ReportData | None = None
-    handed_back: ReportData | None = None
-    adjusted: Adjusted = field(default_factory=Adjusted)
-    marked_late: bool = False
-    outdated: bool = False
-    twin_of: tuple[str, ...] = ()
+    problem: str = ""  # why there is no report, or why the last attempt failed; may be empty
+    result: ResultStatus | None = None  # the stored result; None if there is nothing
+    report: ReportData | None = None  # its report; None if there is none
+    handed_back: ReportData | None = None  # the report with what students may see; None if there is none
+    adjusted: Adjusted = field(default_factory=Adjusted)  # the score after the instructor's decisions
+    marked_late: bool = False  # whether the platform marked it as late
+    outdated: bool = False  # whether the result belongs to different files or another rubric than the current ones
+    twin_of: tuple[str, ...] = ()  # names of other submissions by the same person
 
     @property
     def shown_name(self) -> str:
@@ -77,23 +62,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Gradebook:
-    """The gradebook of a class.
+    """The gradebook of a class."""
 
-    Attributes:
-        rows: Submissions by name, then people without one.
-        matching: How submissions match the roster.
-        strays: Entries of the sources that are not submissions.
-        foreign: Names of results that belong to no current submission.
-        layouts: Each source with its layout.
-        remarks: Remarks for the instructor.
-    """
-
-    rows: tuple[Row, ...]
-    matching: RosterMatch = field(default_factory=RosterMatch)
-    strays: tuple[str, ...] = ()
-    foreign: tuple[str, ...] = ()
-    layouts: tuple[tuple[str, str], ...] = ()
-    remarks: tuple[str, ...] = ()
+    rows: tuple[Row, ...]  # submissions by name, then people without one
+    matching: RosterMatch = field(default_factory=RosterMatch)  # how submissions match the roster
+    strays: tuple[str, ...] = ()  # entries of the sources that are not submissions
+    foreign: tuple[str, ...] = ()  # names of results that belong to no current submission
+    layouts: tuple[tuple[str, str], ...] = ()  # each source with its layout
+    remarks: tuple[str, ...] = ()  # remarks for the instructor
 
     def count(self, status: Status) -> int:
         """Count the rows with a status."""

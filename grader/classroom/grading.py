@@ -39,19 +39,11 @@ def deadline_s(budget_s: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class ClassRun:
-    """One run of the command over a class.
-
-    Attributes:
-        course: The request.
-        exercises: The exercises to grade.
-        conditions: Name of a submission -> what its result depends on.
-        store: Receives the results.
-        watcher: Shows the progress.
-    """
+    """One run of the command over a class."""
 
     course: ClassRequest
     exercises: Sequence[Exercise]
-    conditions: Mapping[str, Conditions]
+    conditions: Mapping[str, Conditions]  # name of a submission -> what its result depends on
     store: Store
     watcher: Watcher
 

@@ -58,40 +58,25 @@ MAX_FILE_BYTES = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class HandedInEntry:
-    """One submission of a class.
+    """One submission of a class."""
 
-    Attributes:
-        name: Unique and safe in paths; also the name of its results folder.
-        label: Its name in the source.
-        path: The folder or file to grade.
-        identity: What its name tells about the student: `user`, `id`, `email`, `name`.
-        late: Whether the platform marked it as late.
-        recognised: Whether its name fits the layout.
-        problem: Why it cannot be graded at all; empty if it can.
-    """
-
-    name: str
-    label: str
-    path: Path
+    name: str  # unique and safe in paths; also the name of its results folder
+    label: str  # its name in the source
+    path: Path  # the folder or file to grade
+    # What its name tells about the student: `user`, `id`, `email`, `name`
     identity: Mapping[str, str] = field(default_factory=dict)
-    late: bool = False
-    recognised: bool = True
-    problem: str = ""
+    late: bool = False  # whether the platform marked it as late
+    recognised: bool = True  # whether its name fits the layout
+    problem: str = ""  # why it cannot be graded at all; empty if it can
 
 
 @dataclass(frozen=True, slots=True)
 class Intake:
-    """The submissions found in the sources.
+    """The submissions found in the sources."""
 
-    Attributes:
-        entries: The submissions, ordered by name.
-        layouts: Each source with its layout, as text.
-        strays: Entries that are not submissions, with the reason; one line each.
-    """
-
-    entries: tuple[HandedInEntry, ...]
-    layouts: tuple[tuple[str, str], ...]
-    strays: tuple[str, ...] = ()
+    entries: tuple[HandedInEntry, ...]  # the submissions, ordered by name
+    layouts: tuple[tuple[str, str], ...]  # each source with its layout, as text
+    strays: tuple[str, ...] = ()  # entries that are not submissions, with the reason; one line each
 
 
 @dataclass(slots=True)

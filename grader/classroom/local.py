@@ -26,36 +26,21 @@ from grader.execution.sandbox.choose import choose_isolation
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One submission to grade.
+    """One submission to grade."""
 
-    Attributes:
-        name: Name of the entry.
-        label: Its name in the source.
-        submission: Path of the submission.
-        into: Destination folder for the files of `worker.PARTS`; must not exist yet.
-        exercises: Exercise ids to grade; empty for all exercises of the rubrics.
-        rubrics: Rubric files; empty for the built-in ones.
-        odom_bag: An /odom recording to play instead of the built-in one.
-        conditions: What the result depends on besides the submission.
-        workers: Most scenarios recorded in parallel.
-        standalone: Whether the HTML report includes its scripts, instead of sharing them with the class.
-        deadline_s: Real time after which the attempt is killed.
-        collected: File with the submission as read on another machine; None to read it now.
-        variant_key: Path of the course key for the command that reproduces the run; the file is not read.
-    """
-
-    name: str
-    label: str
+    name: str  # name of the entry
+    label: str  # its name in the source
     submission: Path
-    into: Path
-    exercises: tuple[str, ...]
-    rubrics: tuple[Path, ...]
-    odom_bag: Path | None
-    conditions: Conditions
-    workers: int
-    standalone: bool
-    deadline_s: float
-    collected: Path | None = None
+    into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
+    exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
+    rubrics: tuple[Path, ...]  # rubric files; empty for the built-in ones
+    odom_bag: Path | None  # an /odom recording to play instead of the built-in one
+    conditions: Conditions  # what the result depends on besides the submission
+    workers: int  # most scenarios recorded in parallel
+    standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class
+    deadline_s: float  # real time after which the attempt is killed
+    collected: Path | None = None  # file with the submission as read on another machine; None to read it now
+    # Path of the course key for the command that reproduces the run; the file is not read
     variant_key: Path | None = None
 
 

@@ -28,19 +28,12 @@ _UNREMARKABLE = {Status.GRADED, Status.MISSING}
 
 @dataclass(frozen=True, slots=True)
 class Platforms:
-    """The platforms to export scores to.
+    """The platforms to export scores to."""
 
-    Attributes:
-        canvas: Number of the assignment in Canvas; empty for no export to Canvas.
-        canvas_gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
-        moodle: The users exported from Moodle; None for no export to Moodle.
-        gradescope: Whether to export to Gradescope.
-    """
-
-    canvas: str = ""
-    canvas_gradebook: Users | None = None
-    moodle: Users | None = None
-    gradescope: bool = False
+    canvas: str = ""  # number of the assignment in Canvas; empty for no export to Canvas
+    canvas_gradebook: Users | None = None  # the gradebook exported from Canvas; None if the roster has the Canvas ids
+    moodle: Users | None = None  # the users exported from Moodle; None for no export to Moodle
+    gradescope: bool = False  # whether to export to Gradescope
 
 
 def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *, gradescope: bool) -> Platforms:
@@ -99,27 +92,18 @@ def class_files(
 
 @dataclass(frozen=True, slots=True)
 class Graded:
-    """A class after grading.
-
-    Attributes:
-        book: The gradebook.
-        graded: Number of submissions graded in this run.
-        kept_before: Number of submissions that already had results.
-        not_replaced: Names of submissions whose new attempt was worse than the stored result, which was kept.
-        files: The files written for the whole class.
-        left_out: Platform -> who is missing in its file, and why.
-        remarks: Remarks about these files.
-        links: Further pages in the results folder, linked from the class page.
-    """
+    """A class after grading."""
 
     book: Gradebook
-    graded: int
-    kept_before: int
+    graded: int  # number of submissions graded in this run
+    kept_before: int  # number of submissions that already had results
+    # Names of submissions whose new attempt was worse than the stored result, which was kept
     not_replaced: tuple[str, ...] = ()
-    files: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()  # the files written for the whole class
+    # Platform -> who is missing in its file, and why
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-    links: tuple[PageLink, ...] = ()
+    remarks: tuple[str, ...] = ()  # remarks about these files
+    links: tuple[PageLink, ...] = ()  # further pages in the results folder, linked from the class page
 
 
 def render_summary(graded: Graded) -> str:

@@ -28,28 +28,16 @@ _FEEDBACK = 4_000
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """The files for a platform.
+    """The files for a platform."""
 
-    Attributes:
-        files: Name, relative to the results folder -> content.
-        left_out: Who is missing, and why; one line each.
-        remark: A remark for the instructor; may be empty.
-    """
-
-    files: Mapping[str, str] = field(default_factory=dict)
-    left_out: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)  # name, relative to the results folder -> content
+    left_out: tuple[str, ...] = ()  # who is missing, and why; one line each
     remark: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Users:
-    """A table of users exported from a platform.
-
-    Attributes:
-        path: Path of the table.
-        header: Its columns.
-        rows: Column -> value.
-    """
+    """A table of users exported from a platform."""
 
     path: Path
     header: tuple[str, ...]

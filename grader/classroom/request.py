@@ -80,34 +80,19 @@ _NO_PLATFORMS = Platforms()
 
 @dataclass(frozen=True, slots=True)
 class ClassRequest:
-    """What to grade, and how.
+    """What to grade, and how."""
 
-    Attributes:
-        sources: Folders of submissions, or downloads.
-        results: The results folder.
-        layout: How submissions are named; one of `downloads.LAYOUTS`.
-        pattern: A regular expression for names, used instead of the layout; empty for none.
-        roster: CSV file of the class; None if there is none.
-        adjustments: YAML file of late days and changed scores; None if there is none.
-        grading: The request as for one submission; its path is ignored.
-        jobs: Submissions graded in parallel; None for one per processor.
-        rerun: One of `RERUNS`.
-        seed_key: The key that seeds are derived from; None for the one stored with the results.
-        standalone: Whether each HTML report is self-contained.
-        platforms: The platforms to export scores to.
-        given: Code handed out to everyone, ignored when submissions are compared; None to skip the comparison.
-    """
-
-    sources: tuple[Path, ...]
+    sources: tuple[Path, ...]  # folders of submissions, or downloads
     results: Path
-    layout: str = AUTO
-    pattern: str = ""
-    roster: Path | None = None
-    adjustments: Path | None = None
-    grading: GradeRequest = _GRADING
-    jobs: int | None = None
-    rerun: str = CHANGED
-    seed_key: SeedKey | None = None
-    standalone: bool = False
+    layout: str = AUTO  # how submissions are named; one of `downloads.LAYOUTS`
+    pattern: str = ""  # a regular expression for names, used instead of the layout; empty for none
+    roster: Path | None = None  # CSV file of the class; None if there is none
+    adjustments: Path | None = None  # YAML file of late days and changed scores; None if there is none
+    grading: GradeRequest = _GRADING  # the request as for one submission; its path is ignored
+    jobs: int | None = None  # submissions graded in parallel; None for one per processor
+    rerun: str = CHANGED  # one of `RERUNS`
+    seed_key: SeedKey | None = None  # the key that seeds are derived from; None for the one stored with the results
+    standalone: bool = False  # whether each HTML report is self-contained
     platforms: Platforms = _NO_PLATFORMS
+    # Code handed out to everyone, ignored when submissions are compared; None to skip the comparison
     given: tuple[ComparedProgram, ...] | None = None

@@ -38,25 +38,15 @@ _PARTICIPANT = re.compile(r"\D+ (\d+)")
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Somebody on the roster.
+    """Somebody on the roster."""
 
-    Attributes:
-        name: Name for display.
-        user: User name on the platform; empty if the roster has none.
-        email: Email address; empty if the roster has none.
-        id: Number at the institution; empty if the roster has none.
-        handles: All ids that are unique to this person, normalised by `fold_handle`.
-        names: Spellings of the name, without spaces and accents.
-        row: Column -> value on the roster; None for a person who is not on a roster.
-    """
-
-    name: str
-    user: str = ""
-    email: str = ""
-    id: str = ""
-    handles: frozenset[str] = frozenset()
-    names: frozenset[str] = frozenset()
-    row: Mapping[str, str] | None = None
+    name: str  # name for display
+    user: str = ""  # user name on the platform; empty if the roster has none
+    email: str = ""  # email address; empty if the roster has none
+    id: str = ""  # number at the institution; empty if the roster has none
+    handles: frozenset[str] = frozenset()  # all ids that are unique to this person, normalised by `fold_handle`
+    names: frozenset[str] = frozenset()  # spellings of the name, without spaces and accents
+    row: Mapping[str, str] | None = None  # column -> value on the roster; None for a person who is not on a roster
 
 
 def fold_handle(text: str) -> str:
@@ -172,21 +162,13 @@ def _spellings(name: str) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class RosterMatch:
-    """How submissions match the roster.
+    """How submissions match the roster."""
 
-    Attributes:
-        people: Name of an entry -> person, for unambiguous matches.
-        unmatched: Names of entries that match nobody on the roster.
-        ambiguous: Names of entries that match several people.
-        duplicates: Groups of names of entries by the same person.
-        missing: People without a submission.
-    """
-
-    people: Mapping[str, Person] = field(default_factory=dict)
-    unmatched: tuple[str, ...] = ()
-    ambiguous: tuple[str, ...] = ()
-    duplicates: tuple[tuple[str, ...], ...] = ()
-    missing: tuple[Person, ...] = ()
+    people: Mapping[str, Person] = field(default_factory=dict)  # name of an entry -> person, for unambiguous matches
+    unmatched: tuple[str, ...] = ()  # names of entries that match nobody on the roster
+    ambiguous: tuple[str, ...] = ()  # names of entries that match several people
+    duplicates: tuple[tuple[str, ...], ...] = ()  # groups of names of entries by the same person
+    missing: tuple[Person, ...] = ()  # people without a submission
 
 
 def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> RosterMatch:

@@ -35,21 +35,13 @@ _CLUSTER = "cluster"
 
 @dataclass(slots=True)
 class _Sending:
-    """A submission that is being graded on the cluster.
-
-    Attributes:
-        task: The task.
-        tries: How often it was sent.
-        only: Workers that may grade it; empty for any worker.
-        future: Future of its answer.
-        payloads: Its scattered data; kept alive until the answer arrives.
-    """
+    """A submission that is being graded on the cluster."""
 
     task: Task
-    tries: int = 0
-    only: tuple[str, ...] = ()
+    tries: int = 0  # how often it was sent
+    only: tuple[str, ...] = ()  # workers that may grade it; empty for any worker
     future: Future[bytes] | None = None
-    payloads: list[object] = field(default_factory=list)
+    payloads: list[object] = field(default_factory=list)  # its scattered data; kept alive until the answer arrives
 
 
 class Dispatcher:
