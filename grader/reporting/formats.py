@@ -47,25 +47,16 @@ def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format of reports.
+    """A format of reports."""
 
-    Attributes:
-        renderer: The rendering function: `module:function` in `grader.reporting`.
-        suffix: File name suffix of this format.
-        usual: Who reads it unless an option says otherwise: students, if a platform shows it to them.
-        arguments: Computes the renderer's further arguments.
-        withholds: Whether the renderer itself hides what students must not see yet, because its platform shows it
-            later.
-        illustrated: Whether it shows figures, which take about as long to draw as judging takes.
-        written_early: Whether its platform ends a run that takes too long, and then uses the file that exists.
-    """
-
-    renderer: str
-    suffix: str
-    usual: Audience
-    arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing
+    renderer: str  # the rendering function: `module:function` in `grader.reporting`
+    suffix: str  # file name suffix of this format
+    usual: Audience  # who reads it unless an option says otherwise: students, if a platform shows it to them
+    arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing  # computes the renderer's further arguments
+    # Whether the renderer itself hides what students must not see yet, because its platform shows it later
     withholds: bool = False
-    illustrated: bool = False
+    illustrated: bool = False  # whether it shows figures, which take about as long to draw as judging takes
+    # Whether its platform ends a run that takes too long, and then uses the file that exists
     written_early: bool = False
 
     def __call__(self, report: Report, layout: PageLayout, **arguments: Any) -> str:

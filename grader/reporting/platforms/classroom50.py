@@ -17,31 +17,18 @@ SCHEMA = "classroom50/result/v1"
 
 @dataclass(frozen=True, slots=True)
 class HandedIn:
-    """Metadata of a submission that only the classroom knows; all fields are required.
-
-    Attributes:
-        classroom: Its name.
-        assignment: Its name.
-        assignment_type: `individual` or `group`.
-        owner: Owner of the repository.
-        username: Who submitted it.
-        submission: Tag that starts with `submit/`.
-        commit: URL of the commit.
-        release: URL of the release.
-        review: URL of the review.
-        datetime: Commit time in UTC, as `2026-01-31T23:59:59Z`.
-    """
+    """Metadata of a submission that only the classroom knows; all fields are required."""
 
     classroom: str
     assignment: str
-    assignment_type: str
-    owner: str
-    username: str
-    submission: str
+    assignment_type: str  # `individual` or `group`
+    owner: str  # owner of the repository
+    username: str  # who submitted it
+    submission: str  # tag that starts with `submit/`
     commit: str
     release: str
     review: str
-    datetime: str
+    datetime: str  # commit time in UTC, as `2026-01-31T23:59:59Z`
 
 
 def render_classroom50(report: Report, handed_in: HandedIn) -> str:
