@@ -37,40 +37,24 @@ _WIDTH = 100
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """How to judge evidence.
+    """How to judge evidence."""
 
-    Attributes:
-        exercises: All exercises of the rubrics.
-        chosen: Requested exercise ids; empty for those that were graded.
-        rubrics: Given rubric files; empty for the built-in ones.
-        pictures: Whether reports include charts.
-        verify: Whether to compare the stored trace with the recordings.
-    """
-
-    exercises: tuple[Exercise, ...]
-    chosen: tuple[str, ...] = ()
-    rubrics: tuple[Path, ...] = ()
-    pictures: bool = False
-    verify: bool = False
+    exercises: tuple[Exercise, ...]  # all exercises of the rubrics
+    chosen: tuple[str, ...] = ()  # requested exercise ids; empty for those that were graded
+    rubrics: tuple[Path, ...] = ()  # given rubric files; empty for the built-in ones
+    pictures: bool = False  # whether reports include charts
+    verify: bool = False  # whether to compare the stored trace with the recordings
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The outputs wanted for each report of a class.
+    """The outputs wanted for each report of a class."""
 
-    Attributes:
-        files: Formats, each with the folder for its files.
-        reports: Whether results include the report as JSON.
-        changes: Whether results include the changes since grading.
-        min_score: See `exit_code`.
-        readers: Who reads the outputs, and when.
-    """
-
-    files: tuple[Output, ...] = ()
+    files: tuple[Output, ...] = ()  # formats, each with the folder for its files
     reports: bool = False
-    changes: bool = False
-    min_score: Fraction | None = None
-    readers: Readers = ANYBODY
+    changes: bool = False  # whether results include the changes since grading
+    min_score: Fraction | None = None  # see `exit_code`
+    readers: Readers = ANYBODY  # who reads the outputs, and when
 
 
 def judgement(

@@ -19,45 +19,28 @@ from grader.submissions.collected import Collected
 
 @dataclass(frozen=True, slots=True)
 class GradeRequest:
-    """What to grade, and how.
+    """What to grade, and how."""
 
-    Attributes:
-        submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only
-            graded by request.
-        every: Whether to grade exactly the exercises that the submission has a file for.
-        rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of all drawn values; None derives it from the submission and the seed key.
-        seed_key: The key to derive the seed with.
-        odom_bag: An /odom recording to play instead of the built-in one.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto`, `none` or the name of a tier.
-        time_budget_s: Real time that all recordings together may take.
-        workers: Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
-        collected: The files of the submission if they were read before, perhaps on another machine; None to read
-            them now.
-        student: Id of the student whose variant is graded; empty if nothing varies.
-        variant_key: File with the course key, as the user typed it; None if not given.
-        spot_checks: Share of submissions, from 0 to 1, that are also recorded on the wall clock.
-        draw: Supplies variant values; if None, rubrics with variants are refused.
-    """
-
-    submission: str
+    submission: str  # path as the user typed it
+    # Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only graded by
+    # request.
     exercises: tuple[str, ...] = ()
-    every: bool = False
-    rubrics: tuple[Path, ...] = ()
-    seed: int | None = None
-    seed_key: SeedKey = PRACTICE
-    odom_bag: Path | None = None
-    clock: str = "auto"
-    isolation: str = "auto"
-    time_budget_s: float = TIME_BUDGET_S
+    every: bool = False  # whether to grade exactly the exercises that the submission has a file for
+    rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
+    seed: int | None = None  # seed of all drawn values; None derives it from the submission and the seed key
+    seed_key: SeedKey = PRACTICE  # the key to derive the seed with
+    odom_bag: Path | None = None  # an /odom recording to play instead of the built-in one
+    clock: str = "auto"  # `virtual`, `wall` or `auto`
+    isolation: str = "auto"  # `auto`, `none` or the name of a tier
+    time_budget_s: float = TIME_BUDGET_S  # real time that all recordings together may take
+    # Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
     workers: int | None = None
-    spot_checks: float = 0.0
+    spot_checks: float = 0.0  # share of submissions, from 0 to 1, that are also recorded on the wall clock
+    # The files of the submission if they were read before, perhaps on another machine; None to read them now
     collected: Collected | None = None
-    student: str = ""
-    variant_key: Path | None = None
-    draw: Draw | None = None
+    student: str = ""  # id of the student whose variant is graded; empty if nothing varies
+    variant_key: Path | None = None  # file with the course key, as the user typed it; None if not given
+    draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused
 
 
 def reproduction(

@@ -64,15 +64,10 @@ def checked_key(key: bytes, where: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class SeedKey:
-    """The key that seeds are derived from; the repr of this object does not reveal it.
-
-    Attributes:
-        value: The key.
-        public: Whether the key is publicly known.
-    """
+    """The key that seeds are derived from; the repr of this object does not reveal it."""
 
     value: bytes = field(repr=False)
-    public: bool = False
+    public: bool = False  # whether the key is publicly known
 
     def seed(self, digest: str) -> int:
         """Derive the seed of a submission from its digest.
@@ -140,15 +135,10 @@ def _close_to_others(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ByKey:
-    """Draws the variant of a student from the course key.
-
-    Attributes:
-        key: The course key.
-        student: Id of the student; case, surrounding whitespace and Unicode normalisation make no difference.
-    """
+    """Draws the variant of a student from the course key."""
 
     key: bytes
-    student: str
+    student: str  # id of the student; case, surrounding whitespace and Unicode normalisation make no difference
 
     def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Pick a value by the HMAC-SHA256 of exercise, variant and student."""

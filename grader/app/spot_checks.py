@@ -61,19 +61,12 @@ def is_drawn(share: float, seed: int, digest: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SpotChecks:
-    """Decides which recordings of a submission are checked.
+    """Decides which recordings of a submission are checked."""
 
-    Attributes:
-        share: Share of submissions that are drawn, from 0 to 1.
-        seed: Seed of the submission's drawn values; together with the digest it decides whether it is drawn.
-        digest: The submission's digest.
-        reaches: Names in its files that access internals of their process.
-    """
-
-    share: float
-    seed: int
+    share: float  # share of submissions that are drawn, from 0 to 1
+    seed: int  # seed of the submission's drawn values; together with the digest it decides whether it is drawn
     digest: str
-    reaches: tuple[str, ...] = ()
+    reaches: tuple[str, ...] = ()  # names in its files that access internals of their process
 
     @property
     def drawn(self) -> bool:
