@@ -153,21 +153,14 @@ class KeptSubmission(_Strict, frozen=True):
 
 
 class KeptRecording(_Strict, frozen=True):
-    """One scenario's recording.
-
-    Attributes:
-        scenario: Scenario id.
-        asked: Digest of the scenario as the rubric described it.
-        digest: `sha256:` of the file; None if the scenario was not recorded because a student's file is missing.
-        at: Offset of the packed trace in the file, in bytes.
-        size: Size of the packed trace, in bytes.
-    """
+    """One scenario's recording."""
 
     scenario: str
-    asked: str
+    asked: str  # digest of the scenario as the rubric described it
+    # `sha256:` of the file; None if the scenario was not recorded because a student's file is missing
     digest: str | None = None
-    at: int = 0
-    size: int = 0
+    at: int = 0  # offset of the packed trace in the file, in bytes
+    size: int = 0  # size of the packed trace, in bytes
 
 
 class KeptExercise(_Strict, frozen=True):

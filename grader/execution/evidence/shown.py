@@ -120,23 +120,14 @@ _MOST_NS = 2**63 - 1
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """One message of a recording.
+    """One message of a recording."""
 
-    Attributes:
-        t_ns: Virtual receive time, from 0.
-        topic: Its topic, or one of the grader's own topics.
-        type: Its type.
-        publisher: `student` or `grader`.
-        cdr: Its bytes.
-        exact: Whether `cdr` is exactly what was sent, as in the trace.
-    """
-
-    t_ns: int
-    topic: str
+    t_ns: int  # virtual receive time, from 0
+    topic: str  # its topic, or one of the grader's own topics
     type: str
-    publisher: str
+    publisher: str  # `student` or `grader`
     cdr: bytes
-    exact: bool = False
+    exact: bool = False  # whether `cdr` is exactly what was sent, as in the trace
 
 
 def shown(observations: tuple[Observation, ...]) -> Iterator[Shown]:

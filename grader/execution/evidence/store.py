@@ -31,12 +31,7 @@ _NOWHERE = Path()
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """A folder of evidence whose manifest has been read.
-
-    Attributes:
-        folder: The folder.
-        manifest: Its manifest.
-    """
+    """A folder of evidence whose manifest has been read."""
 
     folder: Path
     manifest: kept.Manifest

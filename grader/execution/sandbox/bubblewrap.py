@@ -34,21 +34,13 @@ SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 
 @dataclass(frozen=True, slots=True)
 class Bubblewrap:
-    """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits.
-
-    Attributes:
-        bwrap: The bubblewrap program.
-        prlimit: The program of util-linux that sets resource limits.
-        setpriv: The program of util-linux that changes the user; used only as root.
-        as_root: Whether this process is root; students then run as another user instead of in a user namespace.
-        can_forbid_userns: Whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway.
-    """
+    """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits."""
 
     bwrap: Path
-    prlimit: Path
-    setpriv: Path
-    as_root: bool
-    can_forbid_userns: bool
+    prlimit: Path  # the program of util-linux that sets resource limits
+    setpriv: Path  # the program of util-linux that changes the user; used only as root
+    as_root: bool  # whether this process is root; students then run as another user instead of in a user namespace
+    can_forbid_userns: bool  # whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway
 
     @classmethod
     def here(cls) -> Bubblewrap:

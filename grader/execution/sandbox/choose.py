@@ -22,15 +22,10 @@ MOST_CHARACTERS = 100
 
 @dataclass(frozen=True, slots=True)
 class TierChoice:
-    """The tier to record in.
-
-    Attributes:
-        isolation: The tier.
-        containment: What the self-test found it to prevent; empty without a sandbox.
-    """
+    """The tier to record in."""
 
     isolation: Isolation
-    containment: tuple[Property, ...] = ()
+    containment: tuple[Property, ...] = ()  # what the self-test found it to prevent; empty without a sandbox
 
 
 def _silent(step: str) -> None:

@@ -23,14 +23,10 @@ MOST_LINKS = 40  # what the kernel allows in one path
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A minimal view of the machine's files.
+    """A minimal view of the machine's files."""
 
-    Attributes:
-        bound: Real files and folders, sorted, none inside another.
-        links: Symbolic links on the way to them, (path, target), sorted, none inside a bound folder.
-    """
-
-    bound: tuple[Path, ...]
+    bound: tuple[Path, ...]  # real files and folders, sorted, none inside another
+    # Symbolic links on the way to them, (path, target), sorted, none inside a bound folder
     links: tuple[tuple[Path, str], ...]
 
     def parents(self) -> tuple[Path, ...]:

@@ -53,23 +53,14 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentRule:
-    """Refuses a call by the low 32 bits of one argument.
+    """Refuses a call by the low 32 bits of one argument."""
 
-    Attributes:
-        call: Key of `NUMBERS`.
-        argument: Index of the argument.
-        only: The values allowed; empty if any is.
-        never: The values refused.
-        never_bits: Refused if any of these bits is set.
-        error: What errno the caller sees.
-    """
-
-    call: str
-    argument: int
-    only: tuple[int, ...] = ()
-    never: tuple[int, ...] = ()
-    never_bits: int = 0
-    error: int = errno.EPERM
+    call: str  # key of `NUMBERS`
+    argument: int  # index of the argument
+    only: tuple[int, ...] = ()  # the values allowed; empty if any is
+    never: tuple[int, ...] = ()  # the values refused
+    never_bits: int = 0  # refused if any of these bits is set
+    error: int = errno.EPERM  # what errno the caller sees
 
 
 ARGUMENT_RULES = (

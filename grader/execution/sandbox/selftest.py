@@ -37,23 +37,14 @@ SIOCGIFADDR = 0x8915  # linux/sockios.h
 
 @dataclass(frozen=True, slots=True)
 class Bait:
-    """The bait for the probe of one trial.
+    """The bait for the probe of one trial."""
 
-    Attributes:
-        folder: The folder of the trial; deleted afterwards.
-        canary: A file next to the submission that every user may read and write.
-        segment: A file in this machine's shared memory that every user may read and write.
-        secret: A text in the worker's command line and environment.
-        sinks: Listeners on this machine's addresses other than the loopback.
-        loopback: A listener on the loopback address.
-    """
-
-    folder: Path
-    canary: Path
-    segment: Path
-    secret: str
-    sinks: tuple[socket.socket, ...]
-    loopback: socket.socket
+    folder: Path  # the folder of the trial; deleted afterwards
+    canary: Path  # a file next to the submission that every user may read and write
+    segment: Path  # a file in this machine's shared memory that every user may read and write
+    secret: str  # a text in the worker's command line and environment
+    sinks: tuple[socket.socket, ...]  # listeners on this machine's addresses other than the loopback
+    loopback: socket.socket  # a listener on the loopback address
 
 
 def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:

@@ -36,17 +36,11 @@ WITH_SIGNALS = 6
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """The surroundings of a sandboxed process.
+    """The surroundings of a sandboxed process."""
 
-    Attributes:
-        scratch: The folder in which its own folder is created; any user may enter it.
-        loopback: Whether to restrict Fast DDS to the loopback address, because the network is shared.
-        as_root: Whether this process is root; the student's then runs as another user.
-    """
-
-    scratch: Path
-    loopback: bool
-    as_root: bool
+    scratch: Path  # the folder in which its own folder is created; any user may enter it
+    loopback: bool  # whether to restrict Fast DDS to the loopback address, because the network is shared
+    as_root: bool  # whether this process is root; the student's then runs as another user
 
 
 def start_command(

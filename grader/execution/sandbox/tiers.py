@@ -69,16 +69,13 @@ class FlatBubblewrap:
 
     It is for systems that let bubblewrap create namespaces, but do not let it be nested, such as Ubuntu with its
     restriction of user namespaces.
-
-    Attributes:
-        outer: The bubblewrap around the worker.
     """
 
     name: ClassVar[str] = FLAT_NAME
     shares_network: ClassVar[bool] = False
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
-    outer: Bubblewrap
+    outer: Bubblewrap  # the bubblewrap around the worker
 
     @classmethod
     def here(cls) -> FlatBubblewrap:
@@ -110,16 +107,13 @@ class Landlock:
     """The tier `landlock`: Landlock, seccomp, limits and another user, for containers that allow no namespaces.
 
     The network is the caller's: outgoing traffic is contained only if there is no interface but `lo`.
-
-    Attributes:
-        as_root: Whether this process is root; students then run as another user.
     """
 
     name: ClassVar[str] = LANDLOCK_NAME
     shares_network: ClassVar[bool] = True
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
-    as_root: bool
+    as_root: bool  # whether this process is root; students then run as another user
 
     @classmethod
     def here(cls) -> Landlock:
