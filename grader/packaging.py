@@ -164,17 +164,11 @@ _NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """What a platform grades, and how.
+    """What a platform grades, and how."""
 
-    Attributes:
-        exercises: Exercise ids; empty for all exercises of the rubrics.
-        rubrics: Rubric files; empty for the built-in ones.
-        isolation: As on the command line.
-    """
-
-    exercises: tuple[str, ...] = ()
-    rubrics: tuple[Path, ...] = ()
-    isolation: str = "auto"
+    exercises: tuple[str, ...] = ()  # exercise ids; empty for all exercises of the rubrics
+    rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
+    isolation: str = "auto"  # as on the command line
 
 
 def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
