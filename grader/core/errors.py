@@ -18,9 +18,8 @@ A crash of a student's program is not an error but a Fault in the trace.
 class GraderError(Exception):
     """A problem with a place and a fix.
 
-    Args:
-        message: `where: what was expected, what was found`, one line.
-        hint: One thing to do, without the word "hint"; empty if there is none.
+    The message is one line, `where: what was expected, what was found`. The hint is one thing to do, without the word
+    "hint"; empty if there is none.
     """
 
     def __init__(self, message: str, hint: str = "") -> None:

@@ -250,9 +250,8 @@ class Trace:
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:
         """Cache a value that is computed from this trace, for the lifetime of the trace.
 
-        Args:
-            key: Identifies the computation and its parameters.
-            work: Computes the value; a pure function whose result does not refer to the trace.
+        The key identifies the computation and its parameters. The work is a pure function whose result does not
+        refer to the trace.
         """
         if key not in self._known:
             self._known[key] = work()
