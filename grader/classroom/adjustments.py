@@ -72,13 +72,7 @@ class Adjusted:
 
 
 def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adjusted:
-    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned.
-
-    Args:
-        raw: The grader's points; None if there are none.
-        decision: The decision about this submission.
-        rules: The penalties for late days.
-    """
+    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned."""
     penalty = Fraction(0)
     if raw is not None and rules.per_day is not None:
         days = -(-decision.days_late.numerator // decision.days_late.denominator)
@@ -117,11 +111,7 @@ class _File(BaseModel):
 
 
 def read_adjustments(path: Path) -> Adjustments:
-    """Read an adjustments file.
-
-    Raises:
-        ClassError: The file cannot be read or has mistakes; the message names the first one and its position.
-    """
+    """Read an adjustments file; raises ClassError with the first mistake and its position."""
     tree = _tree(path)
     try:
         read = _File.model_validate(tree.data or {})

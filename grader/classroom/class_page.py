@@ -46,12 +46,7 @@ _MIB = 1 << 20
 
 
 def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
-    """Build the header of the page.
-
-    Args:
-        book: The gradebook.
-        run: The run that writes the page.
-    """
+    """Build the header of the page."""
     reports = [row.report for row in book.rows if row.report is not None]
     counts = [f"{book.count(status)} {status.value}" for status in Status if book.count(status)]
     now = "" if run.stopped else f"graded now: {run.graded}, done before: {run.kept}"
@@ -128,13 +123,7 @@ _ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not c
 
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
-    """Build the page of a class.
-
-    Args:
-        book: The gradebook.
-        run: The run that writes the page.
-        links: Other pages in the results folder.
-    """
+    """Build the page of a class, with links to other pages in the results folder."""
     rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
     students = tuple(_student(row, run) for row in rows)
     listings = [listing for listing in _listings(book, rows, run) if listing.entries]
@@ -289,12 +278,7 @@ def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:
 
 
 def without_folders(text: str, folders: Sequence[str]) -> str:
-    """Make paths in a sentence relative to the class.
-
-    Args:
-        text: A sentence.
-        folders: Absolute paths of the class, the longest first; other paths are cut to their last part.
-    """
+    """Make paths in a sentence relative to the folders of the class, longest first; cut others to their last part."""
     for folder in folders:
         text = text.replace(f"{folder}/", "").replace(folder, folder.rsplit("/", 1)[-1])
     return _PATH.sub(r"\1", text)

@@ -208,14 +208,7 @@ def compare_class(
 ) -> Compared:
     """Compare all submissions, and write the similarity pages and table; no score depends on them.
 
-    Args:
-        entries: The submissions.
-        rows: Their rows in the gradebook.
-        given: The files handed out to everyone.
-        store: Receives the pages.
-
-    Raises:
-        HarnessError: The pages cannot be written.
+    The files handed out to everyone, `given`, are left out. Raises HarnessError if the pages cannot be written.
     """
     row_of = {row.name: row for row in rows}
     handed = [_handed(entry, row_of.get(entry.name)) for entry in entries]

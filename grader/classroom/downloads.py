@@ -85,16 +85,10 @@ class DownloadLayout:
 
 
 def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
-    """Determine the layout of a download.
+    """Determine the layout of a download from the names in its top folder, `place`.
 
-    Args:
-        wanted: One of `LAYOUTS`.
-        pattern: The user's regular expression, which overrides `wanted`; empty if there is none.
-        place: Name of the top folder.
-        labels: Names in that folder.
-
-    Raises:
-        ClassError: The regular expression cannot be used.
+    A regular expression of the user overrides the layout that is wanted, one of `LAYOUTS`; raises ClassError if it
+    cannot be used.
     """
     if pattern:
         return DownloadLayout("pattern", _compiled(pattern))
@@ -162,15 +156,9 @@ class Unpacked:
 
 
 def unpack_download(archive: Path, into: Path) -> Unpacked:
-    """Unpack a download, unless it was unpacked before.
+    """Unpack a zip or tar file into a folder of the grader, unless it was unpacked before; a note is kept beside it.
 
-    Args:
-        archive: A zip or tar file, compressed or not.
-        into: Destination folder, owned by the grader; it need not exist. A note is stored beside it.
-
-    Raises:
-        ClassError: The archive cannot be read.
-        HarnessError: The copy cannot be written.
+    Raises ClassError if the archive cannot be read, HarnessError if the copy cannot be written.
     """
     data = _read(archive)
     note = into.with_name(f".{into.name}.json")

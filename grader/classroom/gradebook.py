@@ -100,20 +100,10 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
 ) -> Gradebook:
-    """Assemble the gradebook.
+    """Assemble the gradebook; raises ClassError for a decision about somebody who is not in this class.
 
-    Args:
-        intake: The submissions.
-        matching: How they match the roster.
-        adjustments: The instructor's decisions.
-        kept: Name -> stored results.
-        keys: Name -> key that a current result has; empty if unknown.
-        report_of: Reads the report of a submission.
-        handed_back_of: Reads the report with what students may see.
-        foreign: Names of results that belong to no submission.
-
-    Raises:
-        ClassError: A decision names somebody who is not in this class.
+    Stored results and the keys that current results have, empty if unknown, are given by name. The two functions read
+    the complete report of a submission, and the one with what students may see.
     """
     decisions = decisions_for(intake.entries, matching, adjustments)
     twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}

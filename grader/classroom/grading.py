@@ -50,14 +50,7 @@ class ClassRun:
     def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
         """Grade submissions, and return the names of those whose earlier, better result was kept.
 
-        Args:
-            due: The submissions.
-            warn: Called with warnings for the instructor before grading begins.
-            make: Makes the scheduler.
-
-        Raises:
-            EnvironmentFault: Nothing can be graded here.
-            HarnessError: A disk is full; results stored so far are kept.
+        Raises EnvironmentFault if nothing can be graded here, HarnessError if a disk is full; results so far are kept.
         """
         left = {entry.name for entry in due}
         self._note(left)
@@ -141,13 +134,7 @@ def student_of(person: Person | None) -> str:
 def with_known_students(
     entries: Sequence[HandedInEntry], people: Mapping[str, Person], exercises: Sequence[Exercise]
 ) -> tuple[HandedInEntry, ...]:
-    """If rubrics have variants, refuse the submissions whose student is not known.
-
-    Args:
-        entries: The submissions.
-        people: Name of a submission -> its student, for unambiguous matches.
-        exercises: The exercises to grade.
-    """
+    """If rubrics have variants, refuse the submissions whose student is not known."""
     if not vary(exercises):
         return tuple(entries)
     return tuple(entry if entry.problem else _known(entry, people.get(entry.name)) for entry in entries)
@@ -167,12 +154,7 @@ def vary(exercises: Sequence[Exercise]) -> bool:
 
 
 def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
-    """Check that there are a course key and a roster if exercises have variants.
-
-    Raises:
-        ClassError: The roster is missing.
-        VariantError: The course key is missing.
-    """
+    """Raise VariantError or ClassError if exercises have variants and there is no course key or no roster."""
     if not vary(exercises):
         return
     if course.grading.variant_key is None:
@@ -190,18 +172,7 @@ def own_conditions(
     exercises: Sequence[Exercise],
     conditions: Conditions,
 ) -> dict[str, Conditions]:
-    """Return name of a submission -> the conditions it is graded with.
-
-    Args:
-        course: The request.
-        entries: The submissions.
-        people: Name of a submission -> its student.
-        exercises: The exercises to grade, read with the first value of each variant.
-        conditions: The conditions of the whole class.
-
-    Raises:
-        GraderError: The course key or a rubric cannot be used.
-    """
+    """Return name of a submission -> the conditions it is graded with, which include its student's variant."""
     if not vary(exercises) or course.grading.variant_key is None:
         return {entry.name: conditions for entry in entries}
     key = read_key(course.grading.variant_key, "course key")

@@ -38,10 +38,8 @@ def safe_name(text: str) -> str:
 def distinct_names(wishes: Sequence[tuple[str, str]]) -> list[str]:
     """Return a unique safe name for each wish, independent of their order.
 
-    If several wish for the same name, each gets a suffix derived from its unique text.
-
-    Args:
-        wishes: The preferred name, and a unique text such as the path in the download.
+    A wish is the preferred name and a unique text, such as the path in the download. If several wish for the same name,
+    each gets a suffix derived from its unique text.
     """
     names = [safe_name(wish) for wish, _ in wishes]
     count = Counter(names)
@@ -96,16 +94,10 @@ _ByStudent = dict[tuple[str, ...], _Found]
 
 
 def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
-    """Find all submissions.
+    """Find all submissions in folders and downloads, which are unpacked in the results folder.
 
-    Args:
-        sources: Folders of submissions, or downloads.
-        results: The results folder; downloads are unpacked in it.
-        layout: How submissions are named, one of `LAYOUTS`.
-        pattern: A regular expression for names, used instead of the layout.
-
-    Raises:
-        ClassError: A source cannot be used, or has no submissions.
+    A regular expression for names overrides the layout. Raises ClassError if a source cannot be used, or has no
+    submissions.
     """
     found: list[_Found] = []
     strays: list[str] = []

@@ -64,14 +64,7 @@ class ClassScheduler(Protocol):
     """Grades submissions in parallel, on this machine or on others."""
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Check that grading is possible, and return warnings for the instructor.
-
-        Args:
-            isolation: The requested sandbox.
-
-        Raises:
-            EnvironmentFault: Nothing can be graded.
-        """
+        """Return warnings for the instructor; raises EnvironmentFault if nothing can be graded."""
         ...
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
@@ -93,13 +86,7 @@ WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
 
 
 class LocalScheduler:
-    """Grades on this machine.
-
-    Args:
-        jobs: Submissions graded in parallel.
-        command: Command that grades one submission; replaced only in tests.
-        folder: Base of relative paths; None for the current directory.
-    """
+    """Grades on this machine; relative paths start at the folder, or at the current one if it is None."""
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs

@@ -119,17 +119,7 @@ def files_below(folder: Path) -> Files:
 
 
 def write_answer(files: Iterable[tuple[bytes, bytes]], into: Path, allowed: frozenset[str]) -> None:
-    """Write the files of a result into a new folder.
-
-    Args:
-        files: Relative path and content.
-        into: The folder; must not exist yet.
-        allowed: Names of the files and folders of a result.
-
-    Raises:
-        HarnessError: A file does not belong to a result.
-        OSError: The files cannot be written.
-    """
+    """Write the files of a result into a new folder; raises HarnessError for a file that is not allowed."""
     named = [(os.fsdecode(name), content) for name, content in files]
     if len(named) > MAX_ANSWER_FILES or any(name_problem(n) or n.split("/")[0] not in allowed for n, _ in named):
         raise HarnessError("answer: expected the files of a result, found others")

@@ -47,13 +47,7 @@ def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *
 
 
 def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
-    """Return platform -> its export; raises ClassError if a platform would reject it.
-
-    Args:
-        book: The gradebook.
-        wanted: The platforms.
-        results: Name of an entry -> its results.json for Gradescope.
-    """
+    """Return platform -> its export; raises ClassError if a platform would reject it."""
     made: dict[str, Export] = {}
     if wanted.canvas:
         made["canvas"] = export_canvas(book, wanted.canvas, wanted.canvas_gradebook)
@@ -74,12 +68,7 @@ def class_files(
 ) -> dict[str, bytes]:
     """Return name -> content of all files for the class, relative to the results folder; the page is last.
 
-    Args:
-        book: The gradebook.
-        made: The exports for platforms.
-        run: The run that writes the files.
-        links: Other pages in the folder, to be linked from the class page.
-        standalone: Whether the page includes its scripts, instead of sharing them with the reports.
+    A standalone page includes its scripts, instead of sharing them with the reports.
     """
     files = {GRADEBOOK: render_gradebook(book).encode()}
     for export in made.values():

@@ -51,17 +51,11 @@ def read_users(path: Path) -> Users:
 
 
 def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> Export:
-    """Export scores for Canvas.
+    """Export scores for Canvas; raises ClassError if nothing has this number, or nobody has a Canvas id.
 
     The file contains only people with a score and only this one column, so that later changes in Canvas are kept.
-
-    Args:
-        book: The gradebook.
-        assignment: Number of the assignment in Canvas, or its title and number in parentheses.
-        gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
-
-    Raises:
-        ClassError: The gradebook has no such assignment, or nobody has a Canvas id.
+    Without the gradebook that Canvas exported, the roster must have the ids. The assignment is a number, or a title
+    with the number in parentheses.
     """
     title = _canvas_title(assignment, gradebook)
     rows: list[list[str]] = []
@@ -85,14 +79,8 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> 
 def export_moodle(book: Gradebook, users: Users) -> Export:
     """Export grades and feedback for Moodle's grade import; importing one without the other deletes grades.
 
-    People who are not in the table of users are left out, because Moodle rejects a file with an unknown user.
-
-    Args:
-        book: The gradebook.
-        users: The participants or grades exported from Moodle.
-
-    Raises:
-        ClassError: The table has no column that Moodle can identify people by.
+    People who are not in the table of users are left out, because Moodle rejects a file with an unknown user. Raises
+    ClassError if the table has no column that Moodle can identify people by.
     """
     by_name = {name.strip().casefold(): name for name in users.header}
     column = next((name for name in MOODLE_COLUMNS if name.casefold() in by_name), None)
@@ -114,12 +102,7 @@ def export_moodle(book: Gradebook, users: Users) -> Export:
 
 
 def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
-    """Export a results.json for each submission, as an autograder would write it, and a table of all scores.
-
-    Args:
-        book: The gradebook.
-        results: Name of an entry -> the results.json of its report.
-    """
+    """Export a results.json for each submission, as an autograder would write it, and a table of all scores."""
     files: dict[str, str] = {}
     rows: list[list[str]] = []
     left_out: list[str] = []

@@ -22,12 +22,7 @@ RERUNS = (CHANGED, FAILED, UNDECIDED, ALL)
 
 
 def digest_of(entry: HandedInEntry, scratch: Path) -> str:
-    """Compute the digest of a submission; empty if that is not possible.
-
-    Args:
-        entry: The submission.
-        scratch: An empty folder for a copy.
-    """
+    """Compute the digest of a submission, copied to an empty folder; empty if that is not possible."""
     if entry.problem:
         return unusable_digest(SubmissionError(entry.problem))
     try:
@@ -39,14 +34,7 @@ def digest_of(entry: HandedInEntry, scratch: Path) -> str:
 
 
 def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, str], rerun: str) -> list[HandedInEntry]:
-    """Select the submissions to grade; a stopped run with the same `--rerun` is resumed.
-
-    Args:
-        store: The stored results.
-        entries: The submissions.
-        keys: Name -> key that a current result has.
-        rerun: One of `RERUNS`.
-    """
+    """Select the submissions to grade; a stopped run with the same `--rerun` is resumed."""
     pending = store.pending(rerun)
     due = []
     for entry in entries:
@@ -58,13 +46,7 @@ def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, s
 
 
 def is_due(kept: Kept, key: str, rerun: str) -> bool:
-    """Whether a submission has to be graded.
-
-    Args:
-        kept: The stored results of the submission.
-        key: The key that a current result has; empty if unknown.
-        rerun: One of `RERUNS`.
-    """
+    """Whether a submission has to be graded; the key is that of a current result, empty if unknown."""
     result, last = kept.result, kept.last
     if rerun == ALL or result is None or result.state is State.FAILED or not key or result.key != key:
         return True

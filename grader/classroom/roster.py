@@ -61,11 +61,7 @@ def fold_name(text: str) -> str:
 
 
 def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Read the header and the rows of a CSV file separated by commas, semicolons or tabs.
-
-    Raises:
-        ClassError: The file cannot be read, or has no header and rows.
-    """
+    """Read header and rows of a CSV file separated by commas, semicolons or tabs; raises ClassError if it has none."""
     text = _text(path)
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)
@@ -85,8 +81,7 @@ def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
 def read_roster(path: Path) -> list[Person]:
     """Read the people of a roster: a CSV export from Canvas, Moodle, GitHub or Classroom 50, or a custom one.
 
-    Raises:
-        ClassError: The file cannot be read, or no column identifies people.
+    Raises ClassError if the file cannot be read, or no column identifies people.
     """
     header, rows = read_table(path)
     columns = columns_of(header)
@@ -175,11 +170,7 @@ def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> 
     """Match submissions to people.
 
     Unique ids (user name, number, email address, folder) take precedence over names. If several people match, none is
-    chosen.
-
-    Args:
-        entries: The submissions.
-        roster: The people; None if there is no roster, and then people are named after their submissions.
+    chosen. Without a roster, people are named after their submissions.
     """
     if roster is None:
         people = {entry.name: _unknown(entry) for entry in entries}

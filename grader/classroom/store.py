@@ -93,11 +93,7 @@ class Kept:
 
 
 class Store:
-    """The results of a class; only one process at a time uses the folder.
-
-    Args:
-        folder: The results folder.
-    """
+    """The results of a class; only one process at a time uses the folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -120,15 +116,9 @@ class Store:
         return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
 
     def commit(self, name: str, fresh: Path, status: ResultStatus) -> bool:
-        """Store a new result; return whether it replaced the old one.
+        """Store a new result, whose folder of files is moved or deleted; return whether it replaced the old one.
 
-        Args:
-            name: Name of the submission.
-            fresh: Folder with the files of the new result; it is moved or deleted.
-            status: Status of the attempt, written to the folder.
-
-        Raises:
-            HarnessError: The result cannot be written; the old one is kept.
+        Raises HarnessError if the result cannot be written; the old one is kept.
         """
         place = self.place(name)
         try:
@@ -203,11 +193,7 @@ class Store:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open the results folder, and lock it against other processes.
-
-    Raises:
-        ClassError: The folder cannot be used, or another process uses it.
-    """
+    """Open the results folder, and lock it; raises ClassError if it cannot be used, or another process uses it."""
     store = Store(folder)
     try:
         (folder / "students").mkdir(parents=True, exist_ok=True)

@@ -45,15 +45,9 @@ class _Sending:
 
 
 class Dispatcher:
-    """Grades one batch.
+    """Grades one batch; events of progress arrive on a Dask topic of its own.
 
-    Args:
-        client: Client of the cluster.
-        worker_pool: The workers of the cluster.
-        jobs: Submissions graded in parallel; None for as many as the workers have threads.
-        terms: What the class is graded with.
-        on_step: Called when a step of a submission begins.
-        topic: Dask topic for progress events; unique on the cluster.
+    At most `jobs` submissions are graded in parallel; None for as many as the workers have threads.
     """
 
     def __init__(  # noqa: PLR0913  each is needed for as long as the batch runs
@@ -219,10 +213,8 @@ class Dispatcher:
 class ClusterScheduler:
     """Grades on the workers of a cluster.
 
-    Args:
-        client: Client of the cluster; not closed.
-        jobs: Submissions graded in parallel; None for as many as the workers have threads.
-        warn: Called with the reason if a worker that joined later is not used.
+    At most `jobs` submissions are graded in parallel; None for as many as the workers have threads. If a worker that
+    joins later is not used, `warn` is called with the reason.
     """
 
     def __init__(self, client: Client, jobs: int | None, warn: Callable[[str], None]) -> None:
@@ -257,16 +249,10 @@ _LOGGERS = ("distributed", "distributed.client")
 def connected(
     place: str, jobs: int | None, warn: Callable[[str], None], *, timeout_s: float = CONNECT_S
 ) -> Iterator[MakeScheduler]:
-    """Connect to a cluster, and disconnect at the end.
+    """Connect to a cluster, and disconnect at the end; raises EnvironmentFault if no scheduler answers.
 
-    Args:
-        place: Address of the scheduler, such as `tcp://host:8786`, or a scheduler file.
-        jobs: Submissions graded in parallel; None for as many as the cluster has threads.
-        warn: Called with the reason if a worker that joined later is not used.
-        timeout_s: Longest wait for the scheduler.
-
-    Raises:
-        EnvironmentFault: No scheduler answers.
+    The place is the address of the scheduler, such as `tcp://host:8786`, or a scheduler file; for `jobs` and `warn` see
+    `ClusterScheduler`.
     """
     address = address_of(place)
     if os.environ.get("GRADER_DEBUG") != "1":

@@ -62,12 +62,7 @@ def files_wanted(task: Task) -> Sequence[str]:
 
 
 def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
-    """Pack a submission for the cluster, or return an attempt at once if it cannot be used.
-
-    Args:
-        task: The submission.
-        wanted: Names of the required files.
-    """
+    """Pack a submission for the cluster, or return an attempt at once if it cannot be used."""
     try:
         with tempfile.TemporaryDirectory() as nowhere:
             collected = collect_submission(str(task.submission), wanted, Path(nowhere))

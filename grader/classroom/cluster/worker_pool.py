@@ -18,10 +18,7 @@ PACKAGE = "rclpy-grader"
 class WorkerPool:
     """Knows which workers can grade; asks each worker once, when it first appears.
 
-    Args:
-        client: Client of the cluster.
-        version: Version of the grader that workers must have.
-        warn: Called with the reason if a worker that joined later is not used.
+    Workers must have this version of the grader. If one that joins later is not used, `warn` is called with the reason.
     """
 
     def __init__(self, client: Client, version: str, warn: Callable[[str], None]) -> None:
@@ -34,11 +31,7 @@ class WorkerPool:
     def inspect(self, isolation: str) -> Sequence[str]:
         """Ask all present workers whether they can grade, and return warnings for the instructor.
 
-        Args:
-            isolation: The requested sandbox.
-
-        Raises:
-            EnvironmentFault: The scheduler lacks the package, or there are workers but none of them can grade.
+        Raises EnvironmentFault if the scheduler lacks the package, or if there are workers but none of them can grade.
         """
         self._isolation = isolation
         self._check_scheduler()
@@ -69,11 +62,7 @@ class WorkerPool:
         return {address: count for address, count in threads.items() if self._fit(address)}
 
     def only(self, fit: Collection[str]) -> tuple[str, ...]:
-        """Return the workers that a submission is restricted to; empty if every worker can grade.
-
-        Args:
-            fit: The workers that can grade.
-        """
+        """Return the workers that a submission is restricted to; empty if every worker can grade."""
         unfit = any(fitness.unfit for fitness in self._known.values())
         return tuple(sorted(fit)) if unfit else ()
 
