@@ -25,13 +25,7 @@ _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
 def render_checkup(checkup: Checkup, *, width: int, colour: bool) -> str:
-    """Return a checkup as text.
-
-    Args:
-        checkup: The checkup.
-        width: Columns of the page; at least 60 are used.
-        colour: Whether to colour with ANSI sequences; the text is the same without.
-    """
+    """Return a checkup as text of at least 60 columns; colours are ANSI sequences, the text is the same without."""
     page = Page(width=max(width, _NARROWEST), colour=colour)
     _head(page, checkup)
     _title(page, "This machine")

@@ -86,11 +86,7 @@ FORMATS: dict[str, Format] = {
 
 
 def check_surroundings(name: str) -> None:
-    """Check that the environment has the values that a format needs.
-
-    Raises:
-        GraderError: A value is missing.
-    """
+    """Raise GraderError if the environment lacks a value that a format needs."""
     if FORMATS[name].arguments is _handed_in:
         from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
 
@@ -98,14 +94,7 @@ def check_surroundings(name: str) -> None:
 
 
 def rendered(name: str, report: Report, layout: PageLayout, readers: Readers = ANYBODY) -> str:
-    """Return a report in a format, limited to what its reader may see.
-
-    Args:
-        name: One of `FORMATS`.
-        report: The whole report.
-        layout: Width and colour of text.
-        readers: Who reads it, and when.
-    """
+    """Return a report in one of `FORMATS`, limited to what its reader may see."""
     format_ = FORMATS[name]
     if readers.of(format_.usual) is Audience.INSTRUCTOR:
         return format_(report, layout)

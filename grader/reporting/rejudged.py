@@ -60,8 +60,7 @@ class ReportChange:
 def change(name: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> ReportChange:
     """Compare two JSON reports, for the exercises in the second one.
 
-    Raises:
-        KeyError, TypeError, ValueError: `before` is not a report.
+    Raises KeyError, TypeError or ValueError if `before` is not a report.
     """
     exercises = [e["id"] for e in after["exercises"]]
     old = {key: row for key, row in _standings(before) if key[0] in exercises}

@@ -47,11 +47,7 @@ def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
 
 
 def handed_in(environment: Mapping[str, str]) -> HandedIn:
-    """Return the metadata of the submission from Classroom 50.
-
-    Raises:
-        GraderError: A value that a result needs is missing.
-    """
+    """Return the metadata of the submission from Classroom 50; raises GraderError if a value is missing."""
     missing = [name for name in VARIABLES.values() if not environment.get(name)]
     if missing:
         text = (

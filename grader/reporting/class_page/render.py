@@ -79,14 +79,7 @@ _NAME_LIMIT = 100
 def payload(
     page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[CommonCause], spread: Distribution
 ) -> dict[str, Any]:
-    """Return the data of the page.
-
-    Args:
-        page: The class.
-        exercises: Its exercises and criteria.
-        found: Its causes, in the order shown.
-        spread: Distribution of its scores.
-    """
+    """Return the data of the page."""
     criteria = [(e.id, c.id) for e in exercises for c in e.criteria]
     return {
         "criteria": [f"{exercise}/{criterion}" for exercise, criterion in criteria],
@@ -124,12 +117,9 @@ HANDED_BACK_PAGE = "feedback.html"
 
 
 def render_class(page: ClassPage, *, assets: str | None = None) -> str:
-    """Return the page of a class; it makes no network requests.
+    """Return the page of a class, all of whose text is treated as hostile; it makes no network requests.
 
-    Args:
-        page: The class; all its text is treated as hostile.
-        assets: Where the page finds the files of `class_assets`, relative to itself, e.g. `assets`; None puts them into
-            the page.
+    The files of `class_assets` are found at `assets`, relative to the page; None puts them into the page.
     """
     counted = [(k, s.report) for k, s in enumerate(page.students) if s.report is not None and s.counts]
     exercises = exercise_counts(report for _, report in counted)
@@ -150,13 +140,7 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
 
 
 def result_link(folder: str, file: str, anchor: str = "") -> str:
-    """Return the link to a file of a student's results, percent-encoded; empty if it would leave the folder.
-
-    Args:
-        folder: Folder name below `students/`.
-        file: File name in it.
-        anchor: Id of an element in the file.
-    """
+    """Return the link to a file below `students/`, percent-encoded; empty if it would leave the results."""
     path = page_link(PageLink("", f"students/{folder}/{file}")) if "/" not in folder and folder else ""
     return f"{path}#{quote(anchor, safe='', errors='replace')}" if path and anchor else path
 

@@ -119,12 +119,10 @@ _LINE_LIMIT = 160
 
 
 def render_html(report: Report, *, assets: str | None = None) -> str:
-    """Return a report as an HTML page that makes no network requests.
+    """Return a report, all of whose text is treated as hostile, as an HTML page that makes no network requests.
 
-    Args:
-        report: The report; all its text is treated as hostile.
-        assets: Where the page finds the files of `shared_assets`, relative to itself, e.g. `../assets`. None puts them
-            into the page, which then stands alone.
+    The page finds the files of `shared_assets` at `assets`, relative to itself, e.g. `../assets`. None puts them into
+    the page, which then stands alone.
     """
     page = _templates().get_template("report.html")
     figures = {figure.id: figure_values(figure) for e in report.exercises for figure in e.figures}
