@@ -18,12 +18,7 @@ from grader.rubrics.variants import Recorded
 class EvidenceWriter:
     """Remembers a run while it is graded, and writes it after its report has been delivered.
 
-    Args:
-        folders: Destinations; checked right away, because grading takes long.
-        request: The request that is graded.
-
-    Raises:
-        EvidenceError: Evidence cannot be written to one of the folders.
+    The folders are checked right away, because grading takes long; raises EvidenceError if one cannot be written to.
     """
 
     def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:

@@ -42,15 +42,9 @@ OFFERED = 3
 
 
 def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain a criterion id, `exercise/criterion`, or the name of a check.
+    """Explain a criterion id, `exercise/criterion`, or the name of a check; raises GraderError if there is none.
 
-    Args:
-        name: The name as typed.
-        rubrics: The rubrics to search for criteria; empty for the built-in ones.
-
-    Raises:
-        GraderError: Nothing has that name.
-        RubricError: A rubric cannot be used.
+    Criteria are searched in the given rubrics, or in the built-in ones if none are given.
     """
     pairs = _pairs(rubrics)
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
@@ -63,20 +57,12 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
 
 
 def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain every criterion of the given rubrics, or of the built-in ones if none are given.
-
-    Raises:
-        RubricError: A rubric cannot be used.
-    """
+    """Explain every criterion of the given rubrics, or of the built-in ones if none are given."""
     return [_criterion(e, c) for e, c in _pairs(rubrics)]
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain every check, including those that rubrics define, and list the criteria that use it.
-
-    Raises:
-        RubricError: A rubric cannot be used.
-    """
+    """Explain every check, including those that rubrics define, and list the criteria that use it."""
     pairs = _pairs(rubrics)
     used: dict[str, list[str]] = {}
     for e, c in pairs:

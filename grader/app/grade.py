@@ -40,11 +40,7 @@ Key = tuple[str, str]
 class EarlyReports:
     """Makes a partial report whenever one exercise is completely recorded and others are not.
 
-    Args:
-        exercises: The exercises to grade, in the order of the report.
-        scenarios: The scenarios to record; an exercise without one is judged along with the first that is recorded.
-        run: The run as known before recording.
-        on_report: Called with each partial report.
+    An exercise without a scenario to record is judged along with the first that is recorded.
     """
 
     def __init__(
@@ -151,14 +147,9 @@ def _ignore(key: tuple[str, str], trace: Trace) -> None:
 
 
 def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> list[Exercise]:
-    """Read the exercises to grade, in rubric order.
+    """Read the exercises to grade, in rubric order; raises RubricError if a rubric or a requested exercise is unusable.
 
-    Args:
-        request: What to grade.
-        submissions: Other paths that students control; no rubric may load its own checks from there.
-
-    Raises:
-        RubricError: A rubric cannot be used, or no rubric has a requested exercise.
+    The submissions are other paths that students control: no rubric may load its own checks from there.
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     paths = request.rubrics or _builtin(request)

@@ -47,26 +47,13 @@ class Watched:
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
-    """Run the files together and summarise what they did.
-
-    Raises:
-        GraderError: Something that the run needs cannot be used.
-    """
+    """Run the files together and summarise what they did."""
     watched = watch(request, progress)
     return summarise(watched.trace, watched.processes, watched.isolation)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
-    """Run the files together and return the trace.
-
-    Args:
-        request: What to run, and how.
-        progress: Called at the start of each step.
-        scenario: The scenario; None for one that only plays the given recording, for the given duration.
-
-    Raises:
-        GraderError: Something that the run needs cannot be used.
-    """
+    """Run the files together and return the trace; without a scenario, only the given recording is played."""
     names = _names(request.files)
     if scenario is None:
         scenario = _undisturbed(request, names)

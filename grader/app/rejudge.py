@@ -66,11 +66,7 @@ def judgement(
 
 
 def rejudge(evidence: Evidence, how: Judgement) -> Report:
-    """Judge one submission's evidence and return the report.
-
-    Raises:
-        EvidenceError: The evidence is damaged, or holds none of the requested exercises.
-    """
+    """Judge one submission's evidence; raises EvidenceError if it is damaged or has none of the requested exercises."""
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
     exercises = _as_recorded(_asked(evidence, how), request)
@@ -93,11 +89,7 @@ def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange 
 
 
 def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
-    """Return the name and folder of all evidence in and below the given paths, in order.
-
-    Raises:
-        EvidenceError: One of the paths holds no evidence.
-    """
+    """Return name and folder of all evidence in and below the given paths; raises EvidenceError if one holds none."""
     named: dict[Path, str] = {}
     used: Counter[str] = Counter()
     for path in paths:
@@ -117,11 +109,7 @@ def rejudge_class(
 ) -> list[RejudgedResult]:
     """Judge many submissions, and return their results in the given order; a failure of one does not affect the others.
 
-    Args:
-        named: Name and folder of the evidence.
-        how: How to judge.
-        wanted: The outputs to write.
-        jobs: Number of processes; None for one per core.
+    They are judged by `jobs` processes, or by one for each core if it is None.
     """
     workers = min(jobs or len(os.sched_getaffinity(0)), max(1, len(named) // WORTH_A_POOL))
     if workers == 1:

@@ -46,14 +46,7 @@ class GradeRequest:
 def reproduction(
     request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
 ) -> Reproduction:
-    """Return the command that reproduces a report, with digests of all that it reads besides the submission.
-
-    Args:
-        request: The request.
-        exercises: The graded exercises.
-        odometry: The /odom recording that was played, if any.
-        seed: The seed used, whether requested or derived.
-    """
+    """Return the command that reproduces a report, with digests of all that it reads besides the submission."""
     return Reproduction(
         command=command_words(request, seed),
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),

@@ -35,15 +35,7 @@ _VARIANT_BYTES = 16
 
 
 def read_key(path: Path, what: str) -> bytes:
-    """Read a key from a file, and strip whitespace.
-
-    Args:
-        path: The file.
-        what: Name of the key in messages, such as `course key`.
-
-    Raises:
-        KeyFileError: The file cannot be read, or the key is too short or too long.
-    """
+    """Read a key from a file, and strip whitespace; a KeyFileError calls it `what`, such as `course key`."""
     where = shown(str(path), 500)
     try:
         with path.open("rb") as file:
@@ -102,11 +94,7 @@ def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.envir
 
 
 def kept_key(path: Path) -> SeedKey:
-    """Return the key in a file that only its owner can read; create it on the first call.
-
-    Raises:
-        KeyFileError: The file cannot be read or created.
-    """
+    """Return the key in a file that only its owner can read; create it on the first call."""
     try:
         made = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
     except FileExistsError:

@@ -67,11 +67,7 @@ def readers(audience: str | None, day: str) -> Readers:
 
 
 def drawn_by(student: str, key: Path | None) -> ByKey | None:
-    """Return the source of a student's variant values; None if neither option is given.
-
-    Raises:
-        GraderError: The key or the id cannot be used.
-    """
+    """Return the source of a student's variant values; None if neither option is given."""
     if not student and key is None:
         return None
     if key is None or not student:
@@ -82,11 +78,7 @@ def drawn_by(student: str, key: Path | None) -> ByKey | None:
 
 
 def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
-    """Return the seed key from `--seed-key` or the environment; None if neither has one.
-
-    Raises:
-        KeyFileError: The key cannot be used.
-    """
+    """Return the seed key from `--seed-key` or the environment; None if neither has one."""
     if seed is not None and path is not None:
         raise click.BadParameter("--seed and --seed-key exclude each other: a seed needs no key")
     from grader.app.seeds import seed_key  # noqa: PLC0415  reading, which --help does not need
