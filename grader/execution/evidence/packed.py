@@ -42,11 +42,7 @@ _decode = msgspec.json.Decoder(dict[str, Any]).decode
 
 
 class Fields(Mapping[str, Any]):
-    """A mapping that is decoded on each access, because most of a trace is never read.
-
-    Args:
-        text: A JSON object in ASCII with valid syntax.
-    """
+    """A JSON object in ASCII that is decoded on each access, because most of a trace is never read."""
 
     __slots__ = ("_text",)
 
@@ -261,9 +257,7 @@ _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 def pack(trace: Trace, there: Sequence[bool]) -> bytes:
     """Pack a trace as JSON; the same trace gives the same bytes.
 
-    Args:
-        trace: The trace.
-        there: For each observation, whether the recording contains its bytes as a message.
+    For each observation, `there` says whether the recording contains its bytes as a message.
     """
     data = trace_to_json(trace)
     for row, left_out in zip(data["observations"], there, strict=True):
@@ -273,11 +267,7 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
 
 
 def unpack(data: bytes) -> Trace:
-    """Unpack a trace without the bytes of messages, which judging does not read.
-
-    Raises:
-        EvidenceError: The data is not a packed trace.
-    """
+    """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if it is none."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
     try:
@@ -293,14 +283,9 @@ def unpack(data: bytes) -> Trace:
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
-    """Unpack a trace.
+    """Unpack a trace; raises EvidenceError if it is none, or does not match the recording.
 
-    Args:
-        data: A packed trace.
-        cdrs: The bytes of the recording's messages, one for each observation; None leaves them out.
-
-    Raises:
-        EvidenceError: The data is not a packed trace, or does not match the recording.
+    The bytes of the recording's messages are given one for each observation; None leaves them out.
     """
     try:
         rows = json.loads(data)

@@ -62,10 +62,8 @@ class _Channels:
 def recording_bytes(trace: Trace, facts: Mapping[str, str], name: str) -> tuple[bytes, bytes]:
     """Convert a trace to an MCAP file, and the `metadata.yaml` that makes its folder a rosbag2 recording.
 
-    Args:
-        trace: The trace; the same trace gives the same bytes.
-        facts: Information about the run: digests, seed, environment.
-        name: File name, which is part of rosbag2's metadata.
+    The same trace gives the same bytes. The facts are digests, seed and environment of the run; the name of the file is
+    part of rosbag2's metadata.
     """
     about = _about(trace, facts)
     messages = [said(0, RUN, about), *shown(trace.observations)]
@@ -96,26 +94,14 @@ def place_of_trace(recording: bytes) -> tuple[int, int]:
 
 
 def trace_at(recording: bytes, at: int, size: int) -> Trace:
-    """Read the trace at an offset of a recording, without the bytes of messages, which judging does not read.
-
-    Raises:
-        EvidenceError: There is no trace at that offset.
-    """
+    """Read the trace at an offset of a recording, without the bytes of messages, which judging does not read."""
     with _reading():
         data = _unpressed(recording[at : at + size])
     return unpack(data)
 
 
 def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
-    """Read the trace of a recording.
-
-    Args:
-        recording: The file's bytes.
-        wire: Whether to include the bytes of messages, which takes longer.
-
-    Raises:
-        EvidenceError: The file is not a recording with a trace.
-    """
+    """Read the trace of a recording; with `wire` it includes the bytes of messages, which takes longer."""
     data = packed_trace(recording)
     if not wire:
         return unpack(data)

@@ -46,8 +46,7 @@ class Bubblewrap:
     def here(cls) -> Bubblewrap:
         """Return the tier for this machine and user, without testing whether it works.
 
-        Raises:
-            EnvironmentFault: A program is missing or this processor is unknown; the hint is a fix.
+        Raises EnvironmentFault if a program is missing or this processor is unknown; the hint is a fix.
         """
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")

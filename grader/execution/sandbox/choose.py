@@ -81,11 +81,7 @@ def inspect_tier(
 ) -> TierReport:
     """Return the report on one tier, from the last self-test if nothing relevant has changed since.
 
-    Args:
-        name: Tier name.
-        ros: The ROS installation that students' processes will use.
-        progress: Called with a message when the tier is tested, and why.
-        afresh: Whether to test it in any case.
+    When the tier is tested, `progress` is told why; `afresh` tests it in any case.
     """
     try:
         isolation = isolation_from_name(name)

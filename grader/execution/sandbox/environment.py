@@ -73,12 +73,7 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
 
 
 def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
-    """Return the environment of a trusted worker, with ROS and this package.
-
-    Args:
-        runtime: Interpreter and ROS.
-        home: A folder for files that ROS writes, such as logs.
-    """
+    """Return the environment of a trusted worker, with ROS and this package; ROS writes its logs to `home`."""
     environment = runtime_environment(runtime)
     python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
     return {
@@ -91,11 +86,9 @@ def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
 
 
 def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
-    """Return the complete environment of a student's process.
+    """Return the complete environment of a student's process; its own variables take precedence.
 
-    Args:
-        process: The process to start; its own variables take precedence.
-        home: A folder that the process may write to, as the process sees it.
+    The process may write to `home`, which is the path as it sees it.
     """
     return {
         **runtime_environment(process.runtime),

@@ -37,9 +37,8 @@ class View:
 def view_of(paths: Iterable[Path]) -> View:
     """Return a view in which every existing path can be opened by its own name.
 
-    Args:
-        paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link
-            to a link works; a path that does not exist is left out.
+    Links are followed one by one, so that a virtual environment whose interpreter is a link to a link works; a path
+    that does not exist is left out.
     """
     real: set[Path] = set()
     links: dict[Path, str] = {}
@@ -162,9 +161,7 @@ def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
 def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     """Return the view of a worker: Python, ROS, the part of this package that it runs, and its working folder.
 
-    Args:
-        runtime: Interpreter and ROS.
-        folder: The working folder, which also contains the staged submissions.
+    The working folder also contains the staged submissions.
     """
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)

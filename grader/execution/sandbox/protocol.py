@@ -90,13 +90,9 @@ class Isolation(Protocol):
         pass_fds: tuple[int, ...],
         view: WorkerView | None = None,
     ) -> Command:
-        """Return the command that starts the trusted worker.
+        """Return the command that starts the trusted worker with this complete environment.
 
-        Args:
-            argv: Program and arguments.
-            environment: Its complete environment.
-            pass_fds: Descriptors that it inherits.
-            view: The files that it sees, if the tier can hide files; None for all.
+        It sees the files of the view, if the tier can hide files; None for all.
         """
         ...
 

@@ -48,12 +48,7 @@ class Bait:
 
 
 def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
-    """Run a probe inside a tier and return the report on the tier; takes about half a second.
-
-    Args:
-        isolation: The tier.
-        ros: The ROS installation that students' processes will use.
-    """
+    """Run a probe inside a tier and return the report on the tier; takes about half a second."""
     letter = TIERS[isolation.name]
     with laid_bait() as bait:
         answer, why = trial(isolation, ros, bait)

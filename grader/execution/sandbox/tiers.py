@@ -40,8 +40,7 @@ SCRATCH = Path("/dev/shm")  # noqa: S108
 def isolation_from_name(name: str) -> Isolation:
     """Return a tier without testing whether it works.
 
-    Raises:
-        EnvironmentFault: There is no such tier, it is for another user, or a part of it is missing.
+    Raises EnvironmentFault if there is no such tier, it is for another user, or a part of it is missing.
     """
     if name not in TIERS:
         raise EnvironmentFault(f"isolation: expected one of {', '.join(TIERS)}, found {name}")
@@ -79,11 +78,7 @@ class FlatBubblewrap:
 
     @classmethod
     def here(cls) -> FlatBubblewrap:
-        """Return the isolation for this machine and user.
-
-        Raises:
-            EnvironmentFault: Bubblewrap is missing, or this kernel or processor has no Landlock.
-        """
+        """Return the isolation for this machine and user; raises EnvironmentFault without bubblewrap or Landlock."""
         require_landlock()
         return cls(Bubblewrap.here())
 
@@ -136,11 +131,7 @@ class Landlock:
         return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process.
-
-        Raises:
-            HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
-        """
+        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, LANDLOCK_NAME)
         ground = Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root)
         return sandboxed_command(process, limits, ground)
@@ -171,11 +162,7 @@ class Plain:
         return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process.
-
-        Raises:
-            HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
-        """
+        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
         start = start_command(str(folder), made=True, limits=by_resource(limits))
