@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from grader.core.report import Report
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from grader.core.report import Report
 
 ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-import sys
-import traceback
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,21 +16,26 @@ from grader.cli.options import (
     EVIDENCE,
     PATH,
     audience_options,
+    complain,
     drawn_by,
     drawn_with,
     parse_outputs,
     parse_percent,
     parse_share,
+    print_for_people,
+    print_for_programs,
     readers,
     shown_progress,
     time_budget_option,
 )
-from grader.core.checkup import TIERS, missing
+from grader.core.checkup import TIERS
 from grader.core.errors import GraderError, HarnessError, RubricError
-from grader.core.releases import TRIED
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared, show
-from grader.reporting.escape import encoded, shown
 from grader.reporting.formats import FORMATS
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from grader.reporting.delivery import Output
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -151,15 +153,24 @@ def _grade(  # noqa: PLR0913  one parameter an option
 
     A folder with the name of a command is graded as ./NAME.
     """
+    from grader.reporting.delivery import (  # noqa: PLC0415  reports, which --help does not need
+        Output,
+        deliver,
+        early_delivery,
+        prepared,
+    )
+
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     for_whom = readers(audience, as_of)
-    from grader.app import (  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
+    from grader.app import (  # noqa: PLC0415  the rest of the grader, which mistakes do not need
         evidence_writer,
         grade,
     )
     from grader.app.request import GradeRequest  # noqa: PLC0415  as above
     from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
+    from grader.core.checkup import missing  # noqa: PLC0415  as above
+    from grader.core.releases import TRIED  # noqa: PLC0415  as above
     from grader.reporting.audience import told  # noqa: PLC0415  as above
 
     key = drawn_with(seed, seed_key)
@@ -185,13 +196,13 @@ def _grade(  # noqa: PLR0913  one parameter an option
     with shown_progress(wanted=not no_progress) as progress:
         report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
-        _warn(f"sandbox {report.environment.isolation}: {found}")
+        complain(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
-        _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
+        complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted, for_whom)
     seen = told(report, for_whom)
     if folders and seen is not report:
-        _warn("the evidence is not kept: it holds what the rubric withholds from students")
+        complain("the evidence is not kept: it holds what the rubric withholds from students")
     else:
         writer.write(report)
     return exit_code(seen, min_score)
@@ -217,9 +228,10 @@ def _observe(  # noqa: PLR0913  one parameter an option
     request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
-    text = summary_to_json(summary) if as_json else render_summary(summary)
-    sys.stdout.buffer.write(encoded(text, sys.stdout.encoding or "utf-8"))
-    sys.stdout.flush()
+    if as_json:
+        print_for_programs(summary_to_json(summary))
+    else:
+        print_for_people(lambda _: render_summary(summary))
     return ALL_MET
 
 
@@ -236,9 +248,9 @@ def _doctor(*, as_json: bool) -> int:
     with shown_progress(wanted=True) as progress:
         checkup = examine(progress)
     if as_json:
-        show(lambda _: checkup_to_json(checkup), for_people=False)
+        print_for_programs(checkup_to_json(checkup))
     else:
-        show(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour), for_people=True)
+        print_for_people(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour))
     return ALL_MET if checkup.safe else UNUSABLE
 
 
@@ -257,9 +269,9 @@ def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
 
     found = explain(name, rubrics)
     if as_json:
-        show(lambda _: explanations_to_json(found), for_people=False)
+        print_for_programs(explanations_to_json(found))
     else:
-        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: render_explanations(found, width=layout.width))
     return ALL_MET
 
 
@@ -288,31 +300,26 @@ def _guarded(run: Callable[[], object]) -> int:
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
-        _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
+        _fail(error.format_message().rstrip("."), hint="grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
         # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.
         lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
-        _complain(*lines, hint=error.hint)
+        _fail(*lines, hint=error.hint)
         return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: no report was made", err=True)
         return INTERRUPTED
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
+            import traceback  # noqa: PLC0415  only here
+
             traceback.print_exc()
-        _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
+        _fail(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
         return UNDECIDED
     return code if isinstance(code, int) else ALL_MET
 
 
-def _complain(*lines: str, hint: str) -> None:
-    for line in lines:
-        click.echo(f"error: {shown(line)}", err=True)
-    if hint:
-        click.echo(f"hint: {shown(hint)}", err=True)
-
-
-def _warn(*lines: str) -> None:
-    for line in lines:
-        click.echo(f"warning: {shown(line)}", err=True)
+def _fail(*lines: str, hint: str) -> None:
+    complain(*lines, kind="error")
+    complain(*filter(None, [hint]), kind="hint")

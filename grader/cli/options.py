@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import date
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from grader.core.errors import EnvironmentFault
-from grader.core.exercise import Audience
+from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
-from grader.reporting.audience import Readers
-from grader.reporting.delivery import Output
-from grader.reporting.escape import shown
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from grader.app.grade import Progress
     from grader.app.seeds import ByKey, SeedKey
+    from grader.reporting.audience import Readers
+    from grader.reporting.delivery import Output
+    from grader.reporting.formats import PageLayout
 
 
 #: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
@@ -55,7 +53,7 @@ def audience_options(command: _Command) -> _Command:
     )
     audience = click.option(
         "--audience",
-        type=click.Choice([audience.value for audience in Audience]),
+        type=click.Choice(["student", "instructor"]),
         help="Who reads all reports; by default students read those for platforms, and instructors the others.",
     )
     return audience(day(command))
@@ -63,6 +61,9 @@ def audience_options(command: _Command) -> _Command:
 
 def readers(audience: str | None, day: str) -> Readers:
     """Return the readers of the reports, from the values of `--audience` and `--as-of`."""
+    from grader.core.exercise import Audience  # noqa: PLC0415  reports, which --help does not need
+    from grader.reporting.audience import Readers  # noqa: PLC0415  as above
+
     return Readers(None if audience is None else Audience(audience), day)
 
 
@@ -95,6 +96,8 @@ def require(what: str, library: str, extra: str) -> None:
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
     del ctx, param
+    from datetime import date  # noqa: PLC0415  as above
+
     if value is None:
         return date.today().isoformat()  # noqa: DTZ011  the local date where it is graded
     try:
@@ -119,6 +122,8 @@ def _parse_output(value: str) -> Output:
         raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
     if format_ == EVIDENCE and path == "-":
         raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
+    from grader.reporting.delivery import Output  # noqa: PLC0415  as above
+
     return Output(format_, None if path == "-" else Path(path))
 
 
@@ -129,6 +134,8 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
         return None
     if not 0 <= value <= 100:  # NaN loses
         raise click.BadParameter(f"expected 0 to 100, found {value}")
+    from fractions import Fraction  # noqa: PLC0415  as above
+
     return Fraction(str(value))
 
 
@@ -146,8 +153,44 @@ def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float
 
 def nearest(found: str, known: Sequence[str]) -> str:
     """End a message with the closest known name, or with all known names."""
+    import difflib  # noqa: PLC0415  as above
+
     near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+
+
+def print_for_programs(text: str) -> None:
+    """Print text in UTF-8, and nothing else, on standard output."""
+    from grader.reporting.delivery import show  # noqa: PLC0415  as above
+
+    show(lambda _: text, for_people=False)
+
+
+def print_for_people(render: Callable[[PageLayout], str]) -> None:
+    """Print text on standard output, rendered for its width and colour."""
+    from grader.reporting.delivery import show  # noqa: PLC0415  as above
+
+    show(render, for_people=True)
+
+
+def complain(*lines: str, kind: str = "warning") -> None:
+    """Write lines of a warning, an error or a hint on standard error; they may hold foreign text."""
+    from grader.reporting.escape import shown  # noqa: PLC0415  as above
+
+    for line in lines:
+        click.echo(f"{kind}: {shown(line)}", err=True)
+
+
+def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
+    """Write a file atomically, and its folders if asked; raises GraderError if that fails."""
+    from grader.reporting.delivery import write_whole  # noqa: PLC0415  as above
+
+    try:
+        if parents:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
+    except OSError as error:
+        raise GraderError(f"{path}: it cannot be written: {error.strerror or error}") from error
 
 
 @contextmanager
@@ -158,6 +201,8 @@ def shown_progress(*, wanted: bool) -> Iterator[Progress]:
         return
     from rich.console import Console  # noqa: PLC0415  only for a terminal
     from rich.text import Text  # noqa: PLC0415
+
+    from grader.reporting.escape import shown  # noqa: PLC0415
 
     with Console(stderr=True).status("starting") as status:
         yield lambda step: status.update(Text(shown(step)))

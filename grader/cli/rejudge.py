@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from grader.app.exit_codes import exit_code
-from grader.cli.options import EVIDENCE, PATH, audience_options, parse_outputs, parse_percent, readers
-from grader.reporting.delivery import Output, deliver, prepared, show
+from grader.cli.options import (
+    EVIDENCE,
+    PATH,
+    audience_options,
+    parse_outputs,
+    parse_percent,
+    print_for_people,
+    print_for_programs,
+    readers,
+)
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
 
     from grader.app.rejudge import Judgement, Wanted
     from grader.reporting.audience import Readers
+    from grader.reporting.delivery import Output
 
 
 @click.command(name="rejudge")
@@ -68,6 +77,7 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     from grader.app import rejudge  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
     from grader.execution.evidence.store import is_evidence  # noqa: PLC0415
+    from grader.reporting.delivery import Output  # noqa: PLC0415
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
@@ -98,6 +108,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     from grader.app import rejudge  # noqa: PLC0415  as above
     from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
     from grader.reporting.audience import told  # noqa: PLC0415
+    from grader.reporting.delivery import deliver, prepared  # noqa: PLC0415
 
     wanted = prepared(outputs)
     report = rejudge.rejudge(open_evidence(folder), how)
@@ -114,7 +125,7 @@ def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json:
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
     results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
     if as_json:
-        show(lambda _: results_to_json(results, changes=wanted.changes), for_people=False)
+        print_for_programs(results_to_json(results, changes=wanted.changes))
     else:
-        show(lambda _: render_changes(results) if wanted.changes else render_results(results), for_people=True)
+        print_for_people(lambda _: render_changes(results) if wanted.changes else render_results(results))
     return next(rejudge.codes(results))

@@ -7,11 +7,17 @@ from pathlib import Path
 import click
 
 from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNUSABLE
-from grader.cli.options import PATH, require, shown_progress
+from grader.cli.options import (
+    PATH,
+    complain,
+    print_for_people,
+    print_for_programs,
+    require,
+    shown_progress,
+    write_file,
+)
 from grader.core.checkup import TIERS
 from grader.core.errors import GraderError, RubricError
-from grader.reporting.delivery import show, write_whole
-from grader.reporting.escape import shown
 
 
 @click.group(name="rubric")
@@ -27,6 +33,7 @@ def _check(*, files: tuple[Path, ...]) -> int:
     Exit code 2 if one of them cannot be used; what is merely odd is a warning.
     """
     from grader.authoring.checking import check_rubric, complaints  # noqa: PLC0415  reading, which --help does not need
+    from grader.reporting.escape import shown  # noqa: PLC0415
 
     code = ALL_MET
     for path in files:
@@ -38,7 +45,7 @@ def _check(*, files: tuple[Path, ...]) -> int:
                 click.echo(shown(line), err=True)
             continue
         for warning in checked.warnings:
-            click.echo(f"warning: {shown(warning)}", err=True)
+            complain(warning)
         click.echo(shown(checked.summary))
     return code
 
@@ -54,8 +61,7 @@ def _schema(*, rubric: Path | None) -> int:
     from grader.rubrics.loader import own_checks  # noqa: PLC0415
     from grader.rubrics.schema import schema_text  # noqa: PLC0415
 
-    text = schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))})
-    show(lambda _: text, for_people=False)
+    print_for_programs(schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))}))
     return ALL_MET
 
 
@@ -70,7 +76,7 @@ def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
     from grader.reporting.explained import render_sheet, sheet_to_json  # noqa: PLC0415  as above
 
     exercise = sheet(rubric, key, student)
-    show(lambda _: sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise), for_people=False)
+    print_for_programs(sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise))
     return ALL_MET
 
 
@@ -92,11 +98,11 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 
     found = explain_checks(files) if checks else explain_rubrics(files)
     if as_json:
-        show(lambda _: explanations_to_json(found), for_people=False)
+        print_for_programs(explanations_to_json(found))
     elif checks:
-        show(lambda layout: list_checks(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: list_checks(found, width=layout.width))
     else:
-        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: render_explanations(found, width=layout.width))
     return ALL_MET
 
 
@@ -126,6 +132,7 @@ def _new(  # noqa: PLR0913  one parameter an option
     """
     from grader.app.observe import ObserveRequest  # noqa: PLC0415
     from grader.authoring.starting import new_rubric  # noqa: PLC0415  as above
+    from grader.reporting.escape import shown  # noqa: PLC0415
 
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
@@ -133,14 +140,11 @@ def _new(  # noqa: PLR0913  one parameter an option
         request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
         skeleton = new_rubric(request, progress, id_=id_, sent=sent)
     for remark in skeleton.remarks:
-        click.echo(f"warning: {shown(remark)}", err=True)
+        complain(remark)
     if output is None:
-        show(lambda _: skeleton.text, for_people=False)
+        print_for_programs(skeleton.text)
     else:
-        try:
-            write_whole(output, skeleton.text.encode())
-        except OSError as error:
-            raise GraderError(f"{output}: it cannot be written: {error.strerror or error}") from error
+        write_file(output, skeleton.text.encode())
         rows = "criterion" if skeleton.criteria == 1 else "criteria"
         click.echo(
             f"{shown(str(output))}: {skeleton.criteria} {rows}, all of them met; {skeleton.left_out} in comments"
@@ -194,7 +198,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
     if as_json:
-        show(lambda _: results_to_json(results), for_people=False)
+        print_for_programs(results_to_json(results))
     else:
-        show(lambda page: render_results(results, width=page.width, colour=page.colour), for_people=True)
+        print_for_people(lambda page: render_results(results, width=page.width, colour=page.colour))
     return ALL_MET if all(result.passed for result in results) else NOT_ALL_MET

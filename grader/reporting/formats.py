@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from grader.core.exercise import Audience
-from grader.core.report import Report
-from grader.reporting.audience import ANYBODY, Readers
+if TYPE_CHECKING:
+    from grader.core.report import Report
+    from grader.reporting.audience import Readers
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Format:
 
     renderer: str  # the rendering function: `module:function` in `grader.reporting`
     suffix: str  # file name suffix of this format
-    usual: Audience  # who reads it unless an option says otherwise: students, if a platform shows it to them
+    for_students: bool = False  # whether students read it unless an option says otherwise: a platform shows it to them
     arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing  # computes the renderer's further arguments
     # Whether the renderer itself hides what students must not see yet, because its platform shows it later
     withholds: bool = False
@@ -70,18 +70,18 @@ class Format:
 
 #: Every format of reports, by name.
 FORMATS: dict[str, Format] = {
-    "json": Format("json_report:dumps", ".json", Audience.INSTRUCTOR),
-    "text": Format("text:render_text", ".txt", Audience.INSTRUCTOR, _layout),
-    "html": Format("html.render:render_html", ".html", Audience.INSTRUCTOR, illustrated=True),
-    "markdown": Format("markdown:render_markdown", ".md", Audience.INSTRUCTOR),
-    "junit": Format("junit:render_junit", ".xml", Audience.INSTRUCTOR, _folder),
-    "github": Format("platforms.github:render_github", ".txt", Audience.STUDENT, _folder),
+    "json": Format("json_report:dumps", ".json"),
+    "text": Format("text:render_text", ".txt", arguments=_layout),
+    "html": Format("html.render:render_html", ".html", illustrated=True),
+    "markdown": Format("markdown:render_markdown", ".md"),
+    "junit": Format("junit:render_junit", ".xml", arguments=_folder),
+    "github": Format("platforms.github:render_github", ".txt", for_students=True, arguments=_folder),
     "gradescope": Format(
-        "platforms.gradescope:render_gradescope", ".json", Audience.STUDENT, withholds=True, written_early=True
+        "platforms.gradescope:render_gradescope", ".json", for_students=True, withholds=True, written_early=True
     ),
-    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", Audience.STUDENT),
-    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", Audience.STUDENT, _handed_in),
-    "classroom": Format("platforms.classroom:render_classroom", ".json", Audience.STUDENT),
+    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", for_students=True),
+    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", for_students=True, arguments=_handed_in),
+    "classroom": Format("platforms.classroom:render_classroom", ".json", for_students=True),
 }
 
 
@@ -93,13 +93,14 @@ def check_surroundings(name: str) -> None:
         handed_in(os.environ)
 
 
-def rendered(name: str, report: Report, layout: PageLayout, readers: Readers = ANYBODY) -> str:
+def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) -> str:
     """Return a report in one of `FORMATS`, limited to what its reader may see."""
+    from grader.core.exercise import Audience  # noqa: PLC0415  as above
+    from grader.reporting.audience import for_student  # noqa: PLC0415  as above
+
     format_ = FORMATS[name]
-    if readers.of(format_.usual) is Audience.INSTRUCTOR:
+    if readers.of(Audience.STUDENT if format_.for_students else Audience.INSTRUCTOR) is Audience.INSTRUCTOR:
         return format_(report, layout)
     if format_.withholds:
         return format_(report, layout, day=readers.day)
-    from grader.reporting.audience import for_student  # noqa: PLC0415  as above
-
     return format_(for_student(report, readers.day), layout)
