@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 from rich.text import Text
@@ -158,13 +158,13 @@ def checkup_to_json(checkup: Checkup) -> str:
         "facts": _facts(checkup.facts),
         "exchange": None if checkup.exchange is None else _exchange_json(checkup.exchange),
         "tiers": [_tier_json(tier) for tier in checkup.tiers],
-        "limits": {field.name: getattr(checkup.limits, field.name) for field in fields(checkup.limits)},
+        "limits": asdict(checkup.limits),
     }
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
 def _facts(facts: Sequence[Fact]) -> list[dict[str, Any]]:
-    return [{"name": f.name, "value": f.value, "fits": f.fits, "remedy": f.remedy or None} for f in facts]
+    return [{**asdict(fact), "remedy": fact.remedy or None} for fact in facts]
 
 
 def _exchange_json(exchange: Exchange) -> dict[str, Any]:
@@ -185,8 +185,5 @@ def _tier_json(tier: TierReport) -> dict[str, Any]:
         "usable": tier.usable,
         "why": tier.why or None,
         "remedy": tier.remedy or None,
-        "properties": [
-            {"name": p.name, "holds": p.holds, "mechanism": p.mechanism, "found": p.found or None}
-            for p in tier.properties
-        ],
+        "properties": [{**asdict(found), "found": found.found or None} for found in tier.properties],
     }

@@ -2,12 +2,12 @@
 
 Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`,
 `without_workflow_commands`. Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML:
-`html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
+`script_json`; templates escape the rest. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`,
+`command_line`.
 """
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import re
@@ -166,11 +166,6 @@ def mermaid_label(text: str, *, limit: int = LIMIT) -> str:
     """Return foreign text for a double-quoted label in a Mermaid diagram."""
     signs = frozenset(string.punctuation) - frozenset("/_.,-")
     return "".join(f"#{ord(sign)};" if sign in signs else sign for sign in shown(text, limit=limit))
-
-
-def html_text(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text for an HTML element or a quoted attribute; line breaks stay."""
-    return html.escape(shown_lines(text, limit=limit), quote=True)
 
 
 def script_json(value: object) -> str:

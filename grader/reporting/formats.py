@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -32,14 +33,12 @@ def _layout(report: Report, layout: PageLayout) -> Mapping[str, Any]:
 
 
 def _folder(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    from grader.reporting.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
-
     del layout
     return {"folder": repository_folder(report.path, os.environ)}
 
 
 def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
+    from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
 
     del report, layout
     return {"handed_in": handed_in(os.environ)}
@@ -88,7 +87,7 @@ FORMATS: dict[str, Format] = {
 def check_surroundings(name: str) -> None:
     """Raise GraderError if the environment lacks a value that a format needs."""
     if FORMATS[name].arguments is _handed_in:
-        from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
+        from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
 
         handed_in(os.environ)
 
@@ -104,3 +103,24 @@ def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) ->
     if format_.withholds:
         return format_(report, layout, day=readers.day)
     return format_(for_student(report, readers.day), layout)
+
+
+def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
+    """Return a submission's folder in its repository, POSIX form, empty for the root; None outside of one.
+
+    The repository is the workspace of a GitHub job, else the nearest parent folder with a `.git`, else this folder.
+    """
+    source = Path(os.path.realpath(path))
+    folder = source if source.is_dir() else source.parent
+    if not source.is_dir() and source.suffix != ".py":
+        return None  # files inside an archive are not in the repository
+    workspace = environment.get("GITHUB_WORKSPACE")
+    root = Path(os.path.realpath(workspace)) if workspace else _nearest_checkout(folder)
+    if not folder.is_relative_to(root):
+        return None
+    relative = PurePosixPath(folder.relative_to(root)).as_posix()
+    return "" if relative == "." else relative
+
+
+def _nearest_checkout(folder: Path) -> Path:
+    return next((f for f in (folder, *folder.parents) if (f / ".git").exists()), Path(os.path.realpath(".")))

@@ -128,6 +128,15 @@ def ending(report: Report) -> list[str]:
     return [*rows, f"reproduce: {' '.join(command(report))}"] if report.reproduce.command else rows
 
 
+def whole_output(report: Report) -> str:
+    """Return everything that belongs to no criterion, for a platform that shows it beside them."""
+    lines = [*opening(report), run_line(report)]
+    for exercise in report.exercises:
+        said = remarks(exercise)
+        lines += ["", exercise_line(exercise), *said] if said else []
+    return "\n".join([*lines, "", *ending(report)])
+
+
 def _capped(lines: list[str], most: int, what: str) -> list[str]:
     left_out = len(lines) - most
     return [*lines[:most], f"and {left_out} more {what}; all are in the JSON report"] if left_out > 0 else lines

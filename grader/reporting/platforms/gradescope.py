@@ -29,7 +29,7 @@ def render_gradescope(report: Report, *, day: str | None = None) -> str:
         {
             "score": json_value(report.score),
             "execution_time": json_value(round(report.duration_s, 3)),
-            "output": "\n".join(_output(seen)),
+            "output": wording.whole_output(seen),
             "output_format": "text",
             "visibility": _VISIBLE,
             "stdout_visibility": _HIDDEN,
@@ -43,14 +43,6 @@ def render_gradescope(report: Report, *, day: str | None = None) -> str:
             },
         }
     )
-
-
-def _output(report: Report) -> list[str]:
-    lines = [*wording.opening(report), wording.run_line(report)]
-    for exercise in report.exercises:
-        remarks = wording.remarks(exercise)
-        lines += ["", wording.exercise_line(exercise), *remarks] if remarks else []
-    return [*lines, "", *wording.ending(report)]
 
 
 def _tests(report: Report, seen: Report) -> list[dict[str, Any]]:

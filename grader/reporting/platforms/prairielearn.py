@@ -36,17 +36,9 @@ def _results(report: Report) -> dict[str, Any]:
         "gradable": report.final,
         "score": json_value(share),
         "message": " ".join([wording.headline(report), *wording.warnings(report)]),
-        "output": "\n".join(_lines(report)),
+        "output": wording.whole_output(report),
         "tests": [_test(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts],
     }
-
-
-def _lines(report: Report) -> list[str]:
-    lines = [*wording.opening(report), wording.run_line(report)]
-    for exercise in report.exercises:
-        remarks = wording.remarks(exercise)
-        lines += ["", wording.exercise_line(exercise), *remarks] if remarks else []
-    return [*lines, "", *wording.ending(report)]
 
 
 def _test(exercise: ExerciseReport, verdict: Verdict) -> dict[str, Any]:
