@@ -1,4 +1,4 @@
-"""Grades one submission from end to end."""
+"""Grades one submission from end to end, and keeps its recordings as evidence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 import grader
-from grader.app.request import GradeRequest, reproduction
+from grader.app.request import GradeRequest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
@@ -22,11 +22,13 @@ from grader.core.scenario import OdometryStream
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
+from grader.execution.evidence.store import check_place, keep
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
+from grader.reporting.json_report import dumps
 from grader.rubrics.builtin import builtin_headers, builtin_odometry, require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
@@ -66,6 +68,33 @@ class EarlyReports:
             duration_s = self._run.duration_s + time.perf_counter() - self._started
             run = replace(self._run, traces=dict(self._traces), duration_s=duration_s)
             self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
+
+
+class EvidenceWriter:
+    """Remembers a run while it is graded, and writes it after its report has been delivered.
+
+    The folders are checked right away, because grading takes long; raises EvidenceError if one cannot be written to.
+    """
+
+    def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:
+        for folder in folders:
+            check_place(folder)
+        self._folders = folders
+        self._request = request
+        self._recorded: tuple[Run, Sequence[Exercise]] | None = None
+
+    def remember(self, run: Run, exercises: Sequence[Exercise]) -> None:
+        """Remember a complete run and the exercises it was recorded for."""
+        self._recorded = (run, exercises)
+
+    def write(self, report: Report) -> None:
+        """Write the run and its report; raises EvidenceError if that fails."""
+        if self._recorded is None or not self._folders:
+            return
+        run, exercises = self._recorded
+        for folder in self._folders:
+            asked = request_to_json(self._request, exercises)
+            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
 class Progress(Protocol):

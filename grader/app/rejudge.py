@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from grader.app.evidence_writer import request_of
 from grader.app.exit_codes import UNUSABLE, exit_code
 from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest, command_words
+from grader.app.request import GradeRequest, command_words, request_of
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import Report

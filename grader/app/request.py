@@ -1,4 +1,4 @@
-"""A request to grade a submission, and the command that reproduces its result."""
+"""A request to grade a submission, as JSON in evidence, and as the command that reproduces its result."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from grader.app.seeds import PRACTICE, SeedKey
-from grader.core.exercise import Exercise
+from grader.core.exercise import Drawn, Exercise
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import Reproduction
 from grader.execution.bag import Odometry
-from grader.rubrics.variants import Draw
+from grader.rubrics.variants import Draw, Recorded
 from grader.submissions.collected import Collected
 
 
@@ -92,3 +93,33 @@ def recording_digest(odometry: Odometry) -> str:
 def _unambiguous_path(path: str) -> str:
     """Return a path that cannot be mistaken for an option or a subcommand."""
     return path if os.sep in path or path in (".", "..") else os.path.join(".", path)  # noqa: PTH118  a bare ./
+
+
+def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> dict[str, Any]:
+    """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
+    return {
+        "exercises": list(request.exercises),
+        "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
+        "clock": request.clock,
+        "isolation": request.isolation,
+        "student": request.student,
+        "variant_key": None if request.variant_key is None else str(request.variant_key),
+        "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
+    }
+
+
+def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
+    """Return the request that would record a kept run again and judge it by these rubrics."""
+    bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
+    return GradeRequest(
+        submission=submission,
+        exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
+        rubrics=rubrics,
+        seed=seed,
+        odom_bag=Path(str(bag)) if bag is not None else None,
+        clock=str(data.get("clock", "auto")),
+        isolation=str(data.get("isolation", "auto")),
+        student=student,
+        variant_key=None if key is None else Path(str(key)),
+        draw=Recorded(Drawn(student, data.get("variants", {}))),
+    )

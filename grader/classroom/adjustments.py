@@ -90,22 +90,23 @@ def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adju
     )
 
 
-class _Late(BaseModel):
+class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Late(_Strict):
     per_day: str
     at_most: str | None = None
 
 
-class _Student(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _Student(_Strict):
     days_late: Annotated[float, Field(ge=0, le=3650, allow_inf_nan=False, strict=False)] = 0.0
     score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
     reason: _Reason | None = None
     ignore: _Reason | None = None
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _File(_Strict):
     late: _Late | None = None
     students: dict[str, _Student] = {}
 

@@ -22,11 +22,18 @@ from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
 from grader.classroom.class_page import RunOfClass, folders_of, title_of
 from grader.classroom.gradebook import Gradebook, ReportData, Row, decisions_for, make_gradebook
-from grader.classroom.grading import ClassRun, own_conditions, refuse_without_key, with_known_students
+from grader.classroom.grading import (
+    ClassRequest,
+    ClassRun,
+    digest_of,
+    due_now,
+    own_conditions,
+    refuse_without_key,
+    with_known_students,
+)
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
 from grader.classroom.outputs import CLASS, Graded, class_files, exports, summary_json
-from grader.classroom.request import ClassRequest, digest_of, due_now
 from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.store import SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher

@@ -33,6 +33,7 @@ from grader.submissions.collected import collision, is_skipped, listed, name_pro
 
 #: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")
+#: The layouts that can be requested.
 FOLDERS, AUTO = "folders", "auto"
 GITHUB, CLASSROOM50 = "github-classroom", "classroom50"
 MOODLE, CANVAS = "moodle", "canvas"
@@ -41,8 +42,6 @@ PATTERNS: Mapping[str, str] = {
     MOODLE: r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?",
     CANVAS: r"(?P<name>[^_]+)_(?:(?P<late>LATE)_)?(?P<id>\d+)_\d+_(?P<file>.+)",
 }
-#: All layouts that can be requested.
-LAYOUTS = (AUTO, FOLDERS, GITHUB, CLASSROOM50, MOODLE, CANVAS)
 # Canvas appends a number to the name of a resubmitted file.
 _HANDED_IN_AGAIN = re.compile(r"-\d+(?=\.[^.]+$)")
 _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
@@ -62,7 +61,7 @@ class Named:
 class DownloadLayout:
     """How the entries of one download are named."""
 
-    name: str  # one of `LAYOUTS`, or `pattern`
+    name: str  # one of the layouts above, or `pattern`
     # Regular expression for names; None if the name identifies the student by itself
     pattern: re.Pattern[str] | None = None
     prefix: str = ""  # prefix of the user name in the names of cloned repositories
@@ -87,8 +86,7 @@ class DownloadLayout:
 def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
     """Determine the layout of a download from the names in its top folder, `place`.
 
-    A regular expression of the user overrides the layout that is wanted, one of `LAYOUTS`; raises ClassError if it
-    cannot be used.
+    A regular expression of the user overrides the layout that is wanted; raises ClassError if it cannot be used.
     """
     if pattern:
         return DownloadLayout("pattern", _compiled(pattern))

@@ -80,6 +80,8 @@ class ClassScheduler(Protocol):
 MakeScheduler = Callable[[int], ClassScheduler]
 
 
+#: The hint of a failure.
+AGAIN = "run the same command again"
 #: Longest line read from a process.
 _LINE_BYTES = 1 << 20
 WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
@@ -122,7 +124,7 @@ class LocalScheduler:
         try:
             process = self._start()
         except OSError as error:
-            return _failed(task, f"the grader cannot be started: {error.strerror}")
+            return failed(task, f"the grader cannot be started: {error.strerror}")
         overdue = threading.Event()
 
         def give_up() -> None:
@@ -140,8 +142,8 @@ class LocalScheduler:
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():
-            return _failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
-        return _failed(task, f"the grader ended without a result (exit code {process.returncode})")
+            return failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return failed(task, f"the grader ended without a result (exit code {process.returncode})")
 
     def _start(self) -> subprocess.Popen[bytes]:
         root = str(Path(__file__).resolve().parents[2])
@@ -212,5 +214,6 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def _failed(task: Task, problem: str) -> Attempt:
-    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, "run the same command again"))
+def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+    """Build a failed attempt, which is never the student's fault."""
+    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))

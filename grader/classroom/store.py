@@ -17,7 +17,7 @@ from pathlib import Path
 import msgspec
 
 from grader.app.spot_checks import is_drawn
-from grader.core.errors import ClassError, GraderError, HarnessError
+from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Drawn
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.delivery import write_whole
@@ -261,6 +261,12 @@ class Conditions:
             depends_on["spot_check"] = True
         text = json.dumps(depends_on, sort_keys=True)
         return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def refused(label: str, conditions: Conditions, error: SubmissionError) -> ResultStatus:
+    """Return the status of a submission that cannot be used."""
+    digest = unusable_digest(error)
+    return ResultStatus(State.REFUSED, conditions.key(digest), digest, label, error.message, error.hint)
 
 
 def unusable_digest(error: GraderError) -> str:

@@ -119,8 +119,8 @@ def command(  # noqa: PLR0913  one parameter an option
         require("--similarity", "copydetect", "similarity")
     from grader.app.request import GradeRequest  # noqa: PLC0415  as above
     from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
+    from grader.classroom.grading import ClassRequest  # noqa: PLC0415  as above
     from grader.classroom.outputs import platforms, render_summary, summary_json  # noqa: PLC0415  as above
-    from grader.classroom.request import ClassRequest  # noqa: PLC0415  as above
     from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
     from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
     from grader.similarity.finding import read_given  # noqa: PLC0415  as above

@@ -163,10 +163,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     for_whom = readers(audience, as_of)
-    from grader.app import (  # noqa: PLC0415  the rest of the grader, which mistakes do not need
-        evidence_writer,
-        grade,
-    )
+    from grader.app import grade  # noqa: PLC0415  the rest of the grader, which mistakes do not need
     from grader.app.request import GradeRequest  # noqa: PLC0415  as above
     from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
     from grader.core.checkup import missing  # noqa: PLC0415  as above
@@ -191,7 +188,7 @@ def _grade(  # noqa: PLR0913  one parameter an option
         draw=drawn_by(student, variant_key),
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
-    writer = evidence_writer.EvidenceWriter(folders, request)
+    writer = grade.EvidenceWriter(folders, request)
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
         report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)

@@ -16,7 +16,7 @@ from distributed import Worker, get_worker
 
 import grader
 from grader.classroom import store as kept
-from grader.classroom.local import Attempt, LocalScheduler, Task
+from grader.classroom.local import AGAIN, Attempt, LocalScheduler, Task
 from grader.classroom.messages import (
     MAX_ANSWER_BYTES,
     Files,
@@ -34,8 +34,6 @@ from grader.core.errors import EnvironmentFault, GraderError, HarnessError
 from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import TierChoice, choose_isolation
 from grader.execution.temp_dirs import scratch_folder
-
-_AGAIN = "run the same command again"
 
 
 def fitness(isolation: str, machine: str) -> Fitness:
@@ -85,7 +83,7 @@ def _status_with_machine(attempt: Attempt, machine: str) -> ResultStatus:
     return replace(status, problem=f"{machine}: {status.problem}")
 
 
-def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
+def failure(machine: str, problem: str, hint: str = AGAIN) -> JobResult:
     """Build the answer for a failure of this machine, which never counts as a mark."""
     return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
