@@ -25,8 +25,7 @@ from grader.execution.ros_installation import PythonRuntime, RosInstallation, fi
 from grader.execution.sandbox.choose import choose_isolation
 from grader.execution.sandbox.environment import quick_discovery, runtime_environment
 from grader.execution.sandbox.protocol import Limits, StudentProcess
-from grader.execution.sandbox.starting import HOST
-from grader.execution.sandbox.tiers import ISOLATING, isolation_from_name
+from grader.execution.sandbox.tiers import HOST, ISOLATING, isolation_from_name
 
 NODE = """
 import rclpy, os

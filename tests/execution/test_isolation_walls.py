@@ -203,7 +203,7 @@ def test_where_landlock_has_no_say_over_signals_the_filter_has(
     ros: RosInstallation, submission: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Older kernels: a process reaches itself and its group, and nobody else."""
-    monkeypatch.setattr("grader.execution.sandbox.starting.WITH_SIGNALS", 99)
+    monkeypatch.setattr("grader.execution.sandbox.tiers.WITH_SIGNALS", 99)
     found = walls("landlock", ros, submission)
     if isinstance(found, str):
         pytest.skip(found)

@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from grader.core.errors import EnvironmentFault
 from grader.execution.sandbox import seccomp
@@ -36,6 +37,9 @@ SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 class Bubblewrap:
     """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits."""
 
+    shares_network: ClassVar[bool] = False
+    submission_seen_at: ClassVar[str] = str(SUBMISSION)
+    host_seen_at: ClassVar[str] = str(HOST)
     bwrap: Path
     prlimit: Path  # the program of util-linux that sets resource limits
     setpriv: Path  # the program of util-linux that changes the user; used only as root
@@ -64,21 +68,6 @@ class Bubblewrap:
     def name(self) -> str:
         """Short name that reports show."""
         return ROOT_NAME if self.as_root else USER_NAME
-
-    @property
-    def shares_network(self) -> bool:
-        """Each worker has a network of its own."""
-        return False
-
-    @property
-    def submission_seen_at(self) -> str:
-        """Where a student's process sees its submission."""
-        return str(SUBMISSION)
-
-    @property
-    def host_seen_at(self) -> str:
-        """Where a student's process sees the `host` package."""
-        return str(HOST)
 
     def worker_command(
         self,
