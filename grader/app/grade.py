@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -146,9 +146,7 @@ def grade(
             duration_s=time.perf_counter() - started,
             notes=(
                 *submission.notes,
-                *_seed_notes(request),
-                *_release_notes(session.ros.distro),
-                *_isolation_notes(session),
+                *_notes(request, session),
             ),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
@@ -241,24 +239,17 @@ def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) ->
     return stage_submission(request.submission, wanted, root)
 
 
-def _seed_notes(request: GradeRequest) -> tuple[str, ...]:
-    """Note that students could have predicted the drawn values, if they could."""
-    return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
-
-
-def _release_notes(distro: str) -> tuple[str, ...]:
-    """Note that the grader was never tested with this ROS release, if so."""
-    if distro in TRIED:
-        return ()
-    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
-
-
-def _isolation_notes(session: RecordingSession) -> tuple[str, ...]:
-    """Note that the submission ran without a sandbox, or which properties its sandbox lacks."""
-    if session.isolation.name == NO_ISOLATION:
-        return ("the submission ran without a sandbox: as asked",)
+def _notes(request: GradeRequest, session: RecordingSession) -> Iterator[str]:
+    """Yield what readers must know of the seed, the release and the sandbox."""
+    if request.seed is None and request.seed_key.public:
+        yield PRACTICE_NOTE
+    if session.ros.distro not in TRIED:
+        yield f"ROS 2 {session.ros.distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}"
     lacking = [str(found) for found in session.containment if not found.holds]
-    return (f"sandbox {session.isolation.name}: {'; '.join(lacking)}",) if lacking else ()
+    if session.isolation.name == NO_ISOLATION:
+        yield "the submission ran without a sandbox: as asked"
+    elif lacking:
+        yield f"sandbox {session.isolation.name}: {'; '.join(lacking)}"
 
 
 def _environment(session: RecordingSession) -> Environment:

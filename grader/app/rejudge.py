@@ -21,8 +21,8 @@ from grader.core.report import Report
 from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
 from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
-from grader.reporting.delivery import Output, write_whole
-from grader.reporting.formats import FORMATS, PageLayout, rendered
+from grader.reporting.delivery import Output, write_report
+from grader.reporting.formats import FORMATS
 from grader.reporting.json_report import dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.variants import First
@@ -31,7 +31,6 @@ from grader.rubrics.variants import First
 WORTH_A_POOL = 16
 #: Thresholds of the garbage collector while many recordings are read.
 COLLECTING = (200_000, 20, 20)
-_WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +169,7 @@ def _write(name: str, report: Report, wanted: Wanted) -> None:
         if output.path is not None:
             path = output.path / f"{name}{FORMATS[output.format].suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
-            text = rendered(output.format, report, PageLayout(_WIDTH, colour=False), wanted.readers)
-            write_whole(path, text.encode())
+            write_report(report, Output(output.format, path), wanted.readers)
 
 
 def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:

@@ -10,7 +10,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
-from grader.classroom.roster import Person, fold_name
+from grader.classroom.roster import fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
@@ -159,11 +159,7 @@ def _name(row: Row) -> str:
 def _also(row: Row) -> Iterator[str]:
     yield row.name
     if row.person is not None:
-        yield from _roster_ids(row.person)
-
-
-def _roster_ids(person: Person) -> tuple[str, ...]:
-    return (person.user, person.id, person.email if person.row is not None else "")
+        yield from (row.person.user, row.person.id, row.person.email if row.person.row is not None else "")
 
 
 def _adjustments(row: Row) -> Iterator[str]:

@@ -276,14 +276,11 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
 def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
     by_exercise = {e["id"]: e for e in _exercises(report)}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
+    decided = {pair: criterion for pair, criterion in found.items() if criterion["outcome"] != "undecided"}
     return [
         *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
-        *("" if pair not in found or _is_undecided(found[pair]) else number(found[pair]["score"]) for pair in criteria),
+        *(number(decided[pair]["score"]) if pair in decided else "" for pair in criteria),
     ]
-
-
-def _is_undecided(criterion: Mapping[str, Any]) -> bool:
-    return bool(criterion["outcome"] == "undecided")
 
 
 def _exercises(report: ReportData | None) -> Sequence[Mapping[str, Any]]:

@@ -22,7 +22,7 @@ from grader.classroom.watching import Watcher
 from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
 from grader.execution.supervisor import MARGIN_S, TRIES
-from grader.reporting.html.assets import shared_assets
+from grader.reporting.html.assets import bundle
 from grader.similarity.library import ComparedProgram
 from grader.submissions.submission import stage_submission
 
@@ -131,7 +131,7 @@ class ClassRun:
     def _schedule(
         self, usable: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
     ) -> tuple[str, ...]:
-        for name, data in ({} if self.course.standalone else shared_assets()).items():
+        for name, data in ({} if self.course.standalone else bundle().files).items():
             self.store.write(f"assets/{name}", data)
         cores = len(os.sched_getaffinity(0))
         jobs = self.course.jobs or cores

@@ -201,12 +201,8 @@ def _user(row: Row, users: Users) -> Mapping[str, str] | None:
     exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
     found = [r for r in users.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
     if not found:
-        found = [r for r in users.rows if _named(r, columns) & person.names]
+        found = [r for r in users.rows if person_of(r, columns).names & person.names]
     return found[0] if len(found) == 1 else None
-
-
-def _named(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> frozenset[str]:
-    return person_of(row, columns).names
 
 
 def _possible(gradebook: Users | None, title: str) -> str:

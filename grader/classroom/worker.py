@@ -49,7 +49,7 @@ def main() -> None:
         return
     os.chdir(request["folder"])
     task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
-    status = attempt(task, _step)
+    status = attempt(task, lambda step: _send({"step": step}))
     _send({"done": json.loads(kept.dump(status))})
 
 
@@ -139,10 +139,6 @@ def _usage() -> dict[str, float]:
         "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
         "peak_bytes": 1024 * max(u.ru_maxrss for u in used),
     }
-
-
-def _step(step: str) -> None:
-    _send({"step": step})
 
 
 def _send(message: Mapping[str, Any]) -> None:

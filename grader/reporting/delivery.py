@@ -153,7 +153,7 @@ def _check(output: Output) -> None:
 
 def _delivered(report: Report, output: Output, readers: Readers) -> GraderError | None:
     try:
-        _write(report, output, readers)
+        write_report(report, output, readers)
     except OSError as error:
         return _unwritable(output, error)
     return None
@@ -164,7 +164,8 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
     return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
 
 
-def _write(report: Report, output: Output, readers: Readers) -> None:
+def write_report(report: Report, output: Output, readers: Readers) -> None:
+    """Write a report to its destination; raises OSError if that fails."""
     if output.path is not None:
         text = rendered(output.format, report, PageLayout(_FILE_WIDTH, colour=False), readers)
         write_whole(output.path, text.encode("utf-8"))

@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.text import Text
 
-from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.checkup import NO_WALLS, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, TierReport, missing
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
 from grader.reporting.escape import json_value, shown
@@ -116,8 +116,9 @@ def _matrix(page: Page, checkup: Checkup) -> None:
         page.put(Text(meaning).append(f" ({shown(by)})" if by else "", style=_QUIET), prefix=row, indent=6)
     for tier in tried:
         if tier.name != NO_WALLS:
-            for found in _open(tier):
-                page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
+            for found in tier.properties:
+                if found.found and not found.holds:
+                    page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
 
 
 def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
@@ -129,10 +130,6 @@ def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
 def _mark(tier: TierReport, name: str) -> Text:
     holds = any(found.name == name and found.holds for found in tier.properties)
     return Text(f"{'yes' if holds else 'NO':{_MARK_WIDTH}}", style=_GOOD if holds else _BAD)
-
-
-def _open(tier: TierReport) -> Iterator[Property]:
-    return (found for found in tier.properties if not found.holds and found.found)
 
 
 def _limits(limits: Limits) -> Iterator[tuple[str, str]]:

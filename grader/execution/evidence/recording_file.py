@@ -299,11 +299,9 @@ def trace_at(recording: bytes, at: int, size: int) -> Trace:
     return unpack(data)
 
 
-def trace_of(recording: bytes, *, wire: bool = False) -> Trace:
-    """Read the trace of a recording; with `wire` it includes the bytes of messages, which takes longer."""
+def trace_of(recording: bytes) -> Trace:
+    """Read the trace of a recording with the bytes of its messages."""
     data = packed_trace(recording)
-    if not wire:
-        return unpack(data)
     with _reading():
         messages = make_reader(io.BytesIO(recording)).iter_messages(log_time_order=False)
         cdrs = [message.data for _, _, message in messages]

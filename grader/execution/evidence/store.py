@@ -165,7 +165,7 @@ def _trace(
             raise EvidenceError(f"expected the recording {kept_digest[:_SHOWN]}, found one of {found[:_SHOWN]}")
         if not verify:
             return trace_at(data, recording.at, recording.size)
-        trace = trace_of(data, wire=True)
+        trace = trace_of(data)
         _compare(data, trace, evidence, owner, recording)
     except EvidenceError as error:
         raise EvidenceError(f"{path}: {error.message}", "the file was changed or damaged; grade again") from error

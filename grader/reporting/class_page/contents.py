@@ -150,7 +150,8 @@ def distribution(students: Sequence[StudentRow]) -> Distribution:
     """Return the distribution of the scores that count and are final."""
     counted = [student for student in students if student.counts]
     most = max((s.max_score for s in counted if s.max_score), default=Fraction(0))
-    raw = [s.raw / s.max_score for s in counted if s.raw is not None and s.max_score and _is_final(s)]
+    decided = [s for s in counted if s.report is not None and s.report["final"]]
+    raw = [s.raw / s.max_score for s in decided if s.raw is not None and s.max_score]
     final = [s.final / (s.max_score or most) for s in counted if s.final is not None and (s.max_score or most)]
     in_raw, in_final = Counter(map(_part, raw)), Counter(map(_part, final))
     bins = [_bin(part, in_raw[part], in_final[part]) for part in range(_PARTS + 1)]
@@ -176,10 +177,6 @@ def exercise_counts(reports: Iterable[ReportData]) -> tuple[ExerciseCount, ...]:
         )
         for id_, head in heads.items()
     )
-
-
-def _is_final(student: StudentRow) -> bool:
-    return student.report is not None and bool(student.report["final"])
 
 
 def _part(share: Fraction) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
@@ -28,46 +27,20 @@ from grader.reporting.class_page.contents import (
     exercise_counts,
 )
 from grader.reporting.escape import script_json, shown
-from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
+from grader.reporting.html.assets import Bundle, bundle, page_environment
 
 
 @cache
-def own_script() -> str:
-    """Return the page's own script, which runs after that of the reports."""
-    return _read("assets/class.js")
-
-
-@cache
-def own_style() -> str:
-    """Return the page's own style sheet, which extends that of the reports."""
-    return _read("assets/class.css")
+def own_bundle() -> Bundle:
+    """Return what the page needs besides the bundle of reports, which it extends."""
+    folder = files(__package__) / "assets"
+    script, style = ((folder / name).read_text(encoding="utf-8") for name in ("class.js", "class.css"))
+    return Bundle("class", script, style)
 
 
 def class_assets() -> dict[str, bytes]:
     """Return file name -> content of the files that a page rendered with `assets=...` loads."""
-    return {**shared_assets(), own_name("js"): own_script().encode(), own_name("css"): own_style().encode()}
-
-
-def own_name(ending: str) -> str:
-    """Return the file name of the page's own script or style sheet; it changes with the content."""
-    text = own_script() if ending == "js" else own_style()
-    return f"class-{hashlib.sha256(text.encode()).hexdigest()[:12]}.{ending}"
-
-
-def scripts_policy(*, standalone: bool) -> str:
-    """Return the scripts that the page may run, as a Content-Security-Policy writes them."""
-    if not standalone:
-        return "'self' file:"
-    return f"'{common().script_digest}' '{policy_digest(own_script())}'"
-
-
-def common() -> Bundle:
-    """Return the assets that the page shares with reports."""
-    return bundle()
-
-
-def _read(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return {**bundle().files, **own_bundle().files}
 
 
 #: One letter for each outcome, and one for a criterion that a report lacks.
@@ -133,7 +106,7 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
         spread=spread,
         tiles=_tiles(page, spread),
         outcomes=wording.OUTCOME_WORDS,
-        common=common(),
+        bundles=(bundle(), own_bundle()),
         assets=assets,
         data=Markup(script_json(payload(page, exercises, found, spread))),  # noqa: S704  safe in a script element
     )
@@ -158,10 +131,6 @@ def _template() -> Template:
     templates.filters |= {"points": _points, "percent": _percent}
     templates.globals |= {
         "embedded": Markup,
-        "own_style": own_style,
-        "own_script": own_script,
-        "own_name": own_name,
-        "scripts_policy": scripts_policy,
         "exercise_name": exercise_name,
         "result_link": result_link,
         "page_link": page_link,
@@ -170,7 +139,6 @@ def _template() -> Template:
         "report_page": REPORT_PAGE,
         "report_data": REPORT_DATA,
         "handed_back_page": HANDED_BACK_PAGE,
-        "cause_anchor": _cause_anchor,
     }
     return templates.get_template("class.html")
 
@@ -188,10 +156,6 @@ def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
     scores = [("mean", _percent(found[0])), ("median", _percent(found[1]))] if found else []
     full = [("full score", str(spread.bins[-1].final))] if found else []
     return [*scores, *full, *((status, str(count)) for status, count in standing.most_common())]
-
-
-def _cause_anchor(cause: CommonCause) -> str:
-    return f"{cause.exercise}-{cause.criterion}"
 
 
 def _points(value: Fraction | None) -> str:
