@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 import grader
 from grader.app.request import GradeRequest, reproduction, request_to_json
@@ -37,6 +36,8 @@ from grader.submissions.submission import stage_collected, stage_submission
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
+#: Called at the start of each step with a short phrase such as `exercise 1: alone`.
+Progress = Callable[[str], None]
 
 
 class EarlyReports:
@@ -97,14 +98,6 @@ class EvidenceWriter:
             keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
-class Progress(Protocol):
-    """Called at the start of each step with a short phrase such as `exercise 1: alone`."""
-
-    def __call__(self, step: str) -> None:
-        """Report that a step begins."""
-        ...
-
-
 def grade(
     request: GradeRequest,
     progress: Progress,
@@ -113,17 +106,10 @@ def grade(
     *,
     pictures: bool = True,
 ) -> Report:
-    """Grade one submission.
+    """Grade one submission; raises a GraderError whose class tells who must act.
 
-    Args:
-        request: What to grade, and how.
-        progress: Called at the start of each step.
-        on_recorded: Called with the complete recording and the exercises it was made for.
-        on_partial_report: Called with a partial report whenever one exercise is done and others are not.
-        pictures: Whether the report includes charts, which only some formats show.
-
-    Raises:
-        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
+    The complete recording and its exercises are passed to `on_recorded`; a partial report to `on_partial_report`,
+    whenever one exercise is done and others are not. Pictures are charts, which only some formats show.
     """
     started = time.perf_counter()
     with open_session(request.isolation, request.workers, progress) as session:

@@ -75,17 +75,10 @@ PRACTICE = SeedKey(b"rclpy-grader: the public practice key, for runs that nobody
 
 
 def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.environ) -> SeedKey | None:
-    """Return the seed key from a file or the environment; None if neither has one.
+    """Return the seed key from a file or the environment variable GRADER_SEED_KEY; None if neither has one.
 
-    Removes the variable from the environment, so that no process started later inherits it.
-
-    Args:
-        path: The file given with `--seed-key`; None if not given.
-        environment: May hold `GRADER_SEED_KEY`. An empty value counts as unset, because CI systems set it if the secret
-            does not exist.
-
-    Raises:
-        KeyFileError: The key cannot be used.
+    Removes the variable from the environment, so that no process started later inherits it. An empty value counts as
+    unset, because CI systems set it if the secret does not exist.
     """
     given = environment.pop(VARIABLE, "").strip()
     if path is not None:

@@ -52,12 +52,8 @@ class Attempt:
     status: ResultStatus
 
 
-class OnStep(Protocol):
-    """Called, from any thread, when a step of a submission begins."""
-
-    def __call__(self, name: str, step: str) -> None:
-        """Report the step."""
-        ...
+#: Called with a submission's name and a step of it that begins, from any thread.
+OnStep = Callable[[str, str], None]
 
 
 class ClassScheduler(Protocol):

@@ -10,7 +10,8 @@ from typing import Any
 
 from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
-from grader.classroom.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
+from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle
+from grader.classroom.roster import Table, read_table
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
 from grader.reporting.escape import json_value, shown
@@ -31,8 +32,8 @@ class Platforms:
     """The platforms to export scores to."""
 
     canvas: str = ""  # number of the assignment in Canvas; empty for no export to Canvas
-    canvas_gradebook: Users | None = None  # the gradebook exported from Canvas; None if the roster has the Canvas ids
-    moodle: Users | None = None  # the users exported from Moodle; None for no export to Moodle
+    canvas_gradebook: Table | None = None  # the gradebook exported from Canvas; None if the roster has the Canvas ids
+    moodle: Table | None = None  # the users exported from Moodle; None for no export to Moodle
     gradescope: bool = False  # whether to export to Gradescope
 
 
@@ -40,8 +41,8 @@ def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *
     """Read the tables for the requested platforms; raises ClassError for an unusable table."""
     return Platforms(
         canvas,
-        None if canvas_gradebook is None else read_users(canvas_gradebook),
-        None if moodle is None else read_users(moodle),
+        None if canvas_gradebook is None else read_table(canvas_gradebook),
+        None if moodle is None else read_table(moodle),
         gradescope,
     )
 

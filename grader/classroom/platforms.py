@@ -7,11 +7,10 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from grader.classroom.gradebook import Gradebook, ReportData, Row, number, table, text_cell
-from grader.classroom.roster import Person, columns_of, fold_handle, person_of, read_table
+from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
 from grader.reporting.json_report import json_text
@@ -35,22 +34,7 @@ class Export:
     remark: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Users:
-    """A table of users exported from a platform."""
-
-    path: Path
-    header: tuple[str, ...]
-    rows: tuple[Mapping[str, str], ...]
-
-
-def read_users(path: Path) -> Users:
-    """Read a table of users; raises ClassError if it cannot be read."""
-    header, rows = read_table(path)
-    return Users(path, tuple(header), tuple(rows))
-
-
-def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> Export:
+def export_canvas(book: Gradebook, assignment: str, gradebook: Table | None) -> Export:
     """Export scores for Canvas; raises ClassError if nothing has this number, or nobody has a Canvas id.
 
     The file contains only people with a score and only this one column, so that later changes in Canvas are kept.
@@ -76,7 +60,7 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> 
     return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)), remark)
 
 
-def export_moodle(book: Gradebook, users: Users) -> Export:
+def export_moodle(book: Gradebook, users: Table) -> Export:
     """Export grades and feedback for Moodle's grade import; importing one without the other deletes grades.
 
     People who are not in the table of users are left out, because Moodle rejects a file with an unknown user. Raises
@@ -169,7 +153,7 @@ def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
     return to_export
 
 
-def _canvas_title(assignment: str, gradebook: Users | None) -> str:
+def _canvas_title(assignment: str, gradebook: Table | None) -> str:
     """Return the header of the assignment's column; Canvas identifies it by the number in parentheses."""
     number_ = re.fullmatch(r"(?:.*\()?(\d+)\)?", assignment.strip(), re.DOTALL)
     if number_ is None:
@@ -183,7 +167,7 @@ def _canvas_title(assignment: str, gradebook: Users | None) -> str:
     return title
 
 
-def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
+def _canvas_row(row: Row, gradebook: Table | None) -> Mapping[str, str] | None:
     """Return a person's row in the Canvas gradebook, or on the roster if there is no gradebook."""
     if gradebook is not None:
         return _user(row, gradebook)
@@ -191,7 +175,7 @@ def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
     return person.row if person is not None else None
 
 
-def _user(row: Row, users: Users) -> Mapping[str, str] | None:
+def _user(row: Row, users: Table) -> Mapping[str, str] | None:
     """Find the row of a person by unique ids, then by name; None unless exactly one row matches."""
     columns = columns_of(users.header)
     person = row.person
@@ -205,7 +189,7 @@ def _user(row: Row, users: Users) -> Mapping[str, str] | None:
     return found[0] if len(found) == 1 else None
 
 
-def _possible(gradebook: Users | None, title: str) -> str:
+def _possible(gradebook: Table | None, title: str) -> str:
     """Return the possible points of an assignment in Canvas; empty if unknown."""
     for row in gradebook.rows if gradebook is not None else ():
         if next(iter(row.values())).strip().casefold() == _POSSIBLE:

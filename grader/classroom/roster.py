@@ -60,7 +60,16 @@ def fold_name(text: str) -> str:
     return "".join(c for c in plain if c.isalnum())
 
 
-def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table that a platform exported."""
+
+    path: Path
+    header: Sequence[str]
+    rows: Sequence[Mapping[str, str]]  # column -> value
+
+
+def read_table(path: Path) -> Table:
     """Read header and rows of a CSV file separated by commas, semicolons or tabs; raises ClassError if it has none."""
     text = _text(path)
     first = text.split("\n", 1)[0]
@@ -75,7 +84,7 @@ def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
     if len(rows) > MAX_ROWS:
         raise ClassError(f"{path}: expected at most {MAX_ROWS} rows, found more")
     header = rows[0]
-    return header, [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]]
+    return Table(path, header, [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]])
 
 
 def read_roster(path: Path) -> list[Person]:
@@ -83,13 +92,13 @@ def read_roster(path: Path) -> list[Person]:
 
     Raises ClassError if the file cannot be read, or no column identifies people.
     """
-    header, rows = read_table(path)
-    columns = columns_of(header)
+    table = read_table(path)
+    columns = columns_of(table.header)
     if not columns:
         known = listed([names[0] for names in COLUMNS.values()])
-        found = listed([shown(name, 30) for name in header[:6]], "and")
+        found = listed([shown(name, 30) for name in table.header[:6]], "and")
         raise ClassError(f"{path}:1: expected a column {known}, found {found}", "name the columns in the first line")
-    return [person for row in rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
+    return [person for row in table.rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
 
 
 def columns_of(header: Sequence[str]) -> dict[str, list[str]]:

@@ -270,8 +270,5 @@ def _in_bash_quotes(character: str) -> str:
     if character.isprintable():
         return character
     # Bytes that are not UTF-8 arrive as lone surrogates; other surrogates are written as they are.
-    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", _surrogates(character)))
-
-
-def _surrogates(character: str) -> str:
-    return "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"
+    surrogates = "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"
+    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", surrogates))

@@ -38,7 +38,9 @@ def _lines(summary: Summary) -> Iterator[str]:
     if summary.graph is not None and len(summary.graph.nodes) > 1:
         yield from _section("Graph", draw_graph(summary.graph, width=WIDTH))
     yield from _section("Log records", _cut(_record(r) for r in summary.records))
-    yield from _section("Other output", _cut(_line(o) for o in summary.lines))
+    yield from _section(
+        "Other output", _cut(f"t = {seconds(o.t_ns):.3f} s {o.stream}: {shown(o.text)}" for o in summary.lines)
+    )
     yield from _section("Faults", (line for fault in summary.faults for line in _fault(fault)))
     yield f"isolation {shown(summary.isolation)}"
 
@@ -96,10 +98,6 @@ def _cut(lines: Iterator[str]) -> list[str]:
 
 def _record(record: LogRecord) -> str:
     return f"t = {seconds(record.t_ns):.3f} s [{shown(record.severity)}] [{shown(record.logger)}]: {shown(record.text)}"
-
-
-def _line(line: OutputLine) -> str:
-    return f"t = {seconds(line.t_ns):.3f} s {line.stream}: {shown(line.text)}"
 
 
 def _fault(fault: Fault) -> Iterator[str]:

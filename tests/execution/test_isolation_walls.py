@@ -17,9 +17,10 @@ from sandboxes import HOST, Sandbox, close, make_submission, start, walls
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.limits import Limits
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox import seccomp as seccomp_flat
-from grader.execution.sandbox.protocol import Limits, StudentProcess
+from grader.execution.sandbox.protocol import StudentProcess
 from grader.execution.sandbox.start import OUTGROWN, SPARE
 from grader.execution.sandbox.tiers import Landlock
 

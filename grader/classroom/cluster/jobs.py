@@ -42,6 +42,8 @@ def fitness(isolation: str, machine: str) -> Fitness:
         choice = choose_isolation(isolation, find_ros())
     except EnvironmentFault as fault:
         return Fitness(machine, fault.message, fault.hint)
+    except Exception as error:  # any failure makes this machine unfit, but not the others
+        return Fitness(machine, f"the grader failed: {type(error).__name__}: {error}")
     name = choice.isolation.name
     remarks = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
     if _one_at_a_time(choice):
@@ -163,7 +165,7 @@ class _UnwantedError(Exception):
 
 async def inspect(isolation: str, dask_worker: Worker) -> bytes:
     """Report whether this worker can grade, as a packed `Fitness`; Dask supplies it because of the parameter's name."""
-    return pack(await asyncio.to_thread(_fitness, isolation, _machine(dask_worker)))
+    return pack(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
 
 
 def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
@@ -202,13 +204,6 @@ def other_version(wanted: str, found: str) -> str:
 def remedy(version: str) -> str:
     """Return the hint that fixes a wrong version."""
     return f"install it there: pip install 'rclpy-grader[dask]=={version}'"
-
-
-def _fitness(isolation: str, machine: str) -> Fitness:
-    try:
-        return fitness(isolation, machine)
-    except Exception as error:  # any failure makes this machine unfit, but not the others
-        return Fitness(machine, f"the grader failed: {type(error).__name__}: {error}")
 
 
 def _machine(worker: Worker) -> str:

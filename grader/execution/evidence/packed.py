@@ -106,11 +106,8 @@ def _lively(value: Any) -> Any:
 def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: Any) -> Any:
     """Create the struct that validates a packed dataclass: a list of its fields, after its tag if it has one.
 
-    Args:
-        kind: The dataclass.
-        left_out: Fields that are not written, or written in another way.
-        last: Name, type and default of an optional field at the end.
-        others: Types of fields that are written as another type.
+    Fields are left out that are not written, or written in another way; others are written as another type. The last
+    one is name, type and default of an optional field at the end.
     """
     hints = {**get_type_hints(kind), **others}
     fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]

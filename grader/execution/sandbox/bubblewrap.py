@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from grader.core.errors import EnvironmentFault
+from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp
 from grader.execution.sandbox.environment import student_environment
 from grader.execution.sandbox.exposure import (
@@ -24,7 +25,7 @@ from grader.execution.sandbox.exposure import (
     view_of,
 )
 from grader.execution.sandbox.properties import install_command
-from grader.execution.sandbox.protocol import Command, Limits, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import Command, StudentProcess, WorkerView
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
 SUBMISSION = Path("/submission")

@@ -33,16 +33,10 @@ def _silent(step: str) -> None:
 
 
 def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
-    """Choose the tier to record in.
+    """Choose the tier to record in; raises EnvironmentFault, with a fix as its hint, if it does not work here.
 
-    Args:
-        wanted: `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
-            tier, which must have the properties that it promises.
-        ros: The ROS installation that students' processes will use.
-        progress: Called with a message when a sandbox is tested, and why the last result cannot be used.
-
-    Raises:
-        EnvironmentFault: The requested tier does not exist or does not work here, or no tier does; the hint is a fix.
+    Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
+    tier, which must have the properties that it promises. When a sandbox is tested, `progress` is told why.
     """
     if wanted == NO_WALLS:
         return TierChoice(isolation_from_name(wanted))

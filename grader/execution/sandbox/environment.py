@@ -32,12 +32,9 @@ FEW_RESOURCES: Mapping[str, str] = {
 
 
 def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
-    """Return the variable that names a Fast DDS profile.
+    """Return the variable that names a Fast DDS profile in a folder, as the process sees it.
 
-    Args:
-        folder: The folder at which the process sees the profiles.
-        name: `NAME.xml` is the profile for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
-        distro: ROS release, e.g. `jazzy`.
+    `NAME.xml` is the profile for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
     """
     if release_of(distro).fast_dds == 2:
         return {"FASTRTPS_DEFAULT_PROFILES_FILE": f"{folder}/{name}.xml"}

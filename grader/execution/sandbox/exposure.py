@@ -99,11 +99,8 @@ TAKEN = Path("/run/rclpy-grader.users")
 class StudentUsers:
     """Allocates users for student processes, each to one process on this machine.
 
-    A user stays allocated until the process that requested it ends. Without a file of locks, users are random, and two
-    processes are only unlikely to get the same one.
-
-    Args:
-        taken: The file of locks, created if it does not exist.
+    A user stays allocated until the process that requested it ends. Without a file of locks, which is created if it
+    does not exist, users are random, and two processes are only unlikely to get the same one.
     """
 
     def __init__(self, taken: Path) -> None:

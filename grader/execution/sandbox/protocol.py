@@ -10,14 +10,6 @@ from typing import Protocol
 from grader.core.limits import Limits
 from grader.execution.ros_installation import PythonRuntime
 
-__all__ = [
-    "Command",
-    "Isolation",
-    "Limits",
-    "StudentProcess",
-    "WorkerView",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class StudentProcess:

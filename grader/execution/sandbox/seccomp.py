@@ -165,11 +165,7 @@ def supports(machine: str) -> bool:
 def student_filter(machine: str | None = None) -> bytes:
     """Return the filter for student processes in namespaces of their own, an array of `struct sock_filter`.
 
-    Args:
-        machine: Architecture as `platform.machine()` names it; the running one if None.
-
-    Raises:
-        KeyError: No filter is known for the architecture; ask `supports` first.
+    Without a machine it is for the running one. Raises KeyError for an unknown architecture; ask `supports` first.
     """
     return assembled(NUMBERS, ARGUMENT_RULES, machine or platform.machine())
 
@@ -309,11 +305,9 @@ SIGNAL_RULES = (
 
 
 def flat_filter(*, signals: bool, machine: str | None = None) -> bytes:
-    """Return the filter, an array of `struct sock_filter`.
+    """Return the filter for student processes without namespaces; `signals` to other processes are refused if asked.
 
-    Args:
-        signals: Whether to refuse signals to other processes; `start.load_filter` then fills in the own number.
-        machine: Architecture as `platform.machine()` names it; the running one if None.
+    `start.load_filter` then fills in the own number.
     """
     numbers = {**FLAT_NUMBERS, **(SIGNAL_NUMBERS if signals else {})}
     return assembled(numbers, (*FLAT_RULES, *(SIGNAL_RULES if signals else ())), machine or platform.machine())

@@ -188,13 +188,9 @@ def entries(folder: str) -> Iterator[os.DirEntry[str]]:
 
 
 def become(system: Any, user: int, group: int, *, reach: bool) -> None:
-    """Change to another user without privileges.
+    """Change to another user with a single group, without privileges.
 
-    Args:
-        system: The C library.
-        user: User id.
-        group: Id of its only group.
-        reach: Whether to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
+    To `reach` is to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
     """
     for capability in range(LAST_CAPABILITY + 1):
         if capability != CAP_DAC_READ_SEARCH or not reach:
