@@ -79,7 +79,8 @@ def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     name = check_name(criterion)
-    manual = manual_of(type(criterion.check))
+    kind: type = type(criterion.check)
+    manual = manual_of(kind)
     return CriterionExplanation(
         id=criterion.id,
         title=criterion.title,
@@ -92,7 +93,7 @@ def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation
         check=name,
         asks=manual.summary,
         details=manual.details,
-        parameters=tuple(_parameter(f, type(criterion.check), manual, criterion.check) for f in _fields(criterion)),
+        parameters=tuple(_parameter(f, kind, manual, criterion.check) for f in fields(kind)),
     )
 
 
@@ -100,10 +101,6 @@ def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     manual = manual_of(kind)
     parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
-
-
-def _fields(criterion: Criterion) -> tuple[Field[Any], ...]:
-    return fields(criterion.check)  # type: ignore[arg-type]  # checks are dataclasses
 
 
 def _parameter(field: Field[Any], kind: type, manual: Manual, check: object | None) -> Parameter:

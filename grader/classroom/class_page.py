@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-from grader.classroom.gradebook import Gradebook, Row, Status, exactly, number, remarks
+from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
 from grader.classroom.roster import fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
@@ -246,7 +246,7 @@ def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:
 
 
 def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
-    for exercise in _exercises(row):
+    for exercise in exercises_of(row.report):
         for criterion in exercise["criteria"]:
             if criterion["outcome"] == "undecided":
                 said = without_folders(str(criterion["reason"]), run.folders)
@@ -260,17 +260,13 @@ def _problem(row: Row, run: RunOfClass) -> str:
 
 
 def _faults(index: int, row: Row) -> Iterator[PageEntry]:
-    for exercise in _exercises(row):
+    for exercise in exercises_of(row.report):
         for fault in exercise.get("faults", ()):
             where = f"{fault['file']}:{fault['line']}" if fault["line"] else fault["file"] or "a node"
             what = _ENDED.get(fault["kind"], str(fault["kind"]).replace("_", " "))
             when = f" at t = {fault['t_s']:.3f} s" if fault["t_s"] else ""
             text = str(fault["text"]).strip().rsplit("\n", 1)[-1]
             yield PageEntry(f"{where}: {what}{when}: {text}", index, str(exercise["id"]))
-
-
-def _exercises(row: Row) -> Sequence[Mapping[str, Any]]:
-    return () if row.report is None else row.report["exercises"]
 
 
 def without_folders(text: str, folders: Sequence[str]) -> str:

@@ -267,14 +267,14 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
     exercises: dict[str, None] = {}
     criteria: dict[tuple[str, str], None] = {}
     for row in rows:
-        for exercise in _exercises(row.report):
+        for exercise in exercises_of(row.report):
             exercises[exercise["id"]] = None
             criteria.update({(exercise["id"], criterion["id"]): None for criterion in exercise["criteria"]})
     return list(exercises), sorted(criteria, key=lambda pair: list(exercises).index(pair[0]))
 
 
 def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
-    by_exercise = {e["id"]: e for e in _exercises(report)}
+    by_exercise = {e["id"]: e for e in exercises_of(report)}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
     decided = {pair: criterion for pair, criterion in found.items() if criterion["outcome"] != "undecided"}
     return [
@@ -283,5 +283,6 @@ def _points(report: ReportData | None, exercises: Sequence[str], criteria: Seque
     ]
 
 
-def _exercises(report: ReportData | None) -> Sequence[Mapping[str, Any]]:
+def exercises_of(report: ReportData | None) -> Sequence[Mapping[str, Any]]:
+    """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]

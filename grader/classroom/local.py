@@ -61,7 +61,6 @@ class ClassScheduler(Protocol):
 
     def prepare(self, isolation: str) -> Sequence[str]:
         """Return warnings for the instructor; raises EnvironmentFault if nothing can be graded."""
-        ...
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         """Yield one attempt for each task as it finishes, in any order.
@@ -69,7 +68,6 @@ class ClassScheduler(Protocol):
         Closing the generator aborts the running tasks and leaves no process behind. A failed task yields an attempt in
         the state FAILED; it never raises.
         """
-        ...
 
 
 #: Makes a scheduler for a number of parallel submissions.

@@ -117,13 +117,13 @@ def command(  # noqa: PLR0913  one parameter an option
         require("--scheduler", "distributed", "dask")
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
-    from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
-    from grader.classroom.grading import ClassRequest  # noqa: PLC0415  as above
-    from grader.classroom.outputs import platforms, render_summary, summary_json  # noqa: PLC0415  as above
-    from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
-    from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
-    from grader.similarity.finding import read_given  # noqa: PLC0415  as above
+    from grader.app.request import GradeRequest
+    from grader.classroom.class_run import grade_class
+    from grader.classroom.grading import ClassRequest
+    from grader.classroom.outputs import platforms, render_summary, summary_json
+    from grader.classroom.watching import shown_watcher
+    from grader.rubrics.builtin import shipped_templates
+    from grader.similarity.finding import read_given
 
     if canvas_gradebook is not None and canvas is None:
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
@@ -172,17 +172,17 @@ def command(  # noqa: PLR0913  one parameter an option
 def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
     """Return a scheduler factory for this machine, or for a cluster, which stays connected in the context."""
     if scheduler is None:
-        from grader.classroom.local import LocalScheduler  # noqa: PLC0415  as above
+        from grader.classroom.local import LocalScheduler
 
         return nullcontext(LocalScheduler)
-    from grader.classroom.cluster.dispatcher import connected  # noqa: PLC0415  an optional library
+    from grader.classroom.cluster.dispatcher import connected
 
     return connected(scheduler, jobs, complain)
 
 
 def _code(graded: Graded) -> int:
     """Return the exit code: failures of the grader or the machine take precedence over unusable submissions."""
-    from grader.classroom.gradebook import Status  # noqa: PLC0415  as above
+    from grader.classroom.gradebook import Status
 
     if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
         return UNDECIDED

@@ -36,7 +36,7 @@ def _gradescope(
     target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str, seed_key: Path | None
 ) -> int:
     """Write an autograder ZIP that Gradescope takes as it is."""
-    from grader.packaging import Chosen, gradescope  # noqa: PLC0415  reads rubrics, which --help does not need
+    from grader.packaging import Chosen, gradescope
 
     if isolation == NO_WALLS:
         complain("without a sandbox a student's program can write its own result")
@@ -51,7 +51,7 @@ def _gradescope(
 @click.option("--isolation", type=_tiers, default="auto", show_default=True, help="The sandbox on the runner.")
 def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str) -> int:
     """Write the FOLDER of an assignment's autograder for Classroom 50."""
-    from grader.packaging import Chosen, classroom50  # noqa: PLC0415  as above
+    from grader.packaging import Chosen, classroom50
 
     for name, content in classroom50(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation)).items():
         write_file(target / name, content, parents=True)
@@ -62,7 +62,7 @@ def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, 
 @click.argument("action", metavar="OWNER/NAME@COMMIT")
 def _workflow(action: str) -> int:
     """Print the workflow for students' repositories that grades with your copy of the grader."""
-    from grader.packaging import workflow  # noqa: PLC0415  as above
+    from grader.packaging import workflow
 
     print_for_programs(workflow(action))
     return ALL_MET
@@ -71,7 +71,7 @@ def _workflow(action: str) -> int:
 @command.command(name="constraints")
 def _constraints() -> int:
     """Print the versions of all that the grader needs here, as constraints for pip."""
-    from grader.packaging import pins  # noqa: PLC0415  as above
+    from grader.packaging import pins
 
     print_for_programs(pins())
     return ALL_MET

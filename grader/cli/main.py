@@ -153,22 +153,17 @@ def _grade(  # noqa: PLR0913  one parameter an option
 
     A folder with the name of a command is graded as ./NAME.
     """
-    from grader.reporting.delivery import (  # noqa: PLC0415  reports, which --help does not need
-        Output,
-        deliver,
-        early_delivery,
-        prepared,
-    )
+    from grader.reporting.delivery import Output, deliver, early_delivery, prepared
 
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     for_whom = readers(audience, as_of)
-    from grader.app import grade  # noqa: PLC0415  the rest of the grader, which mistakes do not need
-    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
-    from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
-    from grader.core.checkup import missing  # noqa: PLC0415  as above
-    from grader.core.releases import TRIED  # noqa: PLC0415  as above
-    from grader.reporting.audience import told  # noqa: PLC0415  as above
+    from grader.app import grade
+    from grader.app.request import GradeRequest
+    from grader.app.seeds import PRACTICE
+    from grader.core.checkup import missing
+    from grader.core.releases import TRIED
+    from grader.reporting.audience import told
 
     key = drawn_with(seed, seed_key)
     request = GradeRequest(
@@ -219,8 +214,8 @@ def _observe(  # noqa: PLR0913  one parameter an option
 
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
-    from grader.app import observe  # noqa: PLC0415  as for grading
-    from grader.reporting.observed import render_summary, summary_to_json  # noqa: PLC0415
+    from grader.app import observe
+    from grader.reporting.observed import render_summary, summary_to_json
 
     request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
     with shown_progress(wanted=True) as progress:
@@ -239,8 +234,8 @@ def _doctor(*, as_json: bool) -> int:
 
     Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
     """
-    from grader.app.doctor import examine  # noqa: PLC0415  the rest of the grader, which --help does not need
-    from grader.reporting.doctor import checkup_to_json, render_checkup  # noqa: PLC0415
+    from grader.app.doctor import examine
+    from grader.reporting.doctor import checkup_to_json, render_checkup
 
     with shown_progress(wanted=True) as progress:
         checkup = examine(progress)
@@ -261,8 +256,8 @@ def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
     for it.
     """
-    from grader.app.explain import explain  # noqa: PLC0415  the rest of the grader, which --help does not need
-    from grader.reporting.explained import explanations_to_json, render_explanations  # noqa: PLC0415
+    from grader.app.explain import explain
+    from grader.reporting.explained import explanations_to_json, render_explanations
 
     found = explain(name, rubrics)
     if as_json:
@@ -309,7 +304,7 @@ def _guarded(run: Callable[[], object]) -> int:
         return INTERRUPTED
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
-            import traceback  # noqa: PLC0415  only here
+            import traceback
 
             traceback.print_exc()
         _fail(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")

@@ -164,7 +164,6 @@ class Check(Protocol):
 
     def judge(self, trace: Trace) -> Finding:
         """Return what the trace says; pure, and never raises for anything a student can do."""
-        ...
 
 
 @runtime_checkable
@@ -173,7 +172,6 @@ class SourceCheck(Protocol):
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Return what the files, by their wanted names, and the trace say; as pure as `judge`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

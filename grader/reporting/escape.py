@@ -1,10 +1,4 @@
-"""Makes text that a student controls harmless in each output: one small function per output.
-
-Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`,
-`without_workflow_commands`. Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML:
-`script_json`; templates escape the rest. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`,
-`command_line`.
-"""
+"""Makes text that a student controls harmless in each output: one small function per output."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path, PurePosixPath
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from grader.core.report import Report
     from grader.reporting.audience import Readers
+    from grader.reporting.platforms.classroom50 import HandedIn
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,28 +23,6 @@ class PageLayout:
     colour: bool
 
 
-def _nothing(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    del report, layout
-    return {}
-
-
-def _layout(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    del report
-    return {"width": layout.width, "colour": layout.colour}
-
-
-def _folder(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    del layout
-    return {"folder": repository_folder(report.path, os.environ)}
-
-
-def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, Any]:
-    from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
-
-    del report, layout
-    return {"handed_in": handed_in(os.environ)}
-
-
 @dataclass(frozen=True, slots=True)
 class Format:
     """A format of reports."""
@@ -51,7 +30,7 @@ class Format:
     renderer: str  # the rendering function: `module:function` in `grader.reporting`
     suffix: str  # file name suffix of this format
     for_students: bool = False  # whether students read it unless an option says otherwise: a platform shows it to them
-    arguments: Callable[[Report, PageLayout], Mapping[str, Any]] = _nothing  # computes the renderer's further arguments
+    needs: str = ""  # what its renderer is given besides the report: `layout`, `folder` or `handed_in`
     # Whether the renderer itself hides what students must not see yet, because its platform shows it later
     withholds: bool = False
     illustrated: bool = False  # whether it shows figures, which take about as long to draw as judging takes
@@ -62,40 +41,52 @@ class Format:
         """Return the text of a report."""
         module, _, function = self.renderer.partition(":")
         text: str = getattr(import_module(f"grader.reporting.{module}"), function)(
-            report, **self.arguments(report, layout), **arguments
+            report, **_arguments(self.needs, report, layout), **arguments
         )
         return text
+
+
+def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, Any]:
+    if needs == "layout":
+        return {"width": layout.width, "colour": layout.colour}
+    if needs == "folder":
+        return {"folder": repository_folder(report.path, os.environ)}
+    return {"handed_in": _handed_in()} if needs else {}
+
+
+def _handed_in() -> HandedIn:
+    from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
+
+    return handed_in(os.environ)
 
 
 #: Every format of reports, by name.
 FORMATS: dict[str, Format] = {
     "json": Format("json_report:dumps", ".json"),
-    "text": Format("text:render_text", ".txt", arguments=_layout),
+    "text": Format("text:render_text", ".txt", needs="layout"),
     "html": Format("html.render:render_html", ".html", illustrated=True),
     "markdown": Format("markdown:render_markdown", ".md"),
-    "junit": Format("junit:render_junit", ".xml", arguments=_folder),
-    "github": Format("platforms.github:render_github", ".txt", for_students=True, arguments=_folder),
+    "junit": Format("junit:render_junit", ".xml", needs="folder"),
+    "github": Format("platforms.github:render_github", ".txt", for_students=True, needs="folder"),
     "gradescope": Format(
         "platforms.gradescope:render_gradescope", ".json", for_students=True, withholds=True, written_early=True
     ),
     "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", for_students=True),
-    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", for_students=True, arguments=_handed_in),
+    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", for_students=True, needs="handed_in"),
     "classroom": Format("platforms.classroom:render_classroom", ".json", for_students=True),
 }
 
 
 def check_surroundings(name: str) -> None:
     """Raise GraderError if the environment lacks a value that a format needs."""
-    if FORMATS[name].arguments is _handed_in:
-        from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
-
-        handed_in(os.environ)
+    if FORMATS[name].needs == "handed_in":
+        _handed_in()
 
 
 def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) -> str:
     """Return a report in one of `FORMATS`, limited to what its reader may see."""
-    from grader.core.exercise import Audience  # noqa: PLC0415  as above
-    from grader.reporting.audience import for_student  # noqa: PLC0415  as above
+    from grader.core.exercise import Audience  # noqa: PLC0415  only after a run, not for --help
+    from grader.reporting.audience import for_student  # noqa: PLC0415  only after a run, not for --help
 
     format_ = FORMATS[name]
     if readers.of(Audience.STUDENT if format_.for_students else Audience.INSTRUCTOR) is Audience.INSTRUCTOR:
@@ -115,12 +106,9 @@ def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
     if not source.is_dir() and source.suffix != ".py":
         return None  # files inside an archive are not in the repository
     workspace = environment.get("GITHUB_WORKSPACE")
-    root = Path(os.path.realpath(workspace)) if workspace else _nearest_checkout(folder)
+    checkouts = (parent for parent in (folder, *folder.parents) if (parent / ".git").exists())
+    root = Path(os.path.realpath(workspace)) if workspace else next(checkouts, Path(os.path.realpath(".")))
     if not folder.is_relative_to(root):
         return None
     relative = PurePosixPath(folder.relative_to(root)).as_posix()
     return "" if relative == "." else relative
-
-
-def _nearest_checkout(folder: Path) -> Path:
-    return next((f for f in (folder, *folder.parents) if (f / ".git").exists()), Path(os.path.realpath(".")))

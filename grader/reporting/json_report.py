@@ -10,7 +10,6 @@ from fractions import Fraction
 from typing import Any
 
 from grader.core.checkup import described
-from grader.core.exercise import Variant
 from grader.core.quantities import seconds
 from grader.core.report import SCHEMA, ExerciseReport, Report, ReportedFault, Verdict
 from grader.core.trace import Start
@@ -64,6 +63,7 @@ def start_values(start: Start) -> dict[str, Any]:
 
 
 def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
+    variant = exercise.variant
     return {
         "id": exercise.id,
         "number": exercise.number,
@@ -77,13 +77,8 @@ def _exercise(exercise: ExerciseReport, report: Report) -> dict[str, Any]:
         "faults": [_fault(fault) for fault in exercise.faults],
         "notes": _notes(exercise, report),
         **({"starts": [start_values(start) for start in exercise.starts]} if exercise.starts else {}),
-        **_variant(exercise.variant),
+        **({"variant": {"student": variant.student, "values": dict(variant.values)}} if variant else {}),
     }
-
-
-def _variant(variant: Variant | None) -> dict[str, Any]:
-    """Return the values of this student's variant, if the rubric has variants."""
-    return {"variant": {"student": variant.student, "values": dict(variant.values)}} if variant is not None else {}
 
 
 def _notes(exercise: ExerciseReport, report: Report) -> list[str]:

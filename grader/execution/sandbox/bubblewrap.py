@@ -6,7 +6,7 @@ import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -126,11 +126,12 @@ class Bubblewrap:
         """
         if self.as_root:
             make_readable(process.submission)
+        environment = student_environment(process, HOME)
         filter_fd = _memory_file("filter", seccomp.student_filter())
         options = [
             *self._namespaces(),
             *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
-            *_settings(student_environment(process, HOME)),
+            *(word for setting in environment.items() for word in ("--setenv", *setting)),
             *self._files(process, limits),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
@@ -196,10 +197,6 @@ def _program(name: str, hint: str) -> Path:
     if found is None:
         raise EnvironmentFault(f"sandbox: expected the program {name}, found none", hint)
     return Path(found).absolute()
-
-
-def _settings(environment: Mapping[str, str]) -> Iterable[str]:
-    return (word for name, value in environment.items() for word in ("--setenv", name, value))
 
 
 def _memory_file(name: str, content: bytes) -> int:

@@ -48,16 +48,15 @@ def view_of(paths: Iterable[Path]) -> View:
             real.add(target)
             links.update(on_the_way)
     bound = tuple(path for path in sorted(real) if not any(parent in real for parent in path.parents))
-    return View(bound, tuple((where, links[where]) for where in sorted(links) if not _is_inside(where, bound)))
+    return View(
+        bound,
+        tuple((where, links[where]) for where in sorted(links) if not any(folder in where.parents for folder in bound)),
+    )
 
 
 def parents_of(paths: Iterable[Path]) -> tuple[Path, ...]:
     """Return every folder above the paths except the root, outermost first."""
     return tuple(sorted({parent for path in paths for parent in path.parents if parent != Path("/")}))
-
-
-def _is_inside(path: Path, folders: Iterable[Path]) -> bool:
-    return any(folder in path.parents for folder in folders)
 
 
 def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:

@@ -58,22 +58,18 @@ class Isolation(Protocol):
     @property
     def name(self) -> str:
         """Short name for reports, e.g. `bubblewrap-root`."""
-        ...
 
     @property
     def shares_network(self) -> bool:
         """Whether the worker uses the caller's network, where other graders and nodes may run."""
-        ...
 
     @property
     def submission_seen_at(self) -> str:
         """Absolute folder at which a student process sees its submission; empty if that is the real path."""
-        ...
 
     @property
     def host_seen_at(self) -> str:
         """Absolute folder at which a student process sees the host package, with `launcher.py`."""
-        ...
 
     def worker_command(
         self,
@@ -86,8 +82,6 @@ class Isolation(Protocol):
 
         It sees the files of the view, if the tier can hide files; None for all.
         """
-        ...
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student process inside the worker, which shares only its network."""
-        ...

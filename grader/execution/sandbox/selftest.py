@@ -77,9 +77,6 @@ def why_not(contained: tuple[Property, ...]) -> str:
     return "; ".join(map(str, missing(contained)))
 
 
-# --- the trial ---
-
-
 def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
     """Run the trial and return its answer, or an empty one with the reason."""
     submission = bait.folder / "submission"
@@ -140,9 +137,6 @@ def asked_of_probe(bait: Bait) -> dict[str, Any]:
         "sinks": [sink.getsockname()[:2] for sink in bait.sinks if sink.type == socket.SOCK_STREAM],
         "loopback": bait.loopback.getsockname()[1],
     }
-
-
-# --- the bait ---
 
 
 @contextlib.contextmanager

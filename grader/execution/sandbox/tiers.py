@@ -45,6 +45,7 @@ SCRATCH = Path("/dev/shm")  # noqa: S108
 HERE = Path(__file__).parent
 HOST = PACKAGE / "student_host"
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+_version = functools.cache(landlock_version)
 #: The first Landlock version that restricts signals.
 WITH_SIGNALS = 6
 
@@ -263,8 +264,3 @@ def _walls(process: StudentProcess, ground: Ground) -> dict[str, object]:
         "reach": ground.as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
         "filter": flat_filter(signals=_version() < WITH_SIGNALS).hex(),
     }
-
-
-@functools.cache
-def _version() -> int:
-    return landlock_version()
