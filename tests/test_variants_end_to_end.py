@@ -6,9 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner, Result
+from report_samples import report_schema
 
 from grader.cli import main
-from grader.reporting.json_report import report_schema
 from grader.rubrics.builtin import builtin_rubrics, shipped
 
 SOLUTION = shipped("rubrics").parent / "reference_solutions" / "velocity_publisher.py"

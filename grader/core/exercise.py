@@ -54,18 +54,13 @@ class ProblemKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One problem.
-
-    Attributes:
-        kind: What is wrong.
-        topics: The topics concerned, if a check looks at several.
-        detail: What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does.
-        start: The number that a count starts at; None for problems of other kinds; not shown in reports.
-    """
+    """One problem."""
 
     kind: ProblemKind
-    topics: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()  # the topics concerned, if a check looks at several
+    # What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does
     detail: str = ""
+    # The number that a count starts at; None for problems of other kinds; not shown in reports
     start: int | None = None
 
 
@@ -96,15 +91,11 @@ ORDER = tuple(Shows)
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What a student sees of one criterion.
+    """What a student sees of one criterion."""
 
-    Attributes:
-        shows: How much of the result.
-        until: The last day on which this applies, as `2026-12-01`; everything is shown afterwards. `due_date` and
-            `published` are events that only a platform knows; empty if it always applies.
-    """
-
-    shows: Shows = Shows.ALL
+    shows: Shows = Shows.ALL  # how much of the result
+    # The last day on which this applies, as `2026-12-01`; everything is shown afterwards. `due_date` and `published`
+    # are events that only a platform knows; empty if it always applies.
     until: str = ""
 
     def on(self, day: str) -> Shows:
@@ -128,15 +119,10 @@ Value = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """The values of one exercise for one student.
+    """The values of one exercise for one student."""
 
-    Attributes:
-        student: The student, as staff wrote the name; empty if the values belong to nobody.
-        values: Name and value, in the order of the rubric.
-    """
-
-    student: str
-    values: tuple[tuple[str, Value], ...]
+    student: str  # the student, as staff wrote the name; empty if the values belong to nobody
+    values: tuple[tuple[str, Value], ...]  # name and value, in the order of the rubric
 
     @property
     def text(self) -> str:
@@ -146,15 +132,10 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """The values of all exercises for one student.
+    """The values of all exercises for one student."""
 
-    Attributes:
-        student: The student.
-        values: Exercise id -> name -> value.
-    """
-
-    student: str
-    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    student: str  # the student
+    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)  # exercise id -> name -> value
 
 
 def variant_notes(variant: Variant | None) -> tuple[str, ...]:
@@ -192,25 +173,17 @@ class Location:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check found in a trace.
+    """What a check found in a trace."""
 
-    Attributes:
-        credit: Share of the points earned, in [0, 1].
-        reason: One sentence in the form `where: what was found, what was expected`; no markup.
-        evidence: Plain JSON values behind the reason; keys in a fixed order.
-        location: Place in the student's file, if the trace names one.
-        hint: One thing to do; empty if no advice is very likely to be right.
-        blocked_by: Id of the criterion that must be met before this one can be judged; credit is then 0.
-        problem: The problem found, if the check tells several problems apart.
-    """
-
-    credit: Fraction
-    reason: str
+    credit: Fraction  # share of the points earned, in [0, 1]
+    reason: str  # one sentence in the form `where: what was found, what was expected`; no markup
+    # Plain JSON values behind the reason; keys in a fixed order
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    location: Location | None = None
-    hint: str = ""
+    location: Location | None = None  # place in the student's file, if the trace names one
+    hint: str = ""  # one thing to do; empty if no advice is very likely to be right
+    # Id of the criterion that must be met before this one can be judged; credit is then 0
     blocked_by: str | None = None
-    problem: Problem | None = None
+    problem: Problem | None = None  # the problem found, if the check tells several problems apart
 
 
 class Check(Protocol):
@@ -218,7 +191,6 @@ class Check(Protocol):
 
     def judge(self, trace: Trace) -> Finding:
         """Judge the trace. This is a pure function, and nothing that a student does makes it raise."""
-        ...
 
 
 @runtime_checkable
@@ -227,62 +199,36 @@ class SourceCheck(Protocol):
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Judge the trace and the files, by their required names; a pure function like `judge`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """One row of a rubric.
+    """One row of a rubric."""
 
-    Attributes:
-        id: Unique within the exercise; never changes.
-        title: Its title.
-        points: Above 0.
-        scenario: Id of the scenario whose trace is judged.
-        check: The check that judges it.
-        needs: Ids of criteria that must be met or partly met before this one is judged.
-        hint: Hint for a student who did not meet it, if the check has no better one.
-        chapter: The part of the course text that requires it, e.g. `Exercise 1, acceptance criterion 2`; may be empty.
-        feedback: How much of its result a student sees.
-        check_name: Name of its check in the rubric.
-    """
-
-    id: str
-    title: str
-    points: Fraction
-    scenario: str
-    check: Check
-    needs: tuple[str, ...] = ()
-    hint: str = ""
+    id: str  # unique within the exercise; never changes
+    title: str  # its title
+    points: Fraction  # above 0
+    scenario: str  # id of the scenario whose trace is judged
+    check: Check  # the check that judges it
+    needs: tuple[str, ...] = ()  # ids of criteria that must be met or partly met before this one is judged
+    hint: str = ""  # hint for a student who did not meet it, if the check has no better one
+    # The part of the course text that requires it, e.g. `Exercise 1, acceptance criterion 2`; may be empty
     chapter: str = ""
-    feedback: Feedback = OPEN
-    check_name: str = field(default="", compare=False)
+    feedback: Feedback = OPEN  # how much of its result a student sees
+    check_name: str = field(default="", compare=False)  # name of its check in the rubric
 
 
 @dataclass(frozen=True, slots=True)
 class Exercise:
-    """One rubric file.
+    """One rubric file."""
 
-    Attributes:
-        id: Unique, e.g. `velocity_publisher`.
-        number: Number in the chapter, as text.
-        title: Its title.
-        required: Whether the chapter requires it.
-        files: File names that a submission must contain, in order.
-        scenarios: Its scenarios, in the order of recording.
-        criteria: Its criteria, in order.
-        digest: `sha256:` digest of the rubric file and its own check files.
-        by_request: Whether it is graded only on request.
-        variant: The values for this student; None if nothing varies.
-    """
-
-    id: str
-    number: str
-    title: str
-    required: bool
-    files: tuple[str, ...]
-    scenarios: tuple[Scenario, ...]
-    criteria: tuple[Criterion, ...]
-    digest: str
-    by_request: bool = False
-    variant: Variant | None = None
+    id: str  # unique, e.g. `velocity_publisher`
+    number: str  # number in the chapter, as text
+    title: str  # its title
+    required: bool  # whether the chapter requires it
+    files: tuple[str, ...]  # file names that a submission must contain, in order
+    scenarios: tuple[Scenario, ...]  # its scenarios, in the order of recording
+    criteria: tuple[Criterion, ...]  # its criteria, in order
+    digest: str  # `sha256:` digest of the rubric file and its own check files
+    by_request: bool = False  # whether it is graded only on request
+    variant: Variant | None = None  # the values for this student; None if nothing varies

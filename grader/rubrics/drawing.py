@@ -169,7 +169,7 @@ class _CasesShape(Shape):
 
     made: ClassVar[type]
 
-    def built(self) -> Any:
+    def built(self) -> object:
         """Return the cases as a scenario holds them."""
         return self.made(*(build(getattr(self, name)) for name in type(self).model_fields))
 

@@ -15,7 +15,7 @@ from grader.core.report import Report, ReportedFault, Reproduction
 from grader.core.trace import ClockKind, GraphSnapshot
 from grader.reporting.audience import Readers, for_student, told, withholds
 from grader.reporting.formats import FORMATS, PageLayout, rendered
-from grader.reporting.surroundings import COMMIT_DATETIME, VARIABLES
+from grader.reporting.platforms.classroom50 import COMMIT_DATETIME, VARIABLES
 
 LAYOUT = PageLayout(width=100, colour=False)
 BEFORE, AFTER = "2026-12-01", "2026-12-02"

@@ -13,11 +13,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema.validators import Draft202012Validator
-from report_samples import NASTY, SAMPLES, criterion, exercise, hostile, middling, perfect, report, undecided
+from report_samples import (
+    NASTY,
+    SAMPLES,
+    criterion,
+    exercise,
+    hostile,
+    middling,
+    perfect,
+    report,
+    report_schema,
+    undecided,
+)
 
 from grader.core.exercise import Outcome, Problem, ProblemKind
 from grader.core.trace import Start, StartWay
-from grader.reporting.json_report import dumps, report_schema, report_to_json
+from grader.reporting.json_report import dumps, report_to_json
 
 
 def validator() -> Draft202012Validator:

@@ -40,11 +40,7 @@ _decode = msgspec.json.Decoder(dict[str, Any]).decode
 
 
 class Fields(Mapping[str, Any]):
-    """A mapping that is decoded on each access, because most of a trace is never read.
-
-    Args:
-        text: A JSON object in ASCII with valid syntax.
-    """
+    """A JSON object in ASCII that is decoded on each access, because most of a trace is never read."""
 
     __slots__ = ("_text",)
 
@@ -106,11 +102,8 @@ def _lively(value: Any) -> Any:
 def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: Any) -> Any:
     """Create the struct that validates a packed dataclass: a list of its fields, after its tag if it has one.
 
-    Args:
-        kind: The dataclass.
-        left_out: Fields that are not written, or written in another way.
-        last: Name, type and default of an optional field at the end.
-        others: Types of fields that are written as another type.
+    Fields are left out that are not written, or written in another way; others are written as another type. The last
+    one is name, type and default of an optional field at the end.
     """
     hints = {**get_type_hints(kind), **others}
     fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]
@@ -240,9 +233,7 @@ _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 def pack(trace: Trace, there: Sequence[bool]) -> bytes:
     """Pack a trace as JSON; the same trace gives the same bytes.
 
-    Args:
-        trace: The trace.
-        there: For each observation, whether the recording contains its bytes as a message.
+    For each observation, `there` says whether the recording contains its bytes as a message.
     """
     data = trace_to_json(trace)
     for row, left_out in zip(data["observations"], there, strict=True):
@@ -252,11 +243,7 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
 
 
 def unpack(data: bytes) -> Trace:
-    """Unpack a trace without the bytes of messages, which judging does not read.
-
-    Raises:
-        EvidenceError: The data is not a packed trace.
-    """
+    """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if it is none."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
     try:
@@ -272,14 +259,9 @@ def unpack(data: bytes) -> Trace:
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
-    """Unpack a trace.
+    """Unpack a trace; raises EvidenceError if it is none, or does not match the recording.
 
-    Args:
-        data: A packed trace.
-        cdrs: The bytes of the recording's messages, one for each observation; None leaves them out.
-
-    Raises:
-        EvidenceError: The data is not a packed trace, or does not match the recording.
+    The bytes of the recording's messages are given one for each observation; None leaves them out.
     """
     try:
         rows = json.loads(data)
