@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader.app.grade import grade
 from grader.app.request import GradeRequest
-from grader.reporting.html.assets import bundle, shared_assets
+from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,7 +38,7 @@ def main() -> None:
             f"{alone / 1e6:.2f} MB alone, {linked / 1e3:.0f} kB beside shared files"
         )
     print(
-        f"shared files: {sum(map(len, shared_assets().values())) / 1e6:.2f} MB, of which script {len(bundle().script)}"
+        f"shared files: {sum(map(len, bundle().files.values())) / 1e6:.2f} MB, of which script {len(bundle().script)}"
     )
 
 

@@ -39,8 +39,7 @@ def integration(name: str) -> bytes:
 def wheel() -> tuple[str, bytes]:
     """Build a wheel of the running package, and return its name and content.
 
-    Raises:
-        EnvironmentFault: The package is not installed, or its requirements changed since it was installed.
+    Raises EnvironmentFault if the package is not installed, or its requirements changed since it was installed.
     """
     try:
         installed = importlib.metadata.distribution(PACKAGE)
@@ -164,25 +163,17 @@ _NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """What a platform grades, and how.
+    """What a platform grades, and how."""
 
-    Attributes:
-        exercises: Exercise ids; empty for all exercises of the rubrics.
-        rubrics: Rubric files; empty for the built-in ones.
-        isolation: As on the command line.
-    """
-
-    exercises: tuple[str, ...] = ()
-    rubrics: tuple[Path, ...] = ()
-    isolation: str = "auto"
+    exercises: tuple[str, ...] = ()  # exercise ids; empty for all exercises of the rubrics
+    rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
+    isolation: str = "auto"  # as on the command line
 
 
 def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
     """Build the autograder zip for Gradescope; raises GraderError if it would not work there.
 
-    Args:
-        chosen: What to grade.
-        seed_key: File with the seed key; None for the public practice key.
+    Without a file with the seed key, the public practice key is used.
     """
     files = {name: integration(f"gradescope/{name}") for name in ("setup.sh", "run_autograder")}
     if seed_key is not None:
@@ -191,11 +182,7 @@ def gradescope(chosen: Chosen, seed_key: Path | None = None) -> bytes:
 
 
 def classroom50(chosen: Chosen) -> dict[str, bytes]:
-    """Build the files of an assignment's autograder for Classroom 50, by name.
-
-    Raises:
-        GraderError: The autograder would not work there.
-    """
+    """Build the files of an assignment's autograder, by name; raises GraderError if it would not work there."""
     files = {"autograder.py": integration("classroom50/autograder.py"), **_common(chosen)}
     size = sum(map(len, files.values()))
     if size > CLASSROOM50_BYTES:
@@ -207,11 +194,7 @@ def classroom50(chosen: Chosen) -> dict[str, bytes]:
 def workflow(action: str) -> str:
     """Render the workflow for students' repositories, which uses the action at a fixed commit.
 
-    Args:
-        action: `OWNER/NAME@COMMIT`, with all 40 digits of the commit.
-
-    Raises:
-        GraderError: The argument has another form.
+    The action is `OWNER/NAME@COMMIT`, with all 40 digits of the commit; raises GraderError for another form.
     """
     repository, _, commit = action.partition("@")
     parts = repository.split("/")

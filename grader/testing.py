@@ -81,18 +81,12 @@ class TraceBuilder:
     """Builds a trace from observations; every method except `trace` returns the builder.
 
     A topic with messages gets a publisher in the graph automatically; subscriptions have to be added.
-
-    Attributes:
-        process: File name of the student's process that is observed.
-        node: Name of its node.
-        stop_s: End of the observation.
-        clock: Which clock the nodes ran on.
     """
 
-    process: str = "node.py"
-    node: str = "/node"
-    stop_s: float = 10.0
-    clock: ClockKind = ClockKind.VIRTUAL
+    process: str = "node.py"  # file name of the student's process that is observed
+    node: str = "/node"  # name of its node
+    stop_s: float = 10.0  # end of the observation
+    clock: ClockKind = ClockKind.VIRTUAL  # which clock the nodes ran on
     _seen: list[Observation] = field(default_factory=list, repr=False)
     _ends: list[Endpoint] = field(default_factory=list, repr=False)
     _services: list[ServiceEnd] = field(default_factory=list, repr=False)

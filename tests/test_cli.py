@@ -395,11 +395,11 @@ def test_a_terminal_sees_progress_and_colours() -> None:
 
 @pytest.mark.slow
 def test_help_starts_light() -> None:
-    """Neither rich nor pydantic nor ROS is imported before they are needed."""
+    """Neither rich nor pydantic nor ROS nor the vocabulary of reports is imported before they are needed."""
     code = (
         "import sys\nfrom grader.cli import main\n"
         "try: main.app(['--help'])\nexcept SystemExit: pass\n"
-        "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy'}\n"
+        "heavy = {'rich', 'pydantic', 'rosbags', 'ruamel', 'rclpy', 'numpy', 'fractions', 'grader.core.trace'}\n"
         "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -6,12 +6,12 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner, Result
+from report_samples import report_schema
 
 from grader.cli import main
-from grader.reporting.json_report import report_schema
-from grader.rubrics.builtin import builtin_rubrics, shipped_folder
+from grader.rubrics.builtin import builtin_rubrics, shipped
 
-SOLUTION = shipped_folder().parent / "reference_solutions" / "velocity_publisher.py"
+SOLUTION = shipped("rubrics").parent / "reference_solutions" / "velocity_publisher.py"
 
 
 def run(*words: str) -> Result:

@@ -36,11 +36,7 @@ rclpy.spin(node)
 
 
 def examine(progress: Progress) -> Checkup:
-    """Find out what this machine can do; takes a few seconds.
-
-    Args:
-        progress: Called at the start of each step.
-    """
+    """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = _ros()
     facts = (*software(ros), *lack, *system())

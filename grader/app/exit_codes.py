@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from grader.core.report import Report
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from grader.core.report import Report
 
 ALL_MET, NOT_ALL_MET, UNUSABLE, UNDECIDED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def exit_code(report: Report, min_score: Fraction | None) -> int:
-    """Return the exit code for a report.
+    """Return the exit code for a report as its reader may see it.
 
-    Args:
-        report: The report as its reader may see it.
-        min_score: Smallest share of the points, in percent, that counts as success; None requires every criterion.
+    The share of the points, in percent, that counts as success is `min_score`; None requires every criterion.
     """
     if not report.final:
         return UNDECIDED

@@ -42,15 +42,9 @@ OFFERED = 3
 
 
 def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain a criterion id, `exercise/criterion`, or the name of a check.
+    """Explain a criterion id, `exercise/criterion`, or the name of a check; raises GraderError if there is none.
 
-    Args:
-        name: The name as typed.
-        rubrics: The rubrics to search for criteria; empty for the built-in ones.
-
-    Raises:
-        GraderError: Nothing has that name.
-        RubricError: A rubric cannot be used.
+    Criteria are searched in the given rubrics, or in the built-in ones if none are given.
     """
     pairs = _pairs(rubrics)
     found = [_criterion(e, c) for e, c in pairs if name in (c.id, f"{e.id}/{c.id}")]
@@ -63,20 +57,12 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
 
 
 def explain_rubrics(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain every criterion of the given rubrics, or of the built-in ones if none are given.
-
-    Raises:
-        RubricError: A rubric cannot be used.
-    """
+    """Explain every criterion of the given rubrics, or of the built-in ones if none are given."""
     return [_criterion(e, c) for e, c in _pairs(rubrics)]
 
 
 def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
-    """Explain every check, including those that rubrics define, and list the criteria that use it.
-
-    Raises:
-        RubricError: A rubric cannot be used.
-    """
+    """Explain every check, including those that rubrics define, and list the criteria that use it."""
     pairs = _pairs(rubrics)
     used: dict[str, list[str]] = {}
     for e, c in pairs:
@@ -93,7 +79,8 @@ def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     name = check_name(criterion)
-    manual = manual_of(type(criterion.check))
+    kind: type = type(criterion.check)
+    manual = manual_of(kind)
     return CriterionExplanation(
         id=criterion.id,
         title=criterion.title,
@@ -106,7 +93,7 @@ def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation
         check=name,
         asks=manual.summary,
         details=manual.details,
-        parameters=tuple(_parameter(f, type(criterion.check), manual, criterion.check) for f in _fields(criterion)),
+        parameters=tuple(_parameter(f, kind, manual, criterion.check) for f in fields(kind)),
     )
 
 
@@ -114,10 +101,6 @@ def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     manual = manual_of(kind)
     parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
-
-
-def _fields(criterion: Criterion) -> tuple[Field[object], ...]:
-    return fields(criterion.check)  # type: ignore[arg-type]  # checks are dataclasses
 
 
 def _parameter(field: Field[object], kind: type, manual: Manual, check: object | None) -> Parameter:

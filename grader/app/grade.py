@@ -1,17 +1,16 @@
-"""Grades one submission from end to end."""
+"""Grades one submission from end to end, and keeps its recordings as evidence."""
 
 from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 import grader
-from grader.app.request import GradeRequest, reproduction
+from grader.app.request import GradeRequest, reproduction, request_to_json
 from grader.app.seeds import PRACTICE_NOTE
 from grader.app.spot_checks import SpotChecks, check
 from grader.core.errors import SubmissionError
@@ -22,11 +21,13 @@ from grader.core.scenario import OdometryStream
 from grader.core.submission import Run, Submission
 from grader.core.trace import Trace
 from grader.execution.bag import Odometry, read_odometry
+from grader.execution.evidence.store import check_place, keep
 from grader.execution.plan import plan_scenario
 from grader.execution.recording_session import AUTO, NO_ISOLATION, RecordingSession, open_session, planned_clock
 from grader.execution.supervisor import Job
 from grader.execution.worker import RealTimeBudget
 from grader.judging.judge_run import judge_run
+from grader.reporting.json_report import dumps
 from grader.rubrics.builtin import builtin_headers, builtin_odometry, require_exercises
 from grader.rubrics.loader import read_rubric
 from grader.submissions.collected import listed, shown
@@ -35,16 +36,14 @@ from grader.submissions.submission import stage_collected, stage_submission
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
+#: Called at the start of each step with a short phrase such as `exercise 1: alone`.
+Progress = Callable[[str], None]
 
 
 class EarlyReports:
     """Makes a partial report whenever one exercise is completely recorded and others are not.
 
-    Args:
-        exercises: The exercises to grade, in the order of the report.
-        scenarios: The scenarios to record; an exercise without one is judged along with the first that is recorded.
-        run: The run as known before recording.
-        on_report: Called with each partial report.
+    An exercise without a scenario to record is judged along with the first that is recorded.
     """
 
     def __init__(
@@ -72,12 +71,31 @@ class EarlyReports:
             self._on_report(judge_run(self._exercises, run, pictures=False, pending=pending))
 
 
-class Progress(Protocol):
-    """Called at the start of each step with a short phrase such as `exercise 1: alone`."""
+class EvidenceWriter:
+    """Remembers a run while it is graded, and writes it after its report has been delivered.
 
-    def __call__(self, step: str) -> None:
-        """Report that a step begins."""
-        ...
+    The folders are checked right away, because grading takes long; raises EvidenceError if one cannot be written to.
+    """
+
+    def __init__(self, folders: Sequence[Path], request: GradeRequest) -> None:
+        for folder in folders:
+            check_place(folder)
+        self._folders = folders
+        self._request = request
+        self._recorded: tuple[Run, Sequence[Exercise]] | None = None
+
+    def remember(self, run: Run, exercises: Sequence[Exercise]) -> None:
+        """Remember a complete run and the exercises it was recorded for."""
+        self._recorded = (run, exercises)
+
+    def write(self, report: Report) -> None:
+        """Write the run and its report; raises EvidenceError if that fails."""
+        if self._recorded is None or not self._folders:
+            return
+        run, exercises = self._recorded
+        for folder in self._folders:
+            asked = request_to_json(self._request, exercises)
+            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
 
 
 def grade(
@@ -88,17 +106,10 @@ def grade(
     *,
     pictures: bool = True,
 ) -> Report:
-    """Grade one submission.
+    """Grade one submission; raises a GraderError whose class tells who must act.
 
-    Args:
-        request: What to grade, and how.
-        progress: Called at the start of each step.
-        on_recorded: Called with the complete recording and the exercises it was made for.
-        on_partial_report: Called with a partial report whenever one exercise is done and others are not.
-        pictures: Whether the report includes charts, which only some formats show.
-
-    Raises:
-        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
+    The complete recording and its exercises are passed to `on_recorded`; a partial report to `on_partial_report`,
+    whenever one exercise is done and others are not. Pictures are charts, which only some formats show.
     """
     started = time.perf_counter()
     with open_session(request.isolation, request.workers, progress) as session:
@@ -121,9 +132,7 @@ def grade(
             duration_s=time.perf_counter() - started,
             notes=(
                 *submission.notes,
-                *_seed_notes(request),
-                *_release_notes(session.ros.distro),
-                *_isolation_notes(session),
+                *_notes(request, session),
             ),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
@@ -135,7 +144,7 @@ def grade(
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_one, session, progress, RealTimeBudget(request.time_budget_s))
-            traces = check(checks, jobs, traces, record, take or _ignore)
+            traces = check(checks, jobs, traces, record, take or (lambda *_: None))
         run = replace(run, traces=traces, duration_s=time.perf_counter() - started)
         if on_recorded is not None:
             on_recorded(run, exercises)
@@ -146,19 +155,10 @@ def _record_one(session: RecordingSession, progress: Progress, budget: RealTimeB
     return session.recorder.record([replace(job, budget=budget)], progress)[0]
 
 
-def _ignore(key: tuple[str, str], trace: Trace) -> None:
-    """Stand in for the callback when nobody wants partial reports."""
-
-
 def read_exercises(request: GradeRequest, submissions: Sequence[Path] = ()) -> list[Exercise]:
-    """Read the exercises to grade, in rubric order.
+    """Read the exercises to grade, in rubric order; raises RubricError if a rubric or a requested exercise is unusable.
 
-    Args:
-        request: What to grade.
-        submissions: Other paths that students control; no rubric may load its own checks from there.
-
-    Raises:
-        RubricError: A rubric cannot be used, or no rubric has a requested exercise.
+    The submissions are other paths that students control: no rubric may load its own checks from there.
     """
     theirs = (*submissions, *([Path(request.submission)] if request.submission else []))
     paths = request.rubrics or _builtin(request)
@@ -221,24 +221,17 @@ def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) ->
     return stage_submission(request.submission, wanted, root)
 
 
-def _seed_notes(request: GradeRequest) -> tuple[str, ...]:
-    """Note that students could have predicted the drawn values, if they could."""
-    return (PRACTICE_NOTE,) if request.seed is None and request.seed_key.public else ()
-
-
-def _release_notes(distro: str) -> tuple[str, ...]:
-    """Note that the grader was never tested with this ROS release, if so."""
-    if distro in TRIED:
-        return ()
-    return (f"ROS 2 {distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}",)
-
-
-def _isolation_notes(session: RecordingSession) -> tuple[str, ...]:
-    """Note that the submission ran without a sandbox, or which properties its sandbox lacks."""
-    if session.isolation.name == NO_ISOLATION:
-        return ("the submission ran without a sandbox: as asked",)
+def _notes(request: GradeRequest, session: RecordingSession) -> Iterator[str]:
+    """Yield what readers must know of the seed, the release and the sandbox."""
+    if request.seed is None and request.seed_key.public:
+        yield PRACTICE_NOTE
+    if session.ros.distro not in TRIED:
+        yield f"ROS 2 {session.ros.distro} was never tried with this grader; it was tried on {' and '.join(TRIED)}"
     lacking = [str(found) for found in session.containment if not found.holds]
-    return (f"sandbox {session.isolation.name}: {'; '.join(lacking)}",) if lacking else ()
+    if session.isolation.name == NO_ISOLATION:
+        yield "the submission ran without a sandbox: as asked"
+    elif lacking:
+        yield f"sandbox {session.isolation.name}: {'; '.join(lacking)}"
 
 
 def _environment(session: RecordingSession) -> Environment:

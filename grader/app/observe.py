@@ -28,59 +28,32 @@ ODOMETRY_AFTER_NS = NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class ObserveRequest:
-    """What to observe, and how.
+    """What to observe, and how."""
 
-    Attributes:
-        files: Python files; each runs in its own process.
-        duration_ns: How long they are observed.
-        odom_bag: An /odom recording to play; None for no odometry.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto` or `none`.
-    """
-
-    files: tuple[Path, ...]
-    duration_ns: int = 10 * NS_PER_S
-    odom_bag: Path | None = None
-    clock: str = "auto"
-    isolation: str = "auto"
+    files: tuple[Path, ...]  # Python files; each runs in its own process
+    duration_ns: int = 10 * NS_PER_S  # how long they are observed
+    odom_bag: Path | None = None  # an /odom recording to play; None for no odometry
+    clock: str = "auto"  # `virtual`, `wall` or `auto`
+    isolation: str = "auto"  # `auto` or `none`
 
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """The observed behaviour of the nodes.
-
-    Attributes:
-        trace: The complete trace.
-        processes: File names of the processes.
-        isolation: The sandbox tier used.
-    """
+    """The observed behaviour of the nodes."""
 
     trace: Trace
-    processes: tuple[str, ...]
+    processes: tuple[str, ...]  # file names of the processes
     isolation: str
 
 
 def observe(request: ObserveRequest, progress: Progress) -> Summary:
-    """Run the files together and summarise what they did.
-
-    Raises:
-        GraderError: Something that the run needs cannot be used.
-    """
+    """Run the files together and summarise what they did."""
     watched = watch(request, progress)
     return summarise(watched.trace, watched.processes, watched.isolation)
 
 
 def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None = None) -> Watched:
-    """Run the files together and return the trace.
-
-    Args:
-        request: What to run, and how.
-        progress: Called at the start of each step.
-        scenario: The scenario; None for one that only plays the given recording, for the given duration.
-
-    Raises:
-        GraderError: Something that the run needs cannot be used.
-    """
+    """Run the files together and return the trace; without a scenario, only the given recording is played."""
     names = _names(request.files)
     if scenario is None:
         scenario = _undisturbed(request, names)

@@ -13,18 +13,17 @@ from fractions import Fraction
 from pathlib import Path
 from typing import cast
 
-from grader.app.evidence_writer import request_of
 from grader.app.exit_codes import UNUSABLE, exit_code
 from grader.app.grade import read_exercises
-from grader.app.request import GradeRequest, command_words
+from grader.app.request import GradeRequest, command_words, request_of
 from grader.core.errors import EvidenceError, GraderError
 from grader.core.exercise import Exercise
 from grader.core.report import Report
 from grader.execution.evidence.store import Evidence, first_report, found_under, is_evidence, open_evidence, run_of
 from grader.judging.judge_run import judge_run
 from grader.reporting.audience import ANYBODY, Readers, told
-from grader.reporting.delivery import Output, write_whole
-from grader.reporting.formats import FORMATS, PageLayout, rendered
+from grader.reporting.delivery import Output, write_report
+from grader.reporting.formats import FORMATS
 from grader.reporting.json_report import ReportData, dumps, report_to_json
 from grader.reporting.rejudged import RejudgedResult, ReportChange, change
 from grader.rubrics.variants import First
@@ -33,45 +32,28 @@ from grader.rubrics.variants import First
 WORTH_A_POOL = 16
 #: Thresholds of the garbage collector while many recordings are read.
 COLLECTING = (200_000, 20, 20)
-_WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """How to judge evidence.
+    """How to judge evidence."""
 
-    Attributes:
-        exercises: All exercises of the rubrics.
-        chosen: Requested exercise ids; empty for those that were graded.
-        rubrics: Given rubric files; empty for the built-in ones.
-        pictures: Whether reports include charts.
-        verify: Whether to compare the stored trace with the recordings.
-    """
-
-    exercises: tuple[Exercise, ...]
-    chosen: tuple[str, ...] = ()
-    rubrics: tuple[Path, ...] = ()
-    pictures: bool = False
-    verify: bool = False
+    exercises: tuple[Exercise, ...]  # all exercises of the rubrics
+    chosen: tuple[str, ...] = ()  # requested exercise ids; empty for those that were graded
+    rubrics: tuple[Path, ...] = ()  # given rubric files; empty for the built-in ones
+    pictures: bool = False  # whether reports include charts
+    verify: bool = False  # whether to compare the stored trace with the recordings
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The outputs wanted for each report of a class.
+    """The outputs wanted for each report of a class."""
 
-    Attributes:
-        files: Formats, each with the folder for its files.
-        reports: Whether results include the report as JSON.
-        changes: Whether results include the changes since grading.
-        min_score: See `exit_code`.
-        readers: Who reads the outputs, and when.
-    """
-
-    files: tuple[Output, ...] = ()
+    files: tuple[Output, ...] = ()  # formats, each with the folder for its files
     reports: bool = False
-    changes: bool = False
-    min_score: Fraction | None = None
-    readers: Readers = ANYBODY
+    changes: bool = False  # whether results include the changes since grading
+    min_score: Fraction | None = None  # see `exit_code`
+    readers: Readers = ANYBODY  # who reads the outputs, and when
 
 
 def judgement(
@@ -83,11 +65,7 @@ def judgement(
 
 
 def rejudge(evidence: Evidence, how: Judgement) -> Report:
-    """Judge one submission's evidence and return the report.
-
-    Raises:
-        EvidenceError: The evidence is damaged, or holds none of the requested exercises.
-    """
+    """Judge one submission's evidence; raises EvidenceError if it is damaged or has none of the requested exercises."""
     kept = evidence.manifest.run
     request = request_of(kept.request, submission=kept.path, seed=kept.seed, rubrics=how.rubrics)
     exercises = _as_recorded(_asked(evidence, how), request)
@@ -110,11 +88,7 @@ def what_changed(name: str, evidence: Evidence, report: Report) -> ReportChange 
 
 
 def named_evidence(paths: Sequence[Path]) -> list[tuple[str, Path]]:
-    """Return the name and folder of all evidence in and below the given paths, in order.
-
-    Raises:
-        EvidenceError: One of the paths holds no evidence.
-    """
+    """Return name and folder of all evidence in and below the given paths; raises EvidenceError if one holds none."""
     named: dict[Path, str] = {}
     used: Counter[str] = Counter()
     for path in paths:
@@ -134,11 +108,7 @@ def rejudge_class(
 ) -> list[RejudgedResult]:
     """Judge many submissions, and return their results in the given order; a failure of one does not affect the others.
 
-    Args:
-        named: Name and folder of the evidence.
-        how: How to judge.
-        wanted: The outputs to write.
-        jobs: Number of processes; None for one per core.
+    They are judged by `jobs` processes, or by one for each core if it is None.
     """
     workers = min(jobs or len(os.sched_getaffinity(0)), max(1, len(named) // WORTH_A_POOL))
     if workers == 1:
@@ -200,8 +170,7 @@ def _write(name: str, report: Report, wanted: Wanted) -> None:
         if output.path is not None:
             path = output.path / f"{name}{FORMATS[output.format].suffix}"
             path.parent.mkdir(parents=True, exist_ok=True)
-            text = rendered(output.format, report, PageLayout(_WIDTH, colour=False), wanted.readers)
-            write_whole(path, text.encode())
+            write_report(report, Output(output.format, path), wanted.readers)
 
 
 def _asked(evidence: Evidence, how: Judgement) -> list[Exercise]:

@@ -1,4 +1,4 @@
-"""A request to grade a submission, and the command that reproduces its result."""
+"""A request to grade a submission, as JSON in evidence, and as the command that reproduces its result."""
 
 from __future__ import annotations
 
@@ -7,70 +7,48 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from grader.app.seeds import PRACTICE, SeedKey
-from grader.core.exercise import Exercise
+from grader.core.exercise import Drawn, Exercise
+from grader.core.json_values import JsonObject
 from grader.core.limits import TIME_BUDGET_S
 from grader.core.report import Reproduction
 from grader.execution.bag import Odometry
-from grader.rubrics.variants import Draw
+from grader.rubrics.variants import Draw, Recorded
 from grader.submissions.collected import Collected
 
 
 @dataclass(frozen=True, slots=True)
 class GradeRequest:
-    """What to grade, and how.
+    """What to grade, and how."""
 
-    Attributes:
-        submission: Path as the user typed it.
-        exercises: Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only
-            graded by request.
-        every: Whether to grade exactly the exercises that the submission has a file for.
-        rubrics: Rubric files; empty for the built-in ones.
-        seed: Seed of all drawn values; None derives it from the submission and the seed key.
-        seed_key: The key to derive the seed with.
-        odom_bag: An /odom recording to play instead of the built-in one.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto`, `none` or the name of a tier.
-        time_budget_s: Real time that all recordings together may take.
-        workers: Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
-        collected: The files of the submission if they were read before, perhaps on another machine; None to read
-            them now.
-        student: Id of the student whose variant is graded; empty if nothing varies.
-        variant_key: File with the course key, as the user typed it; None if not given.
-        spot_checks: Share of submissions, from 0 to 1, that are also recorded on the wall clock.
-        draw: Supplies variant values; if None, rubrics with variants are refused.
-    """
-
-    submission: str
+    submission: str  # path as the user typed it
+    # Exercise ids to grade; empty for all exercises of the rubrics, except built-in ones that are only graded by
+    # request.
     exercises: tuple[str, ...] = ()
-    every: bool = False
-    rubrics: tuple[Path, ...] = ()
-    seed: int | None = None
-    seed_key: SeedKey = PRACTICE
-    odom_bag: Path | None = None
-    clock: str = "auto"
-    isolation: str = "auto"
-    time_budget_s: float = TIME_BUDGET_S
+    every: bool = False  # whether to grade exactly the exercises that the submission has a file for
+    rubrics: tuple[Path, ...] = ()  # rubric files; empty for the built-in ones
+    seed: int | None = None  # seed of all drawn values; None derives it from the submission and the seed key
+    seed_key: SeedKey = PRACTICE  # the key to derive the seed with
+    odom_bag: Path | None = None  # an /odom recording to play instead of the built-in one
+    clock: str = "auto"  # `virtual`, `wall` or `auto`
+    isolation: str = "auto"  # `auto`, `none` or the name of a tier
+    time_budget_s: float = TIME_BUDGET_S  # real time that all recordings together may take
+    # Most scenarios recorded in parallel; None for one per processor. Does not affect the result.
     workers: int | None = None
-    spot_checks: float = 0.0
+    spot_checks: float = 0.0  # share of submissions, from 0 to 1, that are also recorded on the wall clock
+    # The files of the submission if they were read before, perhaps on another machine; None to read them now
     collected: Collected | None = None
-    student: str = ""
-    variant_key: Path | None = None
-    draw: Draw | None = None
+    student: str = ""  # id of the student whose variant is graded; empty if nothing varies
+    variant_key: Path | None = None  # file with the course key, as the user typed it; None if not given
+    draw: Draw | None = None  # supplies variant values; if None, rubrics with variants are refused
 
 
 def reproduction(
     request: GradeRequest, exercises: Sequence[Exercise], odometry: Odometry | None, seed: int
 ) -> Reproduction:
-    """Return the command that reproduces a report, with digests of all that it reads besides the submission.
-
-    Args:
-        request: The request.
-        exercises: The graded exercises.
-        odometry: The /odom recording that was played, if any.
-        seed: The seed used, whether requested or derived.
-    """
+    """Return the command that reproduces a report, with digests of all that it reads besides the submission."""
     return Reproduction(
         command=command_words(request, seed),
         rubrics=tuple((exercise.id, exercise.digest) for exercise in exercises),
@@ -116,3 +94,33 @@ def recording_digest(odometry: Odometry) -> str:
 def _unambiguous_path(path: str) -> str:
     """Return a path that cannot be mistaken for an option or a subcommand."""
     return path if os.sep in path or path in (".", "..") else os.path.join(".", path)  # noqa: PTH118  a bare ./
+
+
+def request_to_json(request: GradeRequest, exercises: Sequence[Exercise] = ()) -> JsonObject:
+    """Convert to JSON what reproduces a report besides path, seed and rubrics, and add the variant values."""
+    return {
+        "exercises": list(request.exercises),
+        "odom_bag": None if request.odom_bag is None else str(request.odom_bag),
+        "clock": request.clock,
+        "isolation": request.isolation,
+        "student": request.student,
+        "variant_key": None if request.variant_key is None else str(request.variant_key),
+        "variants": {e.id: dict(e.variant.values) for e in exercises if e.variant is not None},
+    }
+
+
+def request_of(data: dict[str, Any], *, submission: str, seed: int, rubrics: tuple[Path, ...]) -> GradeRequest:
+    """Return the request that would record a kept run again and judge it by these rubrics."""
+    bag, key, student = data.get("odom_bag"), data.get("variant_key"), str(data.get("student", ""))
+    return GradeRequest(
+        submission=submission,
+        exercises=tuple(str(id_) for id_ in data.get("exercises", ())),
+        rubrics=rubrics,
+        seed=seed,
+        odom_bag=Path(str(bag)) if bag is not None else None,
+        clock=str(data.get("clock", "auto")),
+        isolation=str(data.get("isolation", "auto")),
+        student=student,
+        variant_key=None if key is None else Path(str(key)),
+        draw=Recorded(Drawn(student, data.get("variants", {}))),
+    )

@@ -35,15 +35,7 @@ _VARIANT_BYTES = 16
 
 
 def read_key(path: Path, what: str) -> bytes:
-    """Read a key from a file, and strip whitespace.
-
-    Args:
-        path: The file.
-        what: Name of the key in messages, such as `course key`.
-
-    Raises:
-        KeyFileError: The file cannot be read, or the key is too short or too long.
-    """
+    """Read a key from a file, and strip whitespace; a KeyFileError calls it `what`, such as `course key`."""
     where = shown(str(path), 500)
     try:
         with path.open("rb") as file:
@@ -64,15 +56,10 @@ def checked_key(key: bytes, where: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class SeedKey:
-    """The key that seeds are derived from; the repr of this object does not reveal it.
-
-    Attributes:
-        value: The key.
-        public: Whether the key is publicly known.
-    """
+    """The key that seeds are derived from; the repr of this object does not reveal it."""
 
     value: bytes = field(repr=False)
-    public: bool = False
+    public: bool = False  # whether the key is publicly known
 
     def seed(self, digest: str) -> int:
         """Derive the seed of a submission from its digest.
@@ -88,17 +75,10 @@ PRACTICE = SeedKey(b"rclpy-grader: the public practice key, for runs that nobody
 
 
 def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.environ) -> SeedKey | None:
-    """Return the seed key from a file or the environment; None if neither has one.
+    """Return the seed key from a file or the environment variable GRADER_SEED_KEY; None if neither has one.
 
-    Removes the variable from the environment, so that no process started later inherits it.
-
-    Args:
-        path: The file given with `--seed-key`; None if not given.
-        environment: May hold `GRADER_SEED_KEY`. An empty value counts as unset, because CI systems set it if the secret
-            does not exist.
-
-    Raises:
-        KeyFileError: The key cannot be used.
+    Removes the variable from the environment, so that no process started later inherits it. An empty value counts as
+    unset, because CI systems set it if the secret does not exist.
     """
     given = environment.pop(VARIABLE, "").strip()
     if path is not None:
@@ -107,11 +87,7 @@ def seed_key(path: Path | None, environment: MutableMapping[str, str] = os.envir
 
 
 def kept_key(path: Path) -> SeedKey:
-    """Return the key in a file that only its owner can read; create it on the first call.
-
-    Raises:
-        KeyFileError: The file cannot be read or created.
-    """
+    """Return the key in a file that only its owner can read; create it on the first call."""
     try:
         made = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
     except FileExistsError:
@@ -140,15 +116,10 @@ def _close_to_others(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ByKey:
-    """Draws the variant of a student from the course key.
-
-    Attributes:
-        key: The course key.
-        student: Id of the student; case, surrounding whitespace and Unicode normalisation make no difference.
-    """
+    """Draws the variant of a student from the course key."""
 
     key: bytes
-    student: str
+    student: str  # id of the student; case, surrounding whitespace and Unicode normalisation make no difference
 
     def value(self, exercise: str, options: VariantOptions) -> Value | None:
         """Pick a value by the HMAC-SHA256 of exercise, variant and student."""

@@ -32,12 +32,7 @@ Finished = Callable[[Key, Trace], None]
 
 
 def shortened(plan: Plan, virtual: Trace) -> Plan:
-    """Shorten a plan to its beginning, for a spot check on the wall clock with the same stimuli.
-
-    Args:
-        plan: The complete plan.
-        virtual: Its trace in virtual time.
-    """
+    """Shorten a plan to its beginning, for a spot check on the wall clock with the same stimuli."""
     bare = bare_plan(plan, virtual)
     if plan.first_message_on:
         messages = virtual.messages(plan.first_message_on)
@@ -61,19 +56,12 @@ def is_drawn(share: float, seed: int, digest: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SpotChecks:
-    """Decides which recordings of a submission are checked.
+    """Decides which recordings of a submission are checked."""
 
-    Attributes:
-        share: Share of submissions that are drawn, from 0 to 1.
-        seed: Seed of the submission's drawn values; together with the digest it decides whether it is drawn.
-        digest: The submission's digest.
-        reaches: Names in its files that access internals of their process.
-    """
-
-    share: float
-    seed: int
+    share: float  # share of submissions that are drawn, from 0 to 1
+    seed: int  # seed of the submission's drawn values; together with the digest it decides whether it is drawn
     digest: str
-    reaches: tuple[str, ...] = ()
+    reaches: tuple[str, ...] = ()  # names in its files that access internals of their process
 
     @property
     def drawn(self) -> bool:
@@ -109,14 +97,8 @@ def check(
     """Run the spot checks that are due; where the clocks disagree, replace the exercise's traces by wall-clock ones.
 
     If the machine is too busy for a check, the trace in virtual time counts and gets a note. Only for a program that
-    accesses internals of its process, the result is then undecided.
-
-    Args:
-        checks: Decides what to check.
-        jobs: The recorded jobs, by exercise and scenario.
-        traces: Their traces.
-        record: Records a job.
-        finished: Called with each trace of a checked exercise.
+    accesses internals of its process, the result is then undecided. Each trace of a checked exercise is passed to
+    `finished`.
     """
     found = dict(traces)
     due = checks.due(jobs, traces)

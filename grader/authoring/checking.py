@@ -26,34 +26,23 @@ _STRETCHES = ("window", "silence")
 
 
 def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
-    """Return warnings about a rubric, in the order of the file.
-
-    Args:
-        exercise: The exercise read from the rubric.
-        tree: The YAML document, for positions.
-    """
-    found = [*_of_points(exercise, tree), *_of_scenarios(exercise, tree), *_of_files(exercise, tree)]
+    """Return warnings about a rubric, in the order of the file."""
+    found = list(_of_exercise(exercise, tree))
     for index, criterion in enumerate(exercise.criteria):
         found += _of_criterion(criterion, exercise, ("criteria", index), tree)
     return sorted(set(found))
 
 
-def _of_points(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
+def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     total = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
     if total % ROUND:
         text = f"the points add up to {float(total):g}, which is no multiple of {ROUND}"
         yield tree.keys.get(("criteria",), TOP).mistake(text)
-
-
-def _of_scenarios(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     judged = {criterion.scenario for criterion in exercise.criteria}
     for index, scenario in enumerate(exercise.scenarios):
         if scenario.id not in judged:
             where = tree.values.get(("scenarios", index, "id"), TOP)
             yield where.mistake(f"the scenario {scenario.id} is recorded, but no criterion looks at it")
-
-
-def _of_files(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     run = {process for scenario in exercise.scenarios for process in scenario.processes}
     for index, name in enumerate(exercise.files):
         if name not in run:
@@ -85,23 +74,14 @@ def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A valid rubric.
-
-    Attributes:
-        summary: A summary in one line.
-        warnings: Warnings, one line each, with line and column.
-    """
+    """A valid rubric: a summary in one line, and warnings with line and column."""
 
     summary: str
     warnings: tuple[str, ...]
 
 
 def check_rubric(path: Path) -> Checked:
-    """Check a rubric, and summarise it.
-
-    Raises:
-        RubricError: The rubric is invalid; the message lists every mistake.
-    """
+    """Check a rubric, and summarise it; raises RubricError with every mistake."""
     exercise = read_rubric(path, draw=First())
     where = shown(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))

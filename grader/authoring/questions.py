@@ -23,14 +23,14 @@ _OVERRIDES = "qos_overrides."
 def parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
     """Yield node, name and value of each parameter, with an empty node if only one has any; lists become None."""
     offers = [(o.name.partition(":"), o.detail) for o in trace.of(Offer) if o.kind == "parameter"]
-    own = {(node, name): value for (node, _, name), value in offers if not _is_everybodys(name)}
+    own = {
+        (node, name): value
+        for (node, _, name), value in offers
+        if name not in _EVERYBODYS and not name.startswith(_OVERRIDES)
+    }
     several = len({node for node, _ in own}) > 1
     for (node, name), value in own.items():
         yield node if several else "", name, _read(value)
-
-
-def _is_everybodys(name: str) -> bool:
-    return name in _EVERYBODYS or name.startswith(_OVERRIDES)
 
 
 def _read(text: str) -> str | float | bool | None:
@@ -53,13 +53,7 @@ _MOST_CASES, _MOST_ANSWER_FIELDS = 8, 8
 
 
 def cases_seen(trace: Trace, given: str, answered: str) -> list[dict[str, object]]:
-    """Return a case for each distinct input: its fields, and the answer within a second.
-
-    Args:
-        trace: The observed trace.
-        given: Topic of the inputs.
-        answered: Topic of the answers.
-    """
+    """Return a case for each distinct input: its fields, and the answer within a second."""
     inputs = trace.deliveries(given)
     answers = _answers(trace, inputs, answered)
     different: dict[str, tuple[Delivery, Message | None]] = {}
@@ -123,7 +117,6 @@ class Seen:
     Attributes:
         alone: Trace of the nodes without stimuli.
         driven: Trace of the nodes with the stimuli of the draft; the same as `alone` if there are none.
-        files: File names of the nodes.
         window_s: Longest time that every topic was observed after its first message.
     """
 

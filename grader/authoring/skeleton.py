@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from grader.submissions.collected import listed
+
 
 @dataclass(frozen=True, slots=True)
 class DraftQuantity:
@@ -18,13 +20,7 @@ class DraftQuantity:
 
 @dataclass(frozen=True, slots=True)
 class DraftStimulus:
-    """A stimulus of the draft.
-
-    Attributes:
-        kind: Its key in a rubric.
-        parameters: Its parameters, in order.
-        comment: A decision left to the author; may be empty.
-    """
+    """A stimulus of the draft, with a comment on what is left for the author to decide."""
 
     kind: str
     parameters: Mapping[str, object]
@@ -33,17 +29,7 @@ class DraftStimulus:
 
 @dataclass(frozen=True, slots=True)
 class DraftCriterion:
-    """A proposed criterion.
-
-    Attributes:
-        id: Its id.
-        title: Its title.
-        check: Name of its check.
-        parameters: The check's parameters, in order.
-        hint: Hint for students who do not meet it.
-        needs: Id of the criterion that it depends on; empty for none.
-        comment: A decision left to the author; may be empty.
-    """
+    """A proposed criterion, with a comment on what is left for the author to decide."""
 
     id: str
     title: str
@@ -59,14 +45,9 @@ class Draft:
     """The contents of a skeleton.
 
     Attributes:
-        id: Id of the exercise.
         files: Files of the reference; each runs in its own process.
-        duration_s: Duration of the scenario.
         after: Topic whose first message starts the observation; empty for the start of the nodes.
         may_exit: Files that end by themselves.
-        stimuli: The stimuli.
-        criteria: The proposed criteria.
-        remarks: Remarks for the author, one sentence each.
     """
 
     id: str
@@ -96,19 +77,13 @@ _WORDS = ("true", "false", "null", "yes", "no", "on", "off")
 
 
 def rubric_text(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]] = ()) -> str:
-    """Render a draft as the text of a rubric.
-
-    Args:
-        draft: The draft.
-        left_out: Criteria to put into comments, each with the reason.
-    """
+    """Render a draft as the text of a rubric; the criteria left out become comments, each with its reason."""
     return "\n".join(_lines(draft, left_out)) + "\n"
 
 
 def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iterator[str]:
-    yield from _comment(
-        f"A skeleton, made of what {_and(draft.files)} did. What is marked `decide:` only you can know."
-    )
+    files = listed(draft.files, "and")
+    yield from _comment(f"A skeleton, made of what {files} did. What is marked `decide:` only you can know.")
     yield from _comment("`grade rubric check` says whether it can be used, `grade rubric explain` what it asks.")
     for remark in draft.remarks:
         yield from _comment(f"{remark[:1].upper()}{remark[1:]}.")
@@ -227,7 +202,3 @@ def _scalar(text: str) -> str:
 
 def _title(id_: str) -> str:
     return _scalar(id_.replace("_", " ").capitalize())
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

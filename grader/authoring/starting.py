@@ -37,13 +37,7 @@ _CALLS = 3
 
 
 def stimuli_for(trace: Trace, duration_s: float, given: SentMessages = NOTHING) -> tuple[DraftStimulus, ...]:
-    """Propose stimuli for all endpoints of the nodes that wait for input.
-
-    Args:
-        trace: Trace of the nodes without stimuli.
-        duration_s: Duration of the scenario.
-        given: Topic -> fields of the messages that the author wants to send.
-    """
+    """Propose stimuli for all endpoints that wait for input; `given` holds the messages that the author named."""
     return (*_topics(trace, duration_s, given), *_services(trace), *_parameters(trace))
 
 
@@ -104,14 +98,7 @@ def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """The skeleton of a rubric.
-
-    Attributes:
-        text: Content of the file.
-        criteria: Number of criteria; the reference meets all of them.
-        left_out: Number of criteria in comments.
-        remarks: Remarks about the run, one sentence each.
-    """
+    """The text of a skeleton, with the number of criteria that the reference meets, and of those in comments."""
 
     text: str
     criteria: int

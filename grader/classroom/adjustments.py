@@ -34,59 +34,36 @@ class Amount:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The instructor's decision about one submission.
+    """The instructor's decision about one submission."""
 
-    Attributes:
-        days_late: Late days; a started day counts in full.
-        score: Replaces the grader's score, whether late or not; None to keep it.
-        reason: The reason.
-        ignore: Why the submission does not count at all; empty if it counts.
-        where: Position in the file, for messages.
-    """
-
-    days_late: Fraction = Fraction(0)
-    score: Fraction | None = None
+    days_late: Fraction = Fraction(0)  # late days; a started day counts in full
+    score: Fraction | None = None  # replaces the grader's score, whether late or not; None to keep it
     reason: str = ""
-    ignore: str = ""
-    where: str = ""
+    ignore: str = ""  # why the submission does not count at all; empty if it counts
+    where: str = ""  # position in the file, for messages
 
 
 @dataclass(frozen=True, slots=True)
 class Adjustments:
-    """The contents of an adjustments file.
+    """The contents of an adjustments file."""
 
-    Attributes:
-        per_day: Penalty for each late day; None for no penalty.
-        at_most: Largest penalty for all late days together; None for all points earned.
-        students: Name, user name, email address or number -> decision.
-    """
-
-    per_day: Amount | None = None
-    at_most: Amount | None = None
+    per_day: Amount | None = None  # penalty for each late day; None for no penalty
+    at_most: Amount | None = None  # largest penalty for all late days together; None for all points earned
+    # Name, user name, email address or number -> decision
     students: Mapping[str, Decision] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Adjusted:
-    """A score after adjustments, together with the raw score.
+    """A score after adjustments, together with the raw score."""
 
-    Attributes:
-        raw: The grader's points; None if there are none or they are not final.
-        score: The score that counts; None for no score.
-        days_late: Late days.
-        penalty: Points deducted for late days.
-        override: The score set by the instructor; None if not set.
-        reason: The reason for the change, or for ignoring the submission.
-        ignored: Whether the submission does not count.
-    """
-
-    raw: Fraction | None = None
-    score: Fraction | None = None
+    raw: Fraction | None = None  # the grader's points; None if there are none or they are not final
+    score: Fraction | None = None  # the score that counts; None for no score
     days_late: Fraction = Fraction(0)
-    penalty: Fraction = Fraction(0)
-    override: Fraction | None = None
-    reason: str = ""
-    ignored: bool = False
+    penalty: Fraction = Fraction(0)  # points deducted for late days
+    override: Fraction | None = None  # the score set by the instructor; None if not set
+    reason: str = ""  # the reason for the change, or for ignoring the submission
+    ignored: bool = False  # whether the submission does not count
 
     @property
     def changed(self) -> bool:
@@ -95,13 +72,7 @@ class Adjusted:
 
 
 def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adjusted:
-    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned.
-
-    Args:
-        raw: The grader's points; None if there are none.
-        decision: The decision about this submission.
-        rules: The penalties for late days.
-    """
+    """Apply a decision to a score. A started day counts in full, and the penalty never exceeds the points earned."""
     penalty = Fraction(0)
     if raw is not None and rules.per_day is not None:
         days = -(-decision.days_late.numerator // decision.days_late.denominator)
@@ -119,32 +90,29 @@ def adjust(raw: Fraction | None, decision: Decision, rules: Adjustments) -> Adju
     )
 
 
-class _Late(BaseModel):
+class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Late(_Strict):
     per_day: str
     at_most: str | None = None
 
 
-class _Student(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _Student(_Strict):
     days_late: Annotated[float, Field(ge=0, le=3650, allow_inf_nan=False, strict=False)] = 0.0
     score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
     reason: _Reason | None = None
     ignore: _Reason | None = None
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _File(_Strict):
     late: _Late | None = None
     students: dict[str, _Student] = {}
 
 
 def read_adjustments(path: Path) -> Adjustments:
-    """Read an adjustments file.
-
-    Raises:
-        ClassError: The file cannot be read or has mistakes; the message names the first one and its position.
-    """
+    """Read an adjustments file; raises ClassError with the first mistake and its position."""
     tree = _tree(path)
     try:
         read = _File.model_validate(tree.data or {})

@@ -9,38 +9,27 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from grader.classroom.gradebook import Gradebook, Row, Status, exactly, exercises_of, number, remarks
-from grader.classroom.roster import Person, fold_name
+from grader.classroom.roster import fold_name
 from grader.classroom.store import Conditions
 from grader.classroom.watching import clock_time
+from grader.core.checkup import NO_SANDBOX
 from grader.reporting.class_page.contents import ClassPage, Listing, PageEntry, PageLink, RowTone, RunFacts, StudentRow
 from grader.reporting.json_report import ReportData
 
 
 @dataclass(frozen=True, slots=True)
 class RunOfClass:
-    """One run of the command over a class.
+    """One run of the command over a class."""
 
-    Attributes:
-        conditions: What the results depend on.
-        title: Title of the class.
-        written: When the run ended, as text.
-        jobs: Submissions graded in parallel.
-        took_s: How long grading took.
-        graded: Number of submissions graded in this run.
-        kept: Number of submissions that already had results.
-        stopped: Whether the run was stopped before all submissions were graded.
-        folders: Absolute paths of this machine, to be removed from the page.
-    """
-
-    conditions: Conditions
+    conditions: Conditions  # what the results depend on
     title: str = ""
-    written: str = ""
-    jobs: int = 1
-    took_s: float = 0.0
-    graded: int = 0
-    kept: int = 0
-    stopped: bool = False
-    folders: tuple[str, ...] = ()
+    written: str = ""  # when the run ended, as text
+    jobs: int = 1  # submissions graded in parallel
+    took_s: float = 0.0  # how long grading took
+    graded: int = 0  # number of submissions graded in this run
+    kept: int = 0  # number of submissions that already had results
+    stopped: bool = False  # whether the run was stopped before all submissions were graded
+    folders: tuple[str, ...] = ()  # absolute paths of this machine, to be removed from the page
 
 
 def title_of(sources: Sequence[Path]) -> str:
@@ -58,12 +47,7 @@ _MIB = 1 << 20
 
 
 def run_facts(book: Gradebook, run: RunOfClass) -> RunFacts:
-    """Build the header of the page.
-
-    Args:
-        book: The gradebook.
-        run: The run that writes the page.
-    """
+    """Build the header of the page."""
     reports = [row.report for row in book.rows if row.report is not None]
     counts = [f"{book.count(status)} {status.value}" for status in Status if book.count(status)]
     now = "" if run.stopped else f"graded now: {run.graded}, done before: {run.kept}"
@@ -90,7 +74,7 @@ def _rows(book: Gradebook, run: RunOfClass, reports: Sequence[ReportData]) -> It
 def _warnings(run: RunOfClass, reports: Sequence[ReportData]) -> Iterator[str]:
     if run.stopped:
         yield "This run was stopped before everybody was graded; the same command goes on where it was."
-    bare = sum(_isolation(report).startswith("none") for report in reports)
+    bare = sum(_isolation(report) == NO_SANDBOX for report in reports)
     if bare:
         yield f"No isolation: {bare} of {len(reports)} submissions ran without a sandbox."
 
@@ -140,13 +124,7 @@ _ENDED = {"exited": "ended by itself", "killed": "was ended", "hung": "did not c
 
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
-    """Build the page of a class.
-
-    Args:
-        book: The gradebook.
-        run: The run that writes the page.
-        links: Other pages in the results folder.
-    """
+    """Build the page of a class, with links to other pages in the results folder."""
     rows = sorted(book.rows, key=lambda row: (fold_name(row.shown_name), row.shown_name, row.name))
     students = tuple(_student(row, run) for row in rows)
     listings = [listing for listing in _listings(book, rows, run) if listing.entries]
@@ -182,11 +160,7 @@ def _name(row: Row) -> str:
 def _also(row: Row) -> Iterator[str]:
     yield row.name
     if row.person is not None:
-        yield from _roster_ids(row.person)
-
-
-def _roster_ids(person: Person) -> tuple[str, ...]:
-    return (person.user, person.id, person.email if person.row is not None else "")
+        yield from (row.person.user, row.person.id, row.person.email if row.person.row is not None else "")
 
 
 def _adjustments(row: Row) -> Iterator[str]:
@@ -297,12 +271,7 @@ def _faults(index: int, row: Row) -> Iterator[PageEntry]:
 
 
 def without_folders(text: str, folders: Sequence[str]) -> str:
-    """Make paths in a sentence relative to the class.
-
-    Args:
-        text: A sentence.
-        folders: Absolute paths of the class, the longest first; other paths are cut to their last part.
-    """
+    """Make paths in a sentence relative to the folders of the class, longest first; cut others to their last part."""
     for folder in folders:
         text = text.replace(f"{folder}/", "").replace(folder, folder.rsplit("/", 1)[-1])
     return _PATH.sub(r"\1", text)

@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -21,11 +21,18 @@ from grader.app.seeds import kept_key
 from grader.classroom.adjustments import Adjustments, read_adjustments
 from grader.classroom.class_page import RunOfClass, folders_of, title_of
 from grader.classroom.gradebook import Gradebook, Row, decisions_for, make_gradebook
-from grader.classroom.grading import ClassRun, own_conditions, refuse_without_key, with_known_students
+from grader.classroom.grading import (
+    ClassRequest,
+    ClassRun,
+    digest_of,
+    due_now,
+    own_conditions,
+    refuse_without_key,
+    with_known_students,
+)
 from grader.classroom.intake import HandedInEntry, Intake, take_in
 from grader.classroom.local import LocalScheduler, MakeScheduler
 from grader.classroom.outputs import CLASS, Graded, class_files, exports, summary_json
-from grader.classroom.request import ClassRequest, digest_of, due_now
 from grader.classroom.roster import RosterMatch, match, read_roster
 from grader.classroom.store import SEED_KEY, Conditions, Store, open_store
 from grader.classroom.watching import Watcher
@@ -50,16 +57,10 @@ def grade_class(
     warn: Callable[[str], None],
     make_scheduler: MakeScheduler = LocalScheduler,
 ) -> Graded:
-    """Grade a class, or resume grading it.
+    """Grade a class, or resume grading it; raises a GraderError whose class tells who must act.
 
-    Args:
-        course: What to grade, and how.
-        watcher: Shows the progress.
-        warn: Called with warnings for the instructor before grading begins.
-        make_scheduler: Makes the scheduler for a number of parallel submissions.
-
-    Raises:
-        GraderError: Something that grading needs cannot be used; the class of the error tells who must act.
+    Warnings for the instructor are passed to `warn` before grading begins. The scheduler is made for a number of
+    parallel submissions.
     """
     exercises = read_exercises(replace(course.grading, draw=First()), course.sources)
     refuse_without_key(course, exercises)
@@ -142,8 +143,8 @@ def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store
     """Compare the submissions if requested, and add the result to the class."""
     if course.given is None:
         return replace(graded, links=link_of_earlier_run(store))
-    found = compare_class(intake.entries, graded.book.rows, course.given, store)
-    return replace(graded, links=(found.link,), remarks=(found.remark,), files=found.files)
+    found, files = compare_class(intake.entries, graded.book.rows, course.given, store)
+    return replace(graded, links=(_link(found),), remarks=(f"similar submissions: {found}",), files=files)
 
 
 def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: Graded | None = None) -> RunOfClass:
@@ -194,28 +195,12 @@ def _text(path: Path) -> str:
         return ""
 
 
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """The result of comparing a class: a sentence for the summary, the files to open, and a link to the page."""
-
-    remark: str
-    files: tuple[Path, ...]
-    link: PageLink
-
-
 def compare_class(
     entries: Sequence[HandedInEntry], rows: Sequence[Row], given: Sequence[ComparedProgram], store: Store
-) -> Compared:
-    """Compare all submissions, and write the similarity pages and table; no score depends on them.
+) -> tuple[str, tuple[Path, ...]]:
+    """Compare all submissions, write pages and a table, and return what was found and the files to open.
 
-    Args:
-        entries: The submissions.
-        rows: Their rows in the gradebook.
-        given: The files handed out to everyone.
-        store: Receives the pages.
-
-    Raises:
-        HarnessError: The pages cannot be written.
+    The files handed out to everyone, `given`, are left out. Raises HarnessError if the pages cannot be written.
     """
     row_of = {row.name: row for row in rows}
     handed = [_handed(entry, row_of.get(entry.name)) for entry in entries]
@@ -228,8 +213,7 @@ def compare_class(
     for old in (store.folder / SIMILARITY_FOLDER).glob("pair-*.html"):
         if old.name not in pages:
             old.unlink(missing_ok=True)
-    found = _counted(similar)
-    return Compared(f"similar submissions: {found}", (table, overview), _link(found))
+    return _counted(similar), (table, overview)
 
 
 def link_of_earlier_run(store: Store) -> tuple[PageLink, ...]:

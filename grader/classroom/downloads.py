@@ -33,6 +33,7 @@ from grader.submissions.collected import collision, is_skipped, listed, name_pro
 
 #: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")
+#: The layouts that can be requested.
 FOLDERS, AUTO = "folders", "auto"
 GITHUB, CLASSROOM50 = "github-classroom", "classroom50"
 MOODLE, CANVAS = "moodle", "canvas"
@@ -41,8 +42,6 @@ PATTERNS: Mapping[str, str] = {
     MOODLE: r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?",
     CANVAS: r"(?P<name>[^_]+)_(?:(?P<late>LATE)_)?(?P<id>\d+)_\d+_(?P<file>.+)",
 }
-#: All layouts that can be requested.
-LAYOUTS = (AUTO, FOLDERS, GITHUB, CLASSROOM50, MOODLE, CANVAS)
 # Canvas appends a number to the name of a resubmitted file.
 _HANDED_IN_AGAIN = re.compile(r"-\d+(?=\.[^.]+$)")
 _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
@@ -50,34 +49,22 @@ _FOLDER_OF_CLONES = re.compile(r"(?P<slug>.+)-submissions(?:-.*)?")
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """The information in the name of a folder or file in a download.
+    """The information in the name of a folder or file in a download."""
 
-    Attributes:
-        identity: Group -> matched text.
-        file: Original name of the student's file; empty if this is the complete submission.
-        late: Whether the platform marked it as late.
-        recognised: Whether the name fits the layout.
-    """
-
-    identity: Mapping[str, str]
-    file: str = ""
-    late: bool = False
-    recognised: bool = True
+    identity: Mapping[str, str]  # group -> matched text
+    file: str = ""  # original name of the student's file; empty if this is the complete submission
+    late: bool = False  # whether the platform marked it as late
+    recognised: bool = True  # whether the name fits the layout
 
 
 @dataclass(frozen=True, slots=True)
 class DownloadLayout:
-    """How the entries of one download are named.
+    """How the entries of one download are named."""
 
-    Attributes:
-        name: One of `LAYOUTS`, or `pattern`.
-        pattern: Regular expression for names; None if the name identifies the student by itself.
-        prefix: Prefix of the user name in the names of cloned repositories.
-    """
-
-    name: str
+    name: str  # one of the layouts above, or `pattern`
+    # Regular expression for names; None if the name identifies the student by itself
     pattern: re.Pattern[str] | None = None
-    prefix: str = ""
+    prefix: str = ""  # prefix of the user name in the names of cloned repositories
 
     def read(self, label: str) -> Named:
         """Interpret the name of a folder, or of a file including its suffix."""
@@ -97,16 +84,9 @@ class DownloadLayout:
 
 
 def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
-    """Determine the layout of a download.
+    """Determine the layout of a download from the names in its top folder, `place`.
 
-    Args:
-        wanted: One of `LAYOUTS`.
-        pattern: The user's regular expression, which overrides `wanted`; empty if there is none.
-        place: Name of the top folder.
-        labels: Names in that folder.
-
-    Raises:
-        ClassError: The regular expression cannot be used.
+    A regular expression of the user overrides the layout that is wanted; raises ClassError if it cannot be used.
     """
     if pattern:
         return DownloadLayout("pattern", _compiled(pattern))
@@ -166,29 +146,17 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 @dataclass(slots=True)
 class Unpacked:
-    """An unpacked download.
+    """An unpacked download."""
 
-    Attributes:
-        folder: The folder with the submissions, below a folder around all of them if there is one.
-        refused: Name of a folder or file in it -> why it was not unpacked.
-        strays: Entries that belong to no submission, with the reason.
-    """
-
-    folder: Path
-    refused: dict[str, str] = field(default_factory=dict)
-    strays: list[str] = field(default_factory=list)
+    folder: Path  # the folder with the submissions, below a folder around all of them if there is one
+    refused: dict[str, str] = field(default_factory=dict)  # name of a folder or file in it -> why it was not unpacked
+    strays: list[str] = field(default_factory=list)  # entries that belong to no submission, with the reason
 
 
 def unpack_download(archive: Path, into: Path) -> Unpacked:
-    """Unpack a download, unless it was unpacked before.
+    """Unpack a zip or tar file into a folder of the grader, unless it was unpacked before; a note is kept beside it.
 
-    Args:
-        archive: A zip or tar file, compressed or not.
-        into: Destination folder, owned by the grader; it need not exist. A note is stored beside it.
-
-    Raises:
-        ClassError: The archive cannot be read.
-        HarnessError: The copy cannot be written.
+    Raises ClassError if the archive cannot be read, HarnessError if the copy cannot be written.
     """
     data = _read(archive)
     note = into.with_name(f".{into.name}.json")

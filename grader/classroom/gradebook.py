@@ -15,7 +15,7 @@ from grader.classroom.intake import HandedInEntry, Intake
 from grader.classroom.roster import Person, RosterMatch, fold_handle
 from grader.classroom.store import Kept, ResultStatus, State
 from grader.reporting.escape import csv_cell, shown
-from grader.reporting.json_report import CriterionData, ExerciseData, ReportData
+from grader.reporting.json_report import ExerciseData, ReportData
 
 
 class Status(str, Enum):
@@ -31,35 +31,20 @@ class Status(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One submission, or one person without one.
+    """One submission, or one person without one."""
 
-    Attributes:
-        name: Name of the entry and of its results folder; empty for a person without a submission.
-        label: Its name in the source.
-        person: Who handed it in; None if nobody on the roster matches.
-        status: See Status.
-        problem: Why there is no report, or why the last attempt failed; may be empty.
-        result: The stored result; None if there is nothing.
-        report: Its report; None if there is none.
-        handed_back: The report with what students may see; None if there is none.
-        adjusted: The score after the instructor's decisions.
-        marked_late: Whether the platform marked it as late.
-        outdated: Whether the result belongs to different files or another rubric than the current ones.
-        twin_of: Names of other submissions by the same person.
-    """
-
-    name: str
-    label: str
-    person: Person | None
+    name: str  # name of the entry and of its results folder; empty for a person without a submission
+    label: str  # its name in the source
+    person: Person | None  # who handed it in; None if nobody on the roster matches
     status: Status
-    problem: str = ""
-    result: ResultStatus | None = None
-    report: ReportData | None = None
-    handed_back: ReportData | None = None
-    adjusted: Adjusted = field(default_factory=Adjusted)
-    marked_late: bool = False
-    outdated: bool = False
-    twin_of: tuple[str, ...] = ()
+    problem: str = ""  # why there is no report, or why the last attempt failed; may be empty
+    result: ResultStatus | None = None  # the stored result; None if there is nothing
+    report: ReportData | None = None  # its report; None if there is none
+    handed_back: ReportData | None = None  # the report with what students may see; None if there is none
+    adjusted: Adjusted = field(default_factory=Adjusted)  # the score after the instructor's decisions
+    marked_late: bool = False  # whether the platform marked it as late
+    outdated: bool = False  # whether the result belongs to different files or another rubric than the current ones
+    twin_of: tuple[str, ...] = ()  # names of other submissions by the same person
 
     @property
     def shown_name(self) -> str:
@@ -74,23 +59,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Gradebook:
-    """The gradebook of a class.
+    """The gradebook of a class."""
 
-    Attributes:
-        rows: Submissions by name, then people without one.
-        matching: How submissions match the roster.
-        strays: Entries of the sources that are not submissions.
-        foreign: Names of results that belong to no current submission.
-        layouts: Each source with its layout.
-        remarks: Remarks for the instructor.
-    """
-
-    rows: tuple[Row, ...]
-    matching: RosterMatch = field(default_factory=RosterMatch)
-    strays: tuple[str, ...] = ()
-    foreign: tuple[str, ...] = ()
-    layouts: tuple[tuple[str, str], ...] = ()
-    remarks: tuple[str, ...] = ()
+    rows: tuple[Row, ...]  # submissions by name, then people without one
+    matching: RosterMatch = field(default_factory=RosterMatch)  # how submissions match the roster
+    strays: tuple[str, ...] = ()  # entries of the sources that are not submissions
+    foreign: tuple[str, ...] = ()  # names of results that belong to no current submission
+    layouts: tuple[tuple[str, str], ...] = ()  # each source with its layout
+    remarks: tuple[str, ...] = ()  # remarks for the instructor
 
     def count(self, status: Status) -> int:
         """Count the rows with a status."""
@@ -121,20 +97,10 @@ def make_gradebook(  # noqa: PLR0913  each comes from a different source
     handed_back_of: Callable[[str], ReportData | None],
     foreign: Sequence[str] = (),
 ) -> Gradebook:
-    """Assemble the gradebook.
+    """Assemble the gradebook; raises ClassError for a decision about somebody who is not in this class.
 
-    Args:
-        intake: The submissions.
-        matching: How they match the roster.
-        adjustments: The instructor's decisions.
-        kept: Name -> stored results.
-        keys: Name -> key that a current result has; empty if unknown.
-        report_of: Reads the report of a submission.
-        handed_back_of: Reads the report with what students may see.
-        foreign: Names of results that belong to no submission.
-
-    Raises:
-        ClassError: A decision names somebody who is not in this class.
+    Stored results and the keys that current results have, empty if unknown, are given by name. The two functions read
+    the complete report of a submission, and the one with what students may see.
     """
     decisions = decisions_for(intake.entries, matching, adjustments)
     twins = {name: tuple(n for n in group if n != name) for group in matching.duplicates for name in group}
@@ -307,16 +273,13 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
 def _points(report: ReportData | None, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
     by_exercise = {e["id"]: e for e in exercises_of(report)}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
+    decided = {pair: criterion for pair, criterion in found.items() if criterion["outcome"] != "undecided"}
     return [
         *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
-        *("" if pair not in found or _is_undecided(found[pair]) else number(found[pair]["score"]) for pair in criteria),
+        *(number(decided[pair]["score"]) if pair in decided else "" for pair in criteria),
     ]
 
 
-def _is_undecided(criterion: CriterionData) -> bool:
-    return criterion["outcome"] == "undecided"
-
-
 def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
-    """Return the exercises of a report, if there is one."""
+    """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]

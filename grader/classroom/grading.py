@@ -1,4 +1,4 @@
-"""Grades the submissions of a class that are due, each with the variant of its student, and stores the results."""
+"""The request to grade a class; chooses what is due, and grades it, each with the variant of its student."""
 
 from __future__ import annotations
 
@@ -10,18 +10,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.app.grade import read_exercises
-from grader.app.seeds import ByKey, checked, drawn, read_key
+from grader.app.request import GradeRequest
+from grader.app.seeds import ByKey, SeedKey, checked, drawn, read_key
+from grader.classroom.downloads import AUTO
 from grader.classroom.intake import HandedInEntry
 from grader.classroom.local import MakeScheduler, Task
-from grader.classroom.request import CHANGED, ClassRequest
+from grader.classroom.outputs import Platforms
 from grader.classroom.roster import Person
-from grader.classroom.store import Conditions, ResultStatus, State, Store, unusable_digest
+from grader.classroom.store import Conditions, Kept, ResultStatus, State, Store, refused, unusable_digest
 from grader.classroom.watching import Watcher
-from grader.core.errors import ClassError, HarnessError, SubmissionError, VariantError
+from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError, VariantError
 from grader.core.exercise import Exercise
 from grader.execution.supervisor import MARGIN_S, TRIES
-from grader.reporting.html.assets import shared_assets
+from grader.reporting.html.assets import bundle
+from grader.similarity.library import ComparedProgram
+from grader.submissions.submission import stage_submission
 
+#: Values of `--rerun`; each includes new and changed submissions.
+CHANGED, FAILED, UNDECIDED, ALL = "changed", "failed", "undecided", "all"
 #: Free disk space below which nothing can be graded, for results and temporary files.
 LEAST_FREE_BYTES = 4 << 20
 #: Seconds that an attempt may take in addition to the limits of its recordings.
@@ -32,6 +38,65 @@ _NO_ID = (
 )
 
 
+_GRADING = GradeRequest("")
+_NO_PLATFORMS = Platforms()
+
+
+@dataclass(frozen=True, slots=True)
+class ClassRequest:
+    """What to grade, and how."""
+
+    sources: tuple[Path, ...]  # folders of submissions, or downloads
+    results: Path
+    layout: str = AUTO  # how submissions are named; one of those in `downloads`
+    pattern: str = ""  # a regular expression for names, used instead of the layout; empty for none
+    roster: Path | None = None  # CSV file of the class; None if there is none
+    adjustments: Path | None = None  # YAML file of late days and changed scores; None if there is none
+    grading: GradeRequest = _GRADING  # the request as for one submission; its path is ignored
+    jobs: int | None = None  # submissions graded in parallel; None for one per processor
+    rerun: str = CHANGED  # `--rerun`, one of the values above
+    seed_key: SeedKey | None = None  # the key that seeds are derived from; None for the one stored with the results
+    standalone: bool = False  # whether each HTML report is self-contained
+    platforms: Platforms = _NO_PLATFORMS
+    # Code handed out to everyone, ignored when submissions are compared; None to skip the comparison
+    given: tuple[ComparedProgram, ...] | None = None
+
+
+def digest_of(entry: HandedInEntry, scratch: Path) -> str:
+    """Compute the digest of a submission, copied to an empty folder; empty if that is not possible."""
+    if entry.problem:
+        return unusable_digest(SubmissionError(entry.problem))
+    try:
+        return stage_submission(str(entry.path), (), scratch).digest
+    except SubmissionError as error:
+        return unusable_digest(error)
+    except (GraderError, OSError, MemoryError, RecursionError):
+        return ""  # grading it in its own process will report why
+
+
+def due_now(store: Store, entries: Sequence[HandedInEntry], keys: Mapping[str, str], rerun: str) -> list[HandedInEntry]:
+    """Select the submissions to grade; a stopped run with the same `--rerun` is resumed."""
+    pending = store.pending(rerun)
+    due = []
+    for entry in entries:
+        kept, key = store.kept(entry.name), keys[entry.name]
+        again = is_due(kept, key, rerun) if pending is None else entry.name in pending
+        if again or is_due(kept, key, CHANGED):
+            due.append(entry)
+    return due
+
+
+def is_due(kept: Kept, key: str, rerun: str) -> bool:
+    """Whether a submission has to be graded; the key is that of a current result, empty if unknown."""
+    result, last = kept.result, kept.last
+    if rerun == ALL or result is None or result.state is State.FAILED or not key or result.key != key:
+        return True
+    assert last is not None
+    if rerun == UNDECIDED:
+        return State.UNDECIDED in (result.state, last.state)
+    return rerun == FAILED and bool({result.state, last.state} & {State.FAILED, State.REFUSED})
+
+
 def deadline_s(budget_s: float) -> float:
     """Return the real time after which an attempt is killed; all its inner limits have expired by then."""
     return budget_s + TRIES * MARGIN_S + _BEYOND_S
@@ -39,39 +104,25 @@ def deadline_s(budget_s: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class ClassRun:
-    """One run of the command over a class.
-
-    Attributes:
-        course: The request.
-        exercises: The exercises to grade.
-        conditions: Name of a submission -> what its result depends on.
-        store: Receives the results.
-        watcher: Shows the progress.
-    """
+    """One run of the command over a class."""
 
     course: ClassRequest
     exercises: Sequence[Exercise]
-    conditions: Mapping[str, Conditions]
+    conditions: Mapping[str, Conditions]  # name of a submission -> what its result depends on
     store: Store
     watcher: Watcher
 
     def grade(self, due: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler) -> tuple[str, ...]:
         """Grade submissions, and return the names of those whose earlier, better result was kept.
 
-        Args:
-            due: The submissions.
-            warn: Called with warnings for the instructor before grading begins.
-            make: Makes the scheduler.
-
-        Raises:
-            EnvironmentFault: Nothing can be graded here.
-            HarnessError: A disk is full; results stored so far are kept.
+        Raises EnvironmentFault if nothing can be graded here, HarnessError if a disk is full; results so far are kept.
         """
         left = {entry.name for entry in due}
         self._note(left)
         for entry in due:
             if entry.problem:
-                self._take(entry.name, self.store.fresh(entry.name), self._refused(entry), left)
+                status = refused(entry.label, self.conditions[entry.name], SubmissionError(entry.problem))
+                self._take(entry.name, self.store.fresh(entry.name), status, left)
         usable = [entry for entry in due if not entry.problem]
         if not usable:
             return ()
@@ -80,7 +131,7 @@ class ClassRun:
     def _schedule(
         self, usable: Sequence[HandedInEntry], warn: Callable[[str], None], make: MakeScheduler, left: set[str]
     ) -> tuple[str, ...]:
-        for name, data in ({} if self.course.standalone else shared_assets()).items():
+        for name, data in ({} if self.course.standalone else bundle().files).items():
             self.store.write(f"assets/{name}", data)
         cores = len(os.sched_getaffinity(0))
         jobs = self.course.jobs or cores
@@ -127,10 +178,6 @@ class ClassRun:
             deadline_s=deadline_s(self.course.grading.time_budget_s),
         )
 
-    def _refused(self, entry: HandedInEntry) -> ResultStatus:
-        digest = unusable_digest(SubmissionError(entry.problem))
-        return ResultStatus(State.REFUSED, self.conditions[entry.name].key(digest), digest, entry.label, entry.problem)
-
     def _stop_if_full(self, status: ResultStatus) -> None:
         """Raise HarnessError if an attempt failed because a disk is full, as the others would fail too."""
         if status.state is not State.FAILED:
@@ -149,13 +196,7 @@ def student_of(person: Person | None) -> str:
 def with_known_students(
     entries: Sequence[HandedInEntry], people: Mapping[str, Person], exercises: Sequence[Exercise]
 ) -> tuple[HandedInEntry, ...]:
-    """If rubrics have variants, refuse the submissions whose student is not known.
-
-    Args:
-        entries: The submissions.
-        people: Name of a submission -> its student, for unambiguous matches.
-        exercises: The exercises to grade.
-    """
+    """If rubrics have variants, refuse the submissions whose student is not known."""
     if not vary(exercises):
         return tuple(entries)
     return tuple(entry if entry.problem else _known(entry, people.get(entry.name)) for entry in entries)
@@ -175,12 +216,7 @@ def vary(exercises: Sequence[Exercise]) -> bool:
 
 
 def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
-    """Check that there are a course key and a roster if exercises have variants.
-
-    Raises:
-        ClassError: The roster is missing.
-        VariantError: The course key is missing.
-    """
+    """Raise VariantError or ClassError if exercises have variants and there is no course key or no roster."""
     if not vary(exercises):
         return
     if course.grading.variant_key is None:
@@ -198,18 +234,7 @@ def own_conditions(
     exercises: Sequence[Exercise],
     conditions: Conditions,
 ) -> dict[str, Conditions]:
-    """Return name of a submission -> the conditions it is graded with.
-
-    Args:
-        course: The request.
-        entries: The submissions.
-        people: Name of a submission -> its student.
-        exercises: The exercises to grade, read with the first value of each variant.
-        conditions: The conditions of the whole class.
-
-    Raises:
-        GraderError: The course key or a rubric cannot be used.
-    """
+    """Return name of a submission -> the conditions it is graded with, which include its student's variant."""
     if not vary(exercises) or course.grading.variant_key is None:
         return {entry.name: conditions for entry in entries}
     key = read_key(course.grading.variant_key, "course key")

@@ -38,10 +38,8 @@ def safe_name(text: str) -> str:
 def distinct_names(wishes: Sequence[tuple[str, str]]) -> list[str]:
     """Return a unique safe name for each wish, independent of their order.
 
-    If several wish for the same name, each gets a suffix derived from its unique text.
-
-    Args:
-        wishes: The preferred name, and a unique text such as the path in the download.
+    A wish is the preferred name and a unique text, such as the path in the download. If several wish for the same name,
+    each gets a suffix derived from its unique text.
     """
     names = [safe_name(wish) for wish, _ in wishes]
     count = Counter(names)
@@ -58,40 +56,25 @@ MAX_FILE_BYTES = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class HandedInEntry:
-    """One submission of a class.
+    """One submission of a class."""
 
-    Attributes:
-        name: Unique and safe in paths; also the name of its results folder.
-        label: Its name in the source.
-        path: The folder or file to grade.
-        identity: What its name tells about the student: `user`, `id`, `email`, `name`.
-        late: Whether the platform marked it as late.
-        recognised: Whether its name fits the layout.
-        problem: Why it cannot be graded at all; empty if it can.
-    """
-
-    name: str
-    label: str
-    path: Path
+    name: str  # unique and safe in paths; also the name of its results folder
+    label: str  # its name in the source
+    path: Path  # the folder or file to grade
+    # What its name tells about the student: `user`, `id`, `email`, `name`
     identity: Mapping[str, str] = field(default_factory=dict)
-    late: bool = False
-    recognised: bool = True
-    problem: str = ""
+    late: bool = False  # whether the platform marked it as late
+    recognised: bool = True  # whether its name fits the layout
+    problem: str = ""  # why it cannot be graded at all; empty if it can
 
 
 @dataclass(frozen=True, slots=True)
 class Intake:
-    """The submissions found in the sources.
+    """The submissions found in the sources."""
 
-    Attributes:
-        entries: The submissions, ordered by name.
-        layouts: Each source with its layout, as text.
-        strays: Entries that are not submissions, with the reason; one line each.
-    """
-
-    entries: tuple[HandedInEntry, ...]
-    layouts: tuple[tuple[str, str], ...]
-    strays: tuple[str, ...] = ()
+    entries: tuple[HandedInEntry, ...]  # the submissions, ordered by name
+    layouts: tuple[tuple[str, str], ...]  # each source with its layout, as text
+    strays: tuple[str, ...] = ()  # entries that are not submissions, with the reason; one line each
 
 
 @dataclass(slots=True)
@@ -111,16 +94,10 @@ _ByStudent = dict[tuple[str, ...], _Found]
 
 
 def take_in(sources: Sequence[Path], results: Path, *, layout: str = AUTO, pattern: str = "") -> Intake:
-    """Find all submissions.
+    """Find all submissions in folders and downloads, which are unpacked in the results folder.
 
-    Args:
-        sources: Folders of submissions, or downloads.
-        results: The results folder; downloads are unpacked in it.
-        layout: How submissions are named, one of `LAYOUTS`.
-        pattern: A regular expression for names, used instead of the layout.
-
-    Raises:
-        ClassError: A source cannot be used, or has no submissions.
+    A regular expression for names overrides the layout. Raises ClassError if a source cannot be used, or has no
+    submissions.
     """
     found: list[_Found] = []
     strays: list[str] = []

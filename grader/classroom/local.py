@@ -26,36 +26,21 @@ from grader.execution.sandbox.choose import choose_isolation
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One submission to grade.
+    """One submission to grade."""
 
-    Attributes:
-        name: Name of the entry.
-        label: Its name in the source.
-        submission: Path of the submission.
-        into: Destination folder for the files of `worker.PARTS`; must not exist yet.
-        exercises: Exercise ids to grade; empty for all exercises of the rubrics.
-        rubrics: Rubric files; empty for the built-in ones.
-        odom_bag: An /odom recording to play instead of the built-in one.
-        conditions: What the result depends on besides the submission.
-        workers: Most scenarios recorded in parallel.
-        standalone: Whether the HTML report includes its scripts, instead of sharing them with the class.
-        deadline_s: Real time after which the attempt is killed.
-        collected: File with the submission as read on another machine; None to read it now.
-        variant_key: Path of the course key for the command that reproduces the run; the file is not read.
-    """
-
-    name: str
-    label: str
+    name: str  # name of the entry
+    label: str  # its name in the source
     submission: Path
-    into: Path
-    exercises: tuple[str, ...]
-    rubrics: tuple[Path, ...]
-    odom_bag: Path | None
-    conditions: Conditions
-    workers: int
-    standalone: bool
-    deadline_s: float
-    collected: Path | None = None
+    into: Path  # destination folder for the files of `worker.PARTS`; must not exist yet
+    exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
+    rubrics: tuple[Path, ...]  # rubric files; empty for the built-in ones
+    odom_bag: Path | None  # an /odom recording to play instead of the built-in one
+    conditions: Conditions  # what the result depends on besides the submission
+    workers: int  # most scenarios recorded in parallel
+    standalone: bool  # whether the HTML report includes its scripts, instead of sharing them with the class
+    deadline_s: float  # real time after which the attempt is killed
+    collected: Path | None = None  # file with the submission as read on another machine; None to read it now
+    # Path of the course key for the command that reproduces the run; the file is not read
     variant_key: Path | None = None
 
 
@@ -67,27 +52,15 @@ class Attempt:
     status: ResultStatus
 
 
-class OnStep(Protocol):
-    """Called, from any thread, when a step of a submission begins."""
-
-    def __call__(self, name: str, step: str) -> None:
-        """Report the step."""
-        ...
+#: Called with a submission's name and a step of it that begins, from any thread.
+OnStep = Callable[[str, str], None]
 
 
 class ClassScheduler(Protocol):
     """Grades submissions in parallel, on this machine or on others."""
 
     def prepare(self, isolation: str) -> Sequence[str]:
-        """Check that grading is possible, and return warnings for the instructor.
-
-        Args:
-            isolation: The requested sandbox.
-
-        Raises:
-            EnvironmentFault: Nothing can be graded.
-        """
-        ...
+        """Return warnings for the instructor; raises EnvironmentFault if nothing can be graded."""
 
     def run(self, tasks: Sequence[Task], on_step: OnStep) -> Generator[Attempt, None, None]:
         """Yield one attempt for each task as it finishes, in any order.
@@ -95,26 +68,21 @@ class ClassScheduler(Protocol):
         Closing the generator aborts the running tasks and leaves no process behind. A failed task yields an attempt in
         the state FAILED; it never raises.
         """
-        ...
 
 
 #: Makes a scheduler for a number of parallel submissions.
 MakeScheduler = Callable[[int], ClassScheduler]
 
 
+#: The hint of a failure.
+AGAIN = "run the same command again"
 #: Longest line read from a process.
 _LINE_BYTES = 1 << 20
 WORKER = (sys.executable, "-s", "-m", "grader.classroom.worker")
 
 
 class LocalScheduler:
-    """Grades on this machine.
-
-    Args:
-        jobs: Submissions graded in parallel.
-        command: Command that grades one submission; replaced only in tests.
-        folder: Base of relative paths; None for the current directory.
-    """
+    """Grades on this machine; relative paths start at the folder, or at the current one if it is None."""
 
     def __init__(self, jobs: int, command: Sequence[str] = WORKER, *, folder: Path | None = None) -> None:
         self._jobs = jobs
@@ -150,7 +118,7 @@ class LocalScheduler:
         try:
             process = self._start()
         except OSError as error:
-            return _failed(task, f"the grader cannot be started: {error.strerror}")
+            return failed(task, f"the grader cannot be started: {error.strerror}")
         overdue = threading.Event()
 
         def give_up() -> None:
@@ -168,8 +136,8 @@ class LocalScheduler:
         if status is not None:
             return Attempt(task, status)
         if overdue.is_set():
-            return _failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
-        return _failed(task, f"the grader ended without a result (exit code {process.returncode})")
+            return failed(task, f"the grader was not done after {task.deadline_s:.0f} s")
+        return failed(task, f"the grader ended without a result (exit code {process.returncode})")
 
     def _start(self) -> subprocess.Popen[bytes]:
         root = str(Path(__file__).resolve().parents[2])
@@ -240,5 +208,6 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def _failed(task: Task, problem: str) -> Attempt:
-    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, "run the same command again"))
+def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
+    """Build a failed attempt, which is never the student's fault."""
+    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))

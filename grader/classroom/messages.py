@@ -27,84 +27,49 @@ _Message = TypeVar("_Message", "Terms", "GradingJob", "JobResult", "Fitness", "_
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What all submissions of a class are graded with.
+    """What all submissions of a class are graded with."""
 
-    Attributes:
-        conditions: What the results depend on.
-        exercises: Exercise ids to grade; empty for all exercises of the rubrics.
-        rubrics: Relative path and content of each rubric file; empty for the built-in ones.
-        odom_bag: Relative path of an /odom recording; empty for the built-in one.
-        recording: Its files, by their paths below it; a recording in a single file has an empty path.
-        standalone: Whether each HTML report includes its scripts.
-        deadline_s: Real time after which an attempt is killed.
-        checks: Relative path and content of the rubrics' own check files.
-    """
-
-    conditions: Conditions
-    exercises: tuple[str, ...]
-    rubrics: Files
-    odom_bag: bytes
-    recording: Files
-    standalone: bool
-    deadline_s: float
-    checks: Files = ()
+    conditions: Conditions  # what the results depend on
+    exercises: tuple[str, ...]  # exercise ids to grade; empty for all exercises of the rubrics
+    rubrics: Files  # relative path and content of each rubric file; empty for the built-in ones
+    odom_bag: bytes  # relative path of an /odom recording; empty for the built-in one
+    recording: Files  # its files, by their paths below it; a recording in a single file has an empty path
+    standalone: bool  # whether each HTML report includes its scripts
+    deadline_s: float  # real time after which an attempt is killed
+    checks: Files = ()  # relative path and content of the rubrics' own check files
 
 
 @dataclass(frozen=True, slots=True)
 class GradingJob:
-    """One submission to grade.
+    """One submission to grade."""
 
-    Attributes:
-        name: Name of the entry.
-        label: Its name in the source.
-        path: Its path in reports, relative to where the class is graded.
-        collected: The submission; see `pack_collected`.
-        variants: The student's variant values; None if nothing varies.
-        seed: Seed of all drawn values; the seed key itself is never sent.
-    """
-
-    name: str
-    label: bytes
-    path: bytes
-    collected: bytes
-    variants: Drawn | None = None
-    seed: int | None = None
+    name: str  # name of the entry
+    label: bytes  # its name in the source
+    path: bytes  # its path in reports, relative to where the class is graded
+    collected: bytes  # the submission; see `pack_collected`
+    variants: Drawn | None = None  # the student's variant values; None if nothing varies
+    seed: int | None = None  # seed of all drawn values; the seed key itself is never sent
 
 
 @dataclass(frozen=True, slots=True)
 class JobResult:
-    """The result of one submission.
+    """The result of one submission."""
 
-    Attributes:
-        machine: The machine that graded it, for people.
-        status: The status as stored in a results folder; empty if nothing was tried.
-        files: The result files, such as `report.json`.
-        unfit: Why this machine cannot grade; empty if it can.
-        hint: What to do about that.
-    """
-
-    machine: str
-    status: bytes = b""
-    files: Files = ()
-    unfit: str = ""
-    hint: str = ""
+    machine: str  # the machine that graded it, for people
+    status: bytes = b""  # the status as stored in a results folder; empty if nothing was tried
+    files: Files = ()  # the result files, such as `report.json`
+    unfit: str = ""  # why this machine cannot grade; empty if it can
+    hint: str = ""  # what to do about that
 
 
 @dataclass(frozen=True, slots=True)
 class Fitness:
-    """Whether a machine can grade.
+    """Whether a machine can grade."""
 
-    Attributes:
-        machine: The machine, for people.
-        unfit: Why it cannot grade; empty if it can.
-        hint: What to do about that.
-        remarks: Warnings about its sandbox for the instructor.
-    """
-
-    machine: str
-    unfit: str = ""
-    hint: str = ""
-    remarks: tuple[str, ...] = ()
+    machine: str  # the machine, for people
+    unfit: str = ""  # why it cannot grade; empty if it can
+    hint: str = ""  # what to do about that
+    remarks: tuple[str, ...] = ()  # warnings about its sandbox for the instructor
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,17 +119,7 @@ def files_below(folder: Path) -> Files:
 
 
 def write_answer(files: Iterable[tuple[bytes, bytes]], into: Path, allowed: frozenset[str]) -> None:
-    """Write the files of a result into a new folder.
-
-    Args:
-        files: Relative path and content.
-        into: The folder; must not exist yet.
-        allowed: Names of the files and folders of a result.
-
-    Raises:
-        HarnessError: A file does not belong to a result.
-        OSError: The files cannot be written.
-    """
+    """Write the files of a result into a new folder; raises HarnessError for a file that is not allowed."""
     named = [(os.fsdecode(name), content) for name, content in files]
     if len(named) > MAX_ANSWER_FILES or any(name_problem(n) or n.split("/")[0] not in allowed for n, _ in named):
         raise HarnessError("answer: expected the files of a result, found others")

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from grader.classroom.class_page import RunOfClass, class_page
 from grader.classroom.gradebook import Gradebook, Row, Status, number, remarks, render_gradebook
-from grader.classroom.platforms import Export, Users, export_canvas, export_gradescope, export_moodle, read_users
+from grader.classroom.platforms import Export, export_canvas, export_gradescope, export_moodle
+from grader.classroom.roster import Table, read_table
 from grader.core.json_values import JsonObject
 from grader.reporting.class_page.contents import PageLink
 from grader.reporting.class_page.render import class_assets, render_class
@@ -28,39 +29,26 @@ _UNREMARKABLE = {Status.GRADED, Status.MISSING}
 
 @dataclass(frozen=True, slots=True)
 class Platforms:
-    """The platforms to export scores to.
+    """The platforms to export scores to."""
 
-    Attributes:
-        canvas: Number of the assignment in Canvas; empty for no export to Canvas.
-        canvas_gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
-        moodle: The users exported from Moodle; None for no export to Moodle.
-        gradescope: Whether to export to Gradescope.
-    """
-
-    canvas: str = ""
-    canvas_gradebook: Users | None = None
-    moodle: Users | None = None
-    gradescope: bool = False
+    canvas: str = ""  # number of the assignment in Canvas; empty for no export to Canvas
+    canvas_gradebook: Table | None = None  # the gradebook exported from Canvas; None if the roster has the Canvas ids
+    moodle: Table | None = None  # the users exported from Moodle; None for no export to Moodle
+    gradescope: bool = False  # whether to export to Gradescope
 
 
 def platforms(canvas: str, canvas_gradebook: Path | None, moodle: Path | None, *, gradescope: bool) -> Platforms:
     """Read the tables for the requested platforms; raises ClassError for an unusable table."""
     return Platforms(
         canvas,
-        None if canvas_gradebook is None else read_users(canvas_gradebook),
-        None if moodle is None else read_users(moodle),
+        None if canvas_gradebook is None else read_table(canvas_gradebook),
+        None if moodle is None else read_table(moodle),
         gradescope,
     )
 
 
 def exports(book: Gradebook, wanted: Platforms, results: Mapping[str, str]) -> dict[str, Export]:
-    """Return platform -> its export; raises ClassError if a platform would reject it.
-
-    Args:
-        book: The gradebook.
-        wanted: The platforms.
-        results: Name of an entry -> its results.json for Gradescope.
-    """
+    """Return platform -> its export; raises ClassError if a platform would reject it."""
     made: dict[str, Export] = {}
     if wanted.canvas:
         made["canvas"] = export_canvas(book, wanted.canvas, wanted.canvas_gradebook)
@@ -81,12 +69,7 @@ def class_files(
 ) -> dict[str, bytes]:
     """Return name -> content of all files for the class, relative to the results folder; the page is last.
 
-    Args:
-        book: The gradebook.
-        made: The exports for platforms.
-        run: The run that writes the files.
-        links: Other pages in the folder, to be linked from the class page.
-        standalone: Whether the page includes its scripts, instead of sharing them with the reports.
+    A standalone page includes its scripts, instead of sharing them with the reports.
     """
     files = {GRADEBOOK: render_gradebook(book).encode()}
     for export in made.values():
@@ -99,27 +82,18 @@ def class_files(
 
 @dataclass(frozen=True, slots=True)
 class Graded:
-    """A class after grading.
-
-    Attributes:
-        book: The gradebook.
-        graded: Number of submissions graded in this run.
-        kept_before: Number of submissions that already had results.
-        not_replaced: Names of submissions whose new attempt was worse than the stored result, which was kept.
-        files: The files written for the whole class.
-        left_out: Platform -> who is missing in its file, and why.
-        remarks: Remarks about these files.
-        links: Further pages in the results folder, linked from the class page.
-    """
+    """A class after grading."""
 
     book: Gradebook
-    graded: int
-    kept_before: int
+    graded: int  # number of submissions graded in this run
+    kept_before: int  # number of submissions that already had results
+    # Names of submissions whose new attempt was worse than the stored result, which was kept
     not_replaced: tuple[str, ...] = ()
-    files: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()  # the files written for the whole class
+    # Platform -> who is missing in its file, and why
     left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-    links: tuple[PageLink, ...] = ()
+    remarks: tuple[str, ...] = ()  # remarks about these files
+    links: tuple[PageLink, ...] = ()  # further pages in the results folder, linked from the class page
 
 
 def render_summary(graded: Graded) -> str:

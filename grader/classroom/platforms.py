@@ -7,10 +7,9 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from grader.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
-from grader.classroom.roster import Person, columns_of, fold_handle, person_of, read_table
+from grader.classroom.roster import Person, Table, columns_of, fold_handle, person_of
 from grader.core.errors import ClassError
 from grader.reporting.escape import shown as safe
 from grader.reporting.json_report import CriterionData, json_text
@@ -27,52 +26,19 @@ _FEEDBACK = 4_000
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """The files for a platform.
+    """The files for a platform."""
 
-    Attributes:
-        files: Name, relative to the results folder -> content.
-        left_out: Who is missing, and why; one line each.
-        remark: A remark for the instructor; may be empty.
-    """
-
-    files: Mapping[str, str] = field(default_factory=dict)
-    left_out: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)  # name, relative to the results folder -> content
+    left_out: tuple[str, ...] = ()  # who is missing, and why; one line each
     remark: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Users:
-    """A table of users exported from a platform.
-
-    Attributes:
-        path: Path of the table.
-        header: Its columns.
-        rows: Column -> value.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    rows: tuple[Mapping[str, str], ...]
-
-
-def read_users(path: Path) -> Users:
-    """Read a table of users; raises ClassError if it cannot be read."""
-    header, rows = read_table(path)
-    return Users(path, tuple(header), tuple(rows))
-
-
-def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> Export:
-    """Export scores for Canvas.
+def export_canvas(book: Gradebook, assignment: str, gradebook: Table | None) -> Export:
+    """Export scores for Canvas; raises ClassError if nothing has this number, or nobody has a Canvas id.
 
     The file contains only people with a score and only this one column, so that later changes in Canvas are kept.
-
-    Args:
-        book: The gradebook.
-        assignment: Number of the assignment in Canvas, or its title and number in parentheses.
-        gradebook: The gradebook exported from Canvas; None if the roster has the Canvas ids.
-
-    Raises:
-        ClassError: The gradebook has no such assignment, or nobody has a Canvas id.
+    Without the gradebook that Canvas exported, the roster must have the ids. The assignment is a number, or a title
+    with the number in parentheses.
     """
     title = _canvas_title(assignment, gradebook)
     rows: list[list[str]] = []
@@ -93,17 +59,11 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Users | None) -> 
     return Export({"canvas.csv": table(header, [points, *rows])}, tuple(map(_line, left_out)), remark)
 
 
-def export_moodle(book: Gradebook, users: Users) -> Export:
+def export_moodle(book: Gradebook, users: Table) -> Export:
     """Export grades and feedback for Moodle's grade import; importing one without the other deletes grades.
 
-    People who are not in the table of users are left out, because Moodle rejects a file with an unknown user.
-
-    Args:
-        book: The gradebook.
-        users: The participants or grades exported from Moodle.
-
-    Raises:
-        ClassError: The table has no column that Moodle can identify people by.
+    People who are not in the table of users are left out, because Moodle rejects a file with an unknown user. Raises
+    ClassError if the table has no column that Moodle can identify people by.
     """
     by_name = {name.strip().casefold(): name for name in users.header}
     column = next((name for name in MOODLE_COLUMNS if name.casefold() in by_name), None)
@@ -125,12 +85,7 @@ def export_moodle(book: Gradebook, users: Users) -> Export:
 
 
 def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
-    """Export a results.json for each submission, as an autograder would write it, and a table of all scores.
-
-    Args:
-        book: The gradebook.
-        results: Name of an entry -> the results.json of its report.
-    """
+    """Export a results.json for each submission, as an autograder would write it, and a table of all scores."""
     files: dict[str, str] = {}
     rows: list[list[str]] = []
     left_out: list[str] = []
@@ -190,7 +145,7 @@ def _counted(book: Gradebook, left_out: list[str]) -> Sequence[Row]:
     return to_export
 
 
-def _canvas_title(assignment: str, gradebook: Users | None) -> str:
+def _canvas_title(assignment: str, gradebook: Table | None) -> str:
     """Return the header of the assignment's column; Canvas identifies it by the number in parentheses."""
     number_ = re.fullmatch(r"(?:.*\()?(\d+)\)?", assignment.strip(), re.DOTALL)
     if number_ is None:
@@ -204,7 +159,7 @@ def _canvas_title(assignment: str, gradebook: Users | None) -> str:
     return title
 
 
-def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
+def _canvas_row(row: Row, gradebook: Table | None) -> Mapping[str, str] | None:
     """Return a person's row in the Canvas gradebook, or on the roster if there is no gradebook."""
     if gradebook is not None:
         return _user(row, gradebook)
@@ -212,7 +167,7 @@ def _canvas_row(row: Row, gradebook: Users | None) -> Mapping[str, str] | None:
     return person.row if person is not None else None
 
 
-def _user(row: Row, users: Users) -> Mapping[str, str] | None:
+def _user(row: Row, users: Table) -> Mapping[str, str] | None:
     """Find the row of a person by unique ids, then by name; None unless exactly one row matches."""
     columns = columns_of(users.header)
     person = row.person
@@ -222,15 +177,11 @@ def _user(row: Row, users: Users) -> Mapping[str, str] | None:
     exact = [name for kind in ("email", "user", "id", "canvas", "identifier") for name in columns.get(kind, ())]
     found = [r for r in users.rows if any(r[name].strip() and fold_handle(r[name]) in handles for name in exact)]
     if not found:
-        found = [r for r in users.rows if _named(r, columns) & person.names]
+        found = [r for r in users.rows if person_of(r, columns).names & person.names]
     return found[0] if len(found) == 1 else None
 
 
-def _named(row: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> frozenset[str]:
-    return person_of(row, columns).names
-
-
-def _possible(gradebook: Users | None, title: str) -> str:
+def _possible(gradebook: Table | None, title: str) -> str:
     """Return the possible points of an assignment in Canvas; empty if unknown."""
     for row in gradebook.rows if gradebook is not None else ():
         if next(iter(row.values())).strip().casefold() == _POSSIBLE:

@@ -38,25 +38,15 @@ _PARTICIPANT = re.compile(r"\D+ (\d+)")
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Somebody on the roster.
+    """Somebody on the roster."""
 
-    Attributes:
-        name: Name for display.
-        user: User name on the platform; empty if the roster has none.
-        email: Email address; empty if the roster has none.
-        id: Number at the institution; empty if the roster has none.
-        handles: All ids that are unique to this person, normalised by `fold_handle`.
-        names: Spellings of the name, without spaces and accents.
-        row: Column -> value on the roster; None for a person who is not on a roster.
-    """
-
-    name: str
-    user: str = ""
-    email: str = ""
-    id: str = ""
-    handles: frozenset[str] = frozenset()
-    names: frozenset[str] = frozenset()
-    row: Mapping[str, str] | None = None
+    name: str  # name for display
+    user: str = ""  # user name on the platform; empty if the roster has none
+    email: str = ""  # email address; empty if the roster has none
+    id: str = ""  # number at the institution; empty if the roster has none
+    handles: frozenset[str] = frozenset()  # all ids that are unique to this person, normalised by `fold_handle`
+    names: frozenset[str] = frozenset()  # spellings of the name, without spaces and accents
+    row: Mapping[str, str] | None = None  # column -> value on the roster; None for a person who is not on a roster
 
 
 def fold_handle(text: str) -> str:
@@ -70,12 +60,17 @@ def fold_name(text: str) -> str:
     return "".join(c for c in plain if c.isalnum())
 
 
-def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Read the header and the rows of a CSV file separated by commas, semicolons or tabs.
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table that a platform exported."""
 
-    Raises:
-        ClassError: The file cannot be read, or has no header and rows.
-    """
+    path: Path
+    header: Sequence[str]
+    rows: Sequence[Mapping[str, str]]  # column -> value
+
+
+def read_table(path: Path) -> Table:
+    """Read header and rows of a CSV file separated by commas, semicolons or tabs; raises ClassError if it has none."""
     text = _text(path)
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)
@@ -89,22 +84,21 @@ def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
     if len(rows) > MAX_ROWS:
         raise ClassError(f"{path}: expected at most {MAX_ROWS} rows, found more")
     header = rows[0]
-    return header, [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]]
+    return Table(path, header, [dict(zip(header, [*row, *[""] * len(header)], strict=False)) for row in rows[1:]])
 
 
 def read_roster(path: Path) -> list[Person]:
     """Read the people of a roster: a CSV export from Canvas, Moodle, GitHub or Classroom 50, or a custom one.
 
-    Raises:
-        ClassError: The file cannot be read, or no column identifies people.
+    Raises ClassError if the file cannot be read, or no column identifies people.
     """
-    header, rows = read_table(path)
-    columns = columns_of(header)
+    table = read_table(path)
+    columns = columns_of(table.header)
     if not columns:
         known = listed([names[0] for names in COLUMNS.values()])
-        found = listed([shown(name, 30) for name in header[:6]], "and")
+        found = listed([shown(name, 30) for name in table.header[:6]], "and")
         raise ClassError(f"{path}:1: expected a column {known}, found {found}", "name the columns in the first line")
-    return [person for row in rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
+    return [person for row in table.rows if not _is_no_person(row) and (person := person_of(row, columns)).name]
 
 
 def columns_of(header: Sequence[str]) -> dict[str, list[str]]:
@@ -172,32 +166,20 @@ def _spellings(name: str) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class RosterMatch:
-    """How submissions match the roster.
+    """How submissions match the roster."""
 
-    Attributes:
-        people: Name of an entry -> person, for unambiguous matches.
-        unmatched: Names of entries that match nobody on the roster.
-        ambiguous: Names of entries that match several people.
-        duplicates: Groups of names of entries by the same person.
-        missing: People without a submission.
-    """
-
-    people: Mapping[str, Person] = field(default_factory=dict)
-    unmatched: tuple[str, ...] = ()
-    ambiguous: tuple[str, ...] = ()
-    duplicates: tuple[tuple[str, ...], ...] = ()
-    missing: tuple[Person, ...] = ()
+    people: Mapping[str, Person] = field(default_factory=dict)  # name of an entry -> person, for unambiguous matches
+    unmatched: tuple[str, ...] = ()  # names of entries that match nobody on the roster
+    ambiguous: tuple[str, ...] = ()  # names of entries that match several people
+    duplicates: tuple[tuple[str, ...], ...] = ()  # groups of names of entries by the same person
+    missing: tuple[Person, ...] = ()  # people without a submission
 
 
 def match(entries: Sequence[HandedInEntry], roster: Sequence[Person] | None) -> RosterMatch:
     """Match submissions to people.
 
     Unique ids (user name, number, email address, folder) take precedence over names. If several people match, none is
-    chosen.
-
-    Args:
-        entries: The submissions.
-        roster: The people; None if there is no roster, and then people are named after their submissions.
+    chosen. Without a roster, people are named after their submissions.
     """
     if roster is None:
         people = {entry.name: _unknown(entry) for entry in entries}

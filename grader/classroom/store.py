@@ -17,7 +17,7 @@ from pathlib import Path
 import msgspec
 
 from grader.app.spot_checks import is_drawn
-from grader.core.errors import ClassError, GraderError, HarnessError
+from grader.core.errors import ClassError, GraderError, HarnessError, SubmissionError
 from grader.core.exercise import Drawn
 from grader.core.limits import TIME_BUDGET_S
 from grader.reporting.delivery import write_whole
@@ -42,33 +42,19 @@ class State(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class ResultStatus:
-    """Status of one submission.
-
-    Attributes:
-        state: See State.
-        key: What the result depends on; see `Conditions`.
-        digest: Digest of the submission.
-        label: Name of the submission in the source.
-        problem: Why there is no report, in one line; empty if there is one.
-        hint: What to do; may be empty.
-        score: Points earned.
-        max_score: Maximum points.
-        duration_s: Real time.
-        usage: Resources used: `processor_s` and `peak_bytes`.
-        schema: Version of this format.
-    """
+    """Status of one submission."""
 
     state: State
-    key: str
+    key: str  # what the result depends on; see `Conditions`
     digest: str
-    label: str
-    problem: str = ""
-    hint: str = ""
+    label: str  # name of the submission in the source
+    problem: str = ""  # why there is no report, in one line; empty if there is one
+    hint: str = ""  # what to do; may be empty
     score: float = 0.0
     max_score: float = 0.0
     duration_s: float = 0.0
-    usage: Mapping[str, float] = field(default_factory=dict)
-    schema: str = SCHEMA
+    usage: Mapping[str, float] = field(default_factory=dict)  # resources used: `processor_s` and `peak_bytes`
+    schema: str = SCHEMA  # version of this format
 
 
 def dump(status: ResultStatus) -> bytes:
@@ -94,14 +80,10 @@ _PENDING = ".pending.json"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """The stored results of one submission.
+    """The stored results of one submission."""
 
-    Attributes:
-        result: The best result so far; None if there is none.
-        attempt: A later, worse attempt that did not replace the result; None if there was none.
-    """
-
-    result: ResultStatus | None = None
+    result: ResultStatus | None = None  # the best result so far; None if there is none
+    # A later, worse attempt that did not replace the result; None if there was none
     attempt: ResultStatus | None = None
 
     @property
@@ -111,11 +93,7 @@ class Kept:
 
 
 class Store:
-    """The results of a class; only one process at a time uses the folder.
-
-    Args:
-        folder: The results folder.
-    """
+    """The results of a class; only one process at a time uses the folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -138,15 +116,9 @@ class Store:
         return sorted(path.name for path in self._students.iterdir() if (path / RESULT).is_file())
 
     def commit(self, name: str, fresh: Path, status: ResultStatus) -> bool:
-        """Store a new result; return whether it replaced the old one.
+        """Store a new result, whose folder of files is moved or deleted; return whether it replaced the old one.
 
-        Args:
-            name: Name of the submission.
-            fresh: Folder with the files of the new result; it is moved or deleted.
-            status: Status of the attempt, written to the folder.
-
-        Raises:
-            HarnessError: The result cannot be written; the old one is kept.
+        Raises HarnessError if the result cannot be written; the old one is kept.
         """
         place = self.place(name)
         try:
@@ -221,11 +193,7 @@ class Store:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open the results folder, and lock it against other processes.
-
-    Raises:
-        ClassError: The folder cannot be used, or another process uses it.
-    """
+    """Open the results folder, and lock it; raises ClassError if it cannot be used, or another process uses it."""
     store = Store(folder)
     try:
         (folder / "students").mkdir(parents=True, exist_ok=True)
@@ -272,31 +240,18 @@ def _sync_one(folder: Path | str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """Everything that a result depends on besides the submission.
-
-    Attributes:
-        grader: Version of the grader.
-        rubrics: Exercise id and digest of its rubric, in grading order.
-        recording: Digest of the /odom recording; empty if none is played.
-        seed: Seed of all drawn values; None for a whole class in which each submission has its own.
-        clock: The requested clock.
-        isolation: The requested sandbox.
-        every: Whether only exercises count that the submission has a file for.
-        variants: The student's variant values; None if nothing varies.
-        time_budget_s: Real time that all recordings of a submission may take together.
-        spot_checks: Share of the class that is checked on the wall clock, from 0 to 1.
-    """
+    """Everything that a result depends on besides the submission."""
 
     grader: str
-    rubrics: tuple[tuple[str, str], ...]
-    recording: str
-    seed: int | None
+    rubrics: tuple[tuple[str, str], ...]  # exercise id and digest of its rubric, in grading order
+    recording: str  # digest of the /odom recording; empty if none is played
+    seed: int | None  # seed of all drawn values; None for a whole class in which each submission has its own
     clock: str
     isolation: str
-    every: bool = False
-    variants: Drawn | None = None
-    time_budget_s: float = TIME_BUDGET_S
-    spot_checks: float = 0.0
+    every: bool = False  # whether only exercises count that the submission has a file for
+    variants: Drawn | None = None  # the student's variant values; None if nothing varies
+    time_budget_s: float = TIME_BUDGET_S  # real time that all recordings of a submission may take together
+    spot_checks: float = 0.0  # share of the class that is checked on the wall clock, from 0 to 1
 
     def key(self, submission: str) -> str:
         """Return the cache key of a result, given the digest of the submission."""
@@ -306,6 +261,12 @@ class Conditions:
             depends_on["spot_check"] = True
         text = json.dumps(depends_on, sort_keys=True)
         return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def refused(label: str, conditions: Conditions, error: SubmissionError) -> ResultStatus:
+    """Return the status of a submission that cannot be used."""
+    digest = unusable_digest(error)
+    return ResultStatus(State.REFUSED, conditions.key(digest), digest, label, error.message, error.hint)
 
 
 def unusable_digest(error: GraderError) -> str:

@@ -20,12 +20,7 @@ _NAME = 30
 
 
 class Watcher:
-    """Tracks the progress of a class from any thread, and writes a line for each finished submission.
-
-    Args:
-        write: Writes a line.
-        clock: A monotonic clock, in seconds.
-    """
+    """Tracks the progress of a class from any thread, and writes a line for each finished submission."""
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self._write = write

@@ -15,13 +15,12 @@ from datetime import date
 
 import msgspec
 
-from grader.app.evidence_writer import EvidenceWriter
-from grader.app.grade import Progress, grade
+from grader.app.grade import EvidenceWriter, Progress, grade
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
 from grader.classroom.local import Task
 from grader.classroom.messages import read_collected
-from grader.classroom.store import Conditions, ResultStatus, State, unusable_digest
+from grader.classroom.store import Conditions, ResultStatus, State, refused
 from grader.core.errors import GraderError, SubmissionError
 from grader.core.report import Report, Reproduction
 from grader.reporting.audience import for_student
@@ -49,7 +48,7 @@ def main() -> None:
         return
     os.chdir(request["folder"])
     task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
-    status = attempt(task, _step)
+    status = attempt(task, lambda step: _send({"step": step}))
     _send({"done": json.loads(kept.dump(status))})
 
 
@@ -59,13 +58,13 @@ def attempt(task: Task, progress: Progress) -> ResultStatus:
     try:
         status = _graded(task, progress)
     except SubmissionError as error:
-        status = _without_report(task, State.REFUSED, error.message, error.hint, unusable_digest(error))
+        status = refused(task.label, task.conditions, error)
     except GraderError as error:
-        status = _without_report(task, State.FAILED, error.message, error.hint)
+        status = _failed(task, error.message, error.hint)
     except OSError as error:
-        status = _without_report(task, State.FAILED, f"the result cannot be written: {error.strerror}")
+        status = _failed(task, f"the result cannot be written: {error.strerror}")
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
-        status = _without_report(task, State.FAILED, f"the grader failed: {type(error).__name__}: {error}")
+        status = _failed(task, f"the grader failed: {type(error).__name__}: {error}")
     return replace(status, duration_s=round(time.perf_counter() - started, 3), usage=_usage())
 
 
@@ -128,8 +127,8 @@ def _files(report: Report, task: Task, today: str) -> Mapping[str, str]:
     }
 
 
-def _without_report(task: Task, state: State, problem: str, hint: str = "", digest: str = "") -> ResultStatus:
-    return ResultStatus(state, task.conditions.key(digest) if digest else "", digest, task.label, problem, hint)
+def _failed(task: Task, problem: str, hint: str = "") -> ResultStatus:
+    return ResultStatus(State.FAILED, "", "", task.label, problem, hint)
 
 
 def _usage() -> dict[str, float]:
@@ -139,10 +138,6 @@ def _usage() -> dict[str, float]:
         "processor_s": round(sum(u.ru_utime + u.ru_stime for u in used), 3),
         "peak_bytes": 1024 * max(u.ru_maxrss for u in used),
     }
-
-
-def _step(step: str) -> None:
-    _send({"step": step})
 
 
 def _send(message: Mapping[str, object]) -> None:

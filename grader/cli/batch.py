@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,9 +9,17 @@ from typing import TYPE_CHECKING
 import click
 
 from grader.app.exit_codes import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED
-from grader.cli.options import PATH, drawn_with, parse_share, require, time_budget_option
+from grader.cli.options import (
+    PATH,
+    complain,
+    drawn_with,
+    parse_share,
+    print_for_people,
+    print_for_programs,
+    require,
+    time_budget_option,
+)
 from grader.core.checkup import TIERS
-from grader.reporting.escape import encoded, shown
 
 if TYPE_CHECKING:
     from grader.classroom.local import MakeScheduler
@@ -110,13 +117,13 @@ def command(  # noqa: PLR0913  one parameter an option
         require("--scheduler", "distributed", "dask")
     if similarity:
         require("--similarity", "copydetect", "similarity")
-    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
-    from grader.classroom.class_run import grade_class  # noqa: PLC0415  the rest of the grader
-    from grader.classroom.outputs import platforms  # noqa: PLC0415  as above
-    from grader.classroom.request import ClassRequest  # noqa: PLC0415  as above
-    from grader.classroom.watching import shown_watcher  # noqa: PLC0415  as above
-    from grader.rubrics.builtin import shipped_templates  # noqa: PLC0415  as above
-    from grader.similarity.finding import read_given  # noqa: PLC0415  as above
+    from grader.app.request import GradeRequest
+    from grader.classroom.class_run import grade_class
+    from grader.classroom.grading import ClassRequest
+    from grader.classroom.outputs import platforms, render_summary, summary_json
+    from grader.classroom.watching import shown_watcher
+    from grader.rubrics.builtin import shipped
+    from grader.similarity.finding import read_given
 
     if canvas_gradebook is not None and canvas is None:
         raise click.BadParameter("--canvas-gradebook needs --canvas with the assignment's number")
@@ -147,45 +154,36 @@ def command(  # noqa: PLR0913  one parameter an option
         seed_key=drawn_with(seed, seed_key),
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
-        given=read_given(templates or (shipped_templates(),)) if similarity else None,
+        given=read_given(templates or (shipped("student_template"),)) if similarity else None,
     )
     try:
         with _scheduler_factory(scheduler, jobs) as make, shown_watcher(wanted=not no_progress) as watcher:
-            graded = grade_class(course, watcher, _warn, make)
+            graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
         return INTERRUPTED
-    _print(graded, as_json=as_json)
+    if as_json:
+        print_for_programs(summary_json(graded))
+    else:
+        print_for_people(lambda _: render_summary(graded))
     return _code(graded)
 
 
 def _scheduler_factory(scheduler: str | None, jobs: int | None) -> AbstractContextManager[MakeScheduler]:
     """Return a scheduler factory for this machine, or for a cluster, which stays connected in the context."""
     if scheduler is None:
-        from grader.classroom.local import LocalScheduler  # noqa: PLC0415  as above
+        from grader.classroom.local import LocalScheduler
 
         return nullcontext(LocalScheduler)
-    from grader.classroom.cluster.dispatcher import connected  # noqa: PLC0415  an optional library
+    from grader.classroom.cluster.dispatcher import connected
 
-    return connected(scheduler, jobs, _warn)
-
-
-def _print(graded: Graded, *, as_json: bool) -> None:
-    from grader.classroom.outputs import render_summary, summary_json  # noqa: PLC0415  as above
-
-    text = summary_json(graded) if as_json else render_summary(graded)
-    sys.stdout.buffer.write(encoded(text, "utf-8" if as_json else sys.stdout.encoding or "utf-8"))
-    sys.stdout.flush()
+    return connected(scheduler, jobs, complain)
 
 
 def _code(graded: Graded) -> int:
     """Return the exit code: failures of the grader or the machine take precedence over unusable submissions."""
-    from grader.classroom.gradebook import Status  # noqa: PLC0415  as above
+    from grader.classroom.gradebook import Status
 
     if any(graded.book.count(status) for status in (Status.FAILED, Status.UNDECIDED, Status.NOT_RUN)):
         return UNDECIDED
     return NOT_ALL_MET if graded.book.count(Status.REFUSED) else ALL_MET
-
-
-def _warn(line: str) -> None:
-    click.echo(f"warning: {shown(line)}", err=True)

@@ -7,10 +7,8 @@ from pathlib import Path
 import click
 
 from grader.app.exit_codes import ALL_MET
-from grader.cli.options import PATH
+from grader.cli.options import PATH, complain, print_for_programs, write_file
 from grader.core.checkup import NO_SANDBOX, TIERS
-from grader.core.errors import GraderError
-from grader.reporting.delivery import show
 
 _exercises = click.option("--exercise", "exercises", metavar="ID", multiple=True, help="Grade only this; repeatable.")
 _rubrics = click.option("--rubric", "rubrics", type=PATH, multiple=True, help="Use this rubric; repeatable.")
@@ -38,11 +36,11 @@ def _gradescope(
     target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str, seed_key: Path | None
 ) -> int:
     """Write an autograder ZIP that Gradescope takes as it is."""
-    from grader.packaging import Chosen, gradescope  # noqa: PLC0415  reads rubrics, which --help does not need
+    from grader.packaging import Chosen, gradescope
 
     if isolation == NO_SANDBOX:
-        click.echo("warning: without a sandbox a student's program can write its own result", err=True)
-    _write(target, gradescope(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation), seed_key))
+        complain("without a sandbox a student's program can write its own result")
+    write_file(target, gradescope(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation), seed_key), parents=True)
     return ALL_MET
 
 
@@ -53,10 +51,10 @@ def _gradescope(
 @click.option("--isolation", type=_tiers, default="auto", show_default=True, help="The sandbox on the runner.")
 def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, ...], isolation: str) -> int:
     """Write the FOLDER of an assignment's autograder for Classroom 50."""
-    from grader.packaging import Chosen, classroom50  # noqa: PLC0415  as above
+    from grader.packaging import Chosen, classroom50
 
     for name, content in classroom50(Chosen(tuple(dict.fromkeys(exercises)), rubrics, isolation)).items():
-        _write(target / name, content)
+        write_file(target / name, content, parents=True)
     return ALL_MET
 
 
@@ -64,27 +62,16 @@ def _classroom50(target: Path, exercises: tuple[str, ...], rubrics: tuple[Path, 
 @click.argument("action", metavar="OWNER/NAME@COMMIT")
 def _workflow(action: str) -> int:
     """Print the workflow for students' repositories that grades with your copy of the grader."""
-    from grader.packaging import workflow  # noqa: PLC0415  as above
+    from grader.packaging import workflow
 
-    text = workflow(action)
-    show(lambda _: text, for_people=False)
+    print_for_programs(workflow(action))
     return ALL_MET
 
 
 @command.command(name="constraints")
 def _constraints() -> int:
     """Print the versions of all that the grader needs here, as constraints for pip."""
-    from grader.packaging import pins  # noqa: PLC0415  as above
+    from grader.packaging import pins
 
-    show(lambda _: pins(), for_people=False)
+    print_for_programs(pins())
     return ALL_MET
-
-
-def _write(path: Path, content: bytes) -> None:
-    from grader.reporting.delivery import write_whole  # noqa: PLC0415  as above
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content)
-    except OSError as error:
-        raise GraderError(f"{path}: it cannot be written: {error.strerror or error}") from error

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-import sys
-import traceback
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,21 +16,26 @@ from grader.cli.options import (
     EVIDENCE,
     PATH,
     audience_options,
+    complain,
     drawn_by,
     drawn_with,
     parse_outputs,
     parse_percent,
     parse_share,
+    print_for_people,
+    print_for_programs,
     readers,
     shown_progress,
     time_budget_option,
 )
-from grader.core.checkup import TIERS, missing
+from grader.core.checkup import TIERS
 from grader.core.errors import GraderError, HarnessError, RubricError
-from grader.core.releases import TRIED
-from grader.reporting.delivery import Output, deliver, early_delivery, prepared, show
-from grader.reporting.escape import encoded, shown
 from grader.reporting.formats import FORMATS
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from grader.reporting.delivery import Output
 
 _EPILOG = (
     "Exit codes: 0 all criteria met (or the share of --min-score reached), 1 not, 2 the command or something it was "
@@ -151,16 +153,17 @@ def _grade(  # noqa: PLR0913  one parameter an option
 
     A folder with the name of a command is graded as ./NAME.
     """
+    from grader.reporting.delivery import Output, deliver, early_delivery, prepared
+
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     wanted = prepared((*rendered, Output("json")) if as_json else rendered)
     for_whom = readers(audience, as_of)
-    from grader.app import (  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
-        evidence_writer,
-        grade,
-    )
-    from grader.app.request import GradeRequest  # noqa: PLC0415  as above
-    from grader.app.seeds import PRACTICE  # noqa: PLC0415  as above
-    from grader.reporting.audience import told  # noqa: PLC0415  as above
+    from grader.app import grade
+    from grader.app.request import GradeRequest
+    from grader.app.seeds import PRACTICE
+    from grader.core.checkup import missing
+    from grader.core.releases import TRIED
+    from grader.reporting.audience import told
 
     key = drawn_with(seed, seed_key)
     request = GradeRequest(
@@ -180,18 +183,18 @@ def _grade(  # noqa: PLR0913  one parameter an option
         draw=drawn_by(student, variant_key),
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
-    writer = evidence_writer.EvidenceWriter(folders, request)
+    writer = grade.EvidenceWriter(folders, request)
     pictures = any(FORMATS[output.format].illustrated for output in wanted)
     with shown_progress(wanted=not no_progress) as progress:
         report = grade.grade(request, progress, writer.remember, early_delivery(wanted, for_whom), pictures=pictures)
     for found in missing(report.environment.containment):
-        _warn(f"sandbox {report.environment.isolation}: {found}")
+        complain(f"sandbox {report.environment.isolation}: {found}")
     if report.environment.ros_distro not in TRIED:
-        _warn(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
+        complain(f"ROS 2 {report.environment.ros_distro} was never tried with this grader")
     deliver(report, wanted, for_whom)
     seen = told(report, for_whom)
     if folders and seen is not report:
-        _warn("the evidence is not kept: it holds what the rubric withholds from students")
+        complain("the evidence is not kept: it holds what the rubric withholds from students")
     else:
         writer.write(report)
     return exit_code(seen, min_score)
@@ -211,15 +214,16 @@ def _observe(  # noqa: PLR0913  one parameter an option
 
     Shows nodes, topics with types, rates and values, services, parameters, log records, faults and the graph.
     """
-    from grader.app import observe  # noqa: PLC0415  as for grading
-    from grader.reporting.observed import render_summary, summary_to_json  # noqa: PLC0415
+    from grader.app import observe
+    from grader.reporting.observed import render_summary, summary_to_json
 
     request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
-    text = summary_to_json(summary) if as_json else render_summary(summary)
-    sys.stdout.buffer.write(encoded(text, sys.stdout.encoding or "utf-8"))
-    sys.stdout.flush()
+    if as_json:
+        print_for_programs(summary_to_json(summary))
+    else:
+        print_for_people(lambda _: render_summary(summary))
     return ALL_MET
 
 
@@ -230,15 +234,15 @@ def _doctor(*, as_json: bool) -> int:
 
     Exit codes: 0 if strangers' programs can be graded safely here, 2 if not.
     """
-    from grader.app.doctor import examine  # noqa: PLC0415  the rest of the grader, which --help does not need
-    from grader.reporting.doctor import checkup_to_json, render_checkup  # noqa: PLC0415
+    from grader.app.doctor import examine
+    from grader.reporting.doctor import checkup_to_json, render_checkup
 
     with shown_progress(wanted=True) as progress:
         checkup = examine(progress)
     if as_json:
-        show(lambda _: checkup_to_json(checkup), for_people=False)
+        print_for_programs(checkup_to_json(checkup))
     else:
-        show(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour), for_people=True)
+        print_for_people(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour))
     return ALL_MET if checkup.safe else UNUSABLE
 
 
@@ -252,14 +256,14 @@ def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
     Says what is asked, in which situation and with which tolerance it is measured, and which part of the chapter asks
     for it.
     """
-    from grader.app.explain import explain  # noqa: PLC0415  the rest of the grader, which --help does not need
-    from grader.reporting.explained import explanations_to_json, render_explanations  # noqa: PLC0415
+    from grader.app.explain import explain
+    from grader.reporting.explained import explanations_to_json, render_explanations
 
     found = explain(name, rubrics)
     if as_json:
-        show(lambda _: explanations_to_json(found), for_people=False)
+        print_for_programs(explanations_to_json(found))
     else:
-        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: render_explanations(found, width=layout.width))
     return ALL_MET
 
 
@@ -288,31 +292,26 @@ def _guarded(run: Callable[[], object]) -> int:
     except click.exceptions.Exit:
         raise
     except click.ClickException as error:
-        _complain(error.format_message().rstrip("."), hint="grade --help lists the options")
+        _fail(error.format_message().rstrip("."), hint="grade --help lists the options")
         return UNUSABLE
     except GraderError as error:
         # A RubricError lists one mistake per line; in any other message a line break comes from a hostile name.
         lines = error.message.splitlines() if isinstance(error, RubricError) else [error.message]
-        _complain(*lines, hint=error.hint)
+        _fail(*lines, hint=error.hint)
         return UNDECIDED if isinstance(error, HarnessError) else UNUSABLE
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: no report was made", err=True)
         return INTERRUPTED
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
         if os.environ.get("GRADER_DEBUG") == "1":
+            import traceback
+
             traceback.print_exc()
-        _complain(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
+        _fail(f"the grader failed: {type(error).__name__}: {error}", hint="GRADER_DEBUG=1 shows where")
         return UNDECIDED
     return code if isinstance(code, int) else ALL_MET
 
 
-def _complain(*lines: str, hint: str) -> None:
-    for line in lines:
-        click.echo(f"error: {shown(line)}", err=True)
-    if hint:
-        click.echo(f"hint: {shown(hint)}", err=True)
-
-
-def _warn(*lines: str) -> None:
-    for line in lines:
-        click.echo(f"warning: {shown(line)}", err=True)
+def _fail(*lines: str, hint: str) -> None:
+    complain(*lines, kind="error")
+    complain(*filter(None, [hint]), kind="hint")

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import date
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.core.errors import EnvironmentFault
-from grader.core.exercise import Audience
+from grader.core.errors import EnvironmentFault, GraderError
 from grader.core.limits import TIME_BUDGET_S
-from grader.reporting.audience import Readers
-from grader.reporting.delivery import Output
-from grader.reporting.escape import shown
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from grader.app.grade import Progress
     from grader.app.seeds import ByKey, SeedKey
+    from grader.reporting.audience import Readers
+    from grader.reporting.delivery import Output
+    from grader.reporting.formats import PageLayout
 
 
 #: The format name in `-o evidence=FOLDER`, which keeps the recordings of a run.
@@ -55,7 +53,7 @@ def audience_options(command: _Command) -> _Command:
     )
     audience = click.option(
         "--audience",
-        type=click.Choice([audience.value for audience in Audience]),
+        type=click.Choice(["student", "instructor"]),
         help="Who reads all reports; by default students read those for platforms, and instructors the others.",
     )
     return audience(day(command))
@@ -63,33 +61,28 @@ def audience_options(command: _Command) -> _Command:
 
 def readers(audience: str | None, day: str) -> Readers:
     """Return the readers of the reports, from the values of `--audience` and `--as-of`."""
+    from grader.core.exercise import Audience
+    from grader.reporting.audience import Readers
+
     return Readers(None if audience is None else Audience(audience), day)
 
 
 def drawn_by(student: str, key: Path | None) -> ByKey | None:
-    """Return the source of a student's variant values; None if neither option is given.
-
-    Raises:
-        GraderError: The key or the id cannot be used.
-    """
+    """Return the source of a student's variant values; None if neither option is given."""
     if not student and key is None:
         return None
     if key is None or not student:
         raise click.BadParameter("--student and --variant-key need each other")
-    from grader.app.seeds import by_key  # noqa: PLC0415  reading, which --help does not need
+    from grader.app.seeds import by_key
 
     return by_key(key, student)
 
 
 def drawn_with(seed: int | None, path: Path | None) -> SeedKey | None:
-    """Return the seed key from `--seed-key` or the environment; None if neither has one.
-
-    Raises:
-        KeyFileError: The key cannot be used.
-    """
+    """Return the seed key from `--seed-key` or the environment; None if neither has one."""
     if seed is not None and path is not None:
         raise click.BadParameter("--seed and --seed-key exclude each other: a seed needs no key")
-    from grader.app.seeds import seed_key  # noqa: PLC0415  reading, which --help does not need
+    from grader.app.seeds import seed_key
 
     return seed_key(path)
 
@@ -103,6 +96,8 @@ def require(what: str, library: str, extra: str) -> None:
 
 def _parse_day(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
     del ctx, param
+    from datetime import date
+
     if value is None:
         return date.today().isoformat()  # noqa: DTZ011  the local date where it is graded
     try:
@@ -127,6 +122,8 @@ def _parse_output(value: str) -> Output:
         raise click.BadParameter(f"{format_!r} is no format{nearest(format_, [*FORMATS, EVIDENCE])}")
     if format_ == EVIDENCE and path == "-":
         raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")
+    from grader.reporting.delivery import Output
+
     return Output(format_, None if path == "-" else Path(path))
 
 
@@ -137,6 +134,8 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
         return None
     if not 0 <= value <= 100:  # NaN loses
         raise click.BadParameter(f"expected 0 to 100, found {value}")
+    from fractions import Fraction
+
     return Fraction(str(value))
 
 
@@ -154,22 +153,56 @@ def parse_share(ctx: click.Context, param: click.Parameter, value: str) -> float
 
 def nearest(found: str, known: Sequence[str]) -> str:
     """End a message with the closest known name, or with all known names."""
+    import difflib
+
     near = difflib.get_close_matches(found, known, n=1, cutoff=0.4)
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+
+
+def print_for_programs(text: str) -> None:
+    """Print text in UTF-8, and nothing else, on standard output."""
+    from grader.reporting.delivery import show
+
+    show(lambda _: text, for_people=False)
+
+
+def print_for_people(render: Callable[[PageLayout], str]) -> None:
+    """Print text on standard output, rendered for its width and colour."""
+    from grader.reporting.delivery import show
+
+    show(render, for_people=True)
+
+
+def complain(*lines: str, kind: str = "warning") -> None:
+    """Write lines of a warning, an error or a hint on standard error; they may hold foreign text."""
+    from grader.reporting.escape import shown
+
+    for line in lines:
+        click.echo(f"{kind}: {shown(line)}", err=True)
+
+
+def write_file(path: Path, content: bytes, *, parents: bool = False) -> None:
+    """Write a file atomically, and its folders if asked; raises GraderError if that fails."""
+    from grader.reporting.delivery import write_whole
+
+    try:
+        if parents:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
+    except OSError as error:
+        raise GraderError(f"{path}: it cannot be written: {error.strerror or error}") from error
 
 
 @contextmanager
 def shown_progress(*, wanted: bool) -> Iterator[Progress]:
     """Show the current step on a terminal, and erase it at the end."""
     if not (wanted and sys.stderr is not None and sys.stderr.isatty()):
-        yield _ignore
+        yield lambda _: None
         return
-    from rich.console import Console  # noqa: PLC0415  only for a terminal
-    from rich.text import Text  # noqa: PLC0415
+    from rich.console import Console
+    from rich.text import Text
+
+    from grader.reporting.escape import shown
 
     with Console(stderr=True).status("starting") as status:
         yield lambda step: status.update(Text(shown(step)))
-
-
-def _ignore(step: str) -> None:
-    del step

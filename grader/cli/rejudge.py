@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from grader.app.exit_codes import exit_code
-from grader.cli.options import EVIDENCE, PATH, audience_options, parse_outputs, parse_percent, readers
-from grader.reporting.delivery import Output, deliver, prepared, show
+from grader.cli.options import (
+    EVIDENCE,
+    PATH,
+    audience_options,
+    parse_outputs,
+    parse_percent,
+    print_for_people,
+    print_for_programs,
+    readers,
+)
 from grader.reporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
 
     from grader.app.rejudge import Judgement, Wanted
     from grader.reporting.audience import Readers
+    from grader.reporting.delivery import Output
 
 
 @click.command(name="rejudge")
@@ -66,8 +75,9 @@ def command(  # noqa: PLR0913  one parameter an option
 
     Exit codes are those of grading; 2 also where a part of a class had to be refused.
     """
-    from grader.app import rejudge  # noqa: PLC0415  the rest of the grader, which --help and mistakes do not need
-    from grader.execution.evidence.store import is_evidence  # noqa: PLC0415
+    from grader.app import rejudge
+    from grader.execution.evidence.store import is_evidence
+    from grader.reporting.delivery import Output
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
@@ -95,9 +105,10 @@ def command(  # noqa: PLR0913  one parameter an option
 
 def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fraction | None, for_whom: Readers) -> int:
     """Judge one submission, and deliver its report as grading does."""
-    from grader.app import rejudge  # noqa: PLC0415  as above
-    from grader.execution.evidence.store import open_evidence  # noqa: PLC0415
-    from grader.reporting.audience import told  # noqa: PLC0415
+    from grader.app import rejudge
+    from grader.execution.evidence.store import open_evidence
+    from grader.reporting.audience import told
+    from grader.reporting.delivery import deliver, prepared
 
     wanted = prepared(outputs)
     report = rejudge.rejudge(open_evidence(folder), how)
@@ -107,14 +118,14 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
 
 def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json: bool, jobs: int | None) -> int:
     """Judge many submissions, print their results, and write one file for each submission and format."""
-    from grader.app import rejudge  # noqa: PLC0415  as above
-    from grader.reporting.rejudged import render_changes, render_results, results_to_json  # noqa: PLC0415  as above
+    from grader.app import rejudge
+    from grader.reporting.rejudged import render_changes, render_results, results_to_json
 
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
     results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
     if as_json:
-        show(lambda _: results_to_json(results, changes=wanted.changes), for_people=False)
+        print_for_programs(results_to_json(results, changes=wanted.changes))
     else:
-        show(lambda _: render_changes(results) if wanted.changes else render_results(results), for_people=True)
+        print_for_people(lambda _: render_changes(results) if wanted.changes else render_results(results))
     return next(rejudge.codes(results))

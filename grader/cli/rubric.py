@@ -7,11 +7,9 @@ from pathlib import Path
 import click
 
 from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNUSABLE
-from grader.cli.options import PATH, require, shown_progress
+from grader.cli.options import PATH, complain, print_for_people, print_for_programs, require, shown_progress, write_file
 from grader.core.checkup import TIERS
 from grader.core.errors import GraderError, RubricError
-from grader.reporting.delivery import show, write_whole
-from grader.reporting.escape import shown
 
 
 @click.group(name="rubric")
@@ -26,7 +24,8 @@ def _check(*, files: tuple[Path, ...]) -> int:
 
     Exit code 2 if one of them cannot be used; what is merely odd is a warning.
     """
-    from grader.authoring.checking import check_rubric, complaints  # noqa: PLC0415  reading, which --help does not need
+    from grader.authoring.checking import check_rubric, complaints
+    from grader.reporting.escape import shown
 
     code = ALL_MET
     for path in files:
@@ -38,7 +37,7 @@ def _check(*, files: tuple[Path, ...]) -> int:
                 click.echo(shown(line), err=True)
             continue
         for warning in checked.warnings:
-            click.echo(f"warning: {shown(warning)}", err=True)
+            complain(warning)
         click.echo(shown(checked.summary))
     return code
 
@@ -50,12 +49,11 @@ def _schema(*, rubric: Path | None) -> int:
 
     That for a rubric FILE knows the checks of its own as well.
     """
-    from grader.judging.checks import CHECKS  # noqa: PLC0415  as above
-    from grader.rubrics.loader import own_checks  # noqa: PLC0415
-    from grader.rubrics.schema import schema_text  # noqa: PLC0415
+    from grader.judging.checks import CHECKS
+    from grader.rubrics.loader import own_checks
+    from grader.rubrics.schema import schema_text
 
-    text = schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))})
-    show(lambda _: text, for_people=False)
+    print_for_programs(schema_text({**CHECKS, **({} if rubric is None else own_checks(rubric))}))
     return ALL_MET
 
 
@@ -66,11 +64,11 @@ def _schema(*, rubric: Path | None) -> int:
 @click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
 def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
-    from grader.app.seeds import sheet  # noqa: PLC0415
-    from grader.reporting.explained import render_sheet, sheet_to_json  # noqa: PLC0415  as above
+    from grader.app.seeds import sheet
+    from grader.reporting.explained import render_sheet, sheet_to_json
 
     exercise = sheet(rubric, key, student)
-    show(lambda _: sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise), for_people=False)
+    print_for_programs(sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise))
     return ALL_MET
 
 
@@ -83,20 +81,16 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
 
     Without a FILE the rubrics that come with the grader are explained.
     """
-    from grader.app.explain import explain_checks, explain_rubrics  # noqa: PLC0415  as above
-    from grader.reporting.explained import (  # noqa: PLC0415  as above
-        explanations_to_json,
-        list_checks,
-        render_explanations,
-    )
+    from grader.app.explain import explain_checks, explain_rubrics
+    from grader.reporting.explained import explanations_to_json, list_checks, render_explanations
 
     found = explain_checks(files) if checks else explain_rubrics(files)
     if as_json:
-        show(lambda _: explanations_to_json(found), for_people=False)
+        print_for_programs(explanations_to_json(found))
     elif checks:
-        show(lambda layout: list_checks(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: list_checks(found, width=layout.width))
     else:
-        show(lambda layout: render_explanations(found, width=layout.width), for_people=True)
+        print_for_people(lambda layout: render_explanations(found, width=layout.width))
     return ALL_MET
 
 
@@ -124,8 +118,9 @@ def _new(  # noqa: PLR0913  one parameter an option
 
     It is a skeleton: comments tell what was seen, and what its author has to decide. The reference meets all of it.
     """
-    from grader.app.observe import ObserveRequest  # noqa: PLC0415
-    from grader.authoring.starting import new_rubric  # noqa: PLC0415  as above
+    from grader.app.observe import ObserveRequest
+    from grader.authoring.starting import new_rubric
+    from grader.reporting.escape import shown
 
     if output is not None and output.exists():
         raise GraderError(f"{output}: expected a new file, found one that is there", "name another, or remove it")
@@ -133,14 +128,11 @@ def _new(  # noqa: PLR0913  one parameter an option
         request = ObserveRequest(files, round(duration * 1e9), None, clock, isolation)
         skeleton = new_rubric(request, progress, id_=id_, sent=sent)
     for remark in skeleton.remarks:
-        click.echo(f"warning: {shown(remark)}", err=True)
+        complain(remark)
     if output is None:
-        show(lambda _: skeleton.text, for_people=False)
+        print_for_programs(skeleton.text)
     else:
-        try:
-            write_whole(output, skeleton.text.encode())
-        except OSError as error:
-            raise GraderError(f"{output}: it cannot be written: {error.strerror or error}") from error
+        write_file(output, skeleton.text.encode())
         rows = "criterion" if skeleton.criteria == 1 else "criteria"
         click.echo(
             f"{shown(str(output))}: {skeleton.criteria} {rows}, all of them met; {skeleton.left_out} in comments"
@@ -182,9 +174,9 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     2 the command or something it was given cannot be used.
     """
     require("grade selftest", "libcst", "authors")
-    from grader.mutation.running import SelftestOptions, selftest  # noqa: PLC0415  as above
-    from grader.mutation.showing import render_results, results_to_json  # noqa: PLC0415  as above
-    from grader.rubrics.loader import NOTES  # noqa: PLC0415  the rest of the grader, and libcst
+    from grader.mutation.running import SelftestOptions, selftest
+    from grader.mutation.showing import render_results, results_to_json
+    from grader.rubrics.loader import NOTES
 
     # A shell pattern such as rubrics/*.yaml matches the notes as well.
     named = [path for path in rubrics if not path.name.endswith(NOTES)]
@@ -194,7 +186,7 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
     if as_json:
-        show(lambda _: results_to_json(results), for_people=False)
+        print_for_programs(results_to_json(results))
     else:
-        show(lambda page: render_results(results, width=page.width, colour=page.colour), for_people=True)
+        print_for_people(lambda page: render_results(results, width=page.width, colour=page.colour))
     return ALL_MET if all(result.passed for result in results) else NOT_ALL_MET

@@ -32,20 +32,13 @@ class Tone(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A series of points.
+    """A series of points."""
 
-    Attributes:
-        name: Its name in the legend.
-        points: (x, y) in the units of the axes; NaN interrupts a line.
-        look: How the points are connected.
-        tone: Their meaning.
-        texts: A text for each point; empty if there are none. Student-controlled.
-    """
-
-    name: str
-    points: tuple[Point, ...]
-    look: Look = Look.LINE
-    tone: Tone = Tone.MAIN
+    name: str  # its name in the legend
+    points: tuple[Point, ...]  # (x, y) in the units of the axes; NaN interrupts a line
+    look: Look = Look.LINE  # how the points are connected
+    tone: Tone = Tone.MAIN  # their meaning
+    # A text for each point; empty if there are none. Student-controlled.
     texts: tuple[str, ...] = ()
 
 
@@ -78,52 +71,32 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One coordinate system of a chart.
+    """One coordinate system of a chart."""
 
-    Attributes:
-        title: Title of the vertical axis.
-        unit: Its unit; empty for none.
-        series: In drawing order.
-        bands: Ranges of accepted values.
-        levels: Thresholds and expected values.
-        lanes: If not empty, the vertical axis has these rows instead of numbers, from the top; y is the index of a row.
-        grid: Grid lines of the horizontal axis: (first, distance); None if the renderer chooses.
-    """
-
-    title: str
-    unit: str
-    series: tuple[Series, ...]
-    bands: tuple[Band, ...] = ()
-    levels: tuple[Level, ...] = ()
+    title: str  # title of the vertical axis
+    unit: str  # its unit; empty for none
+    series: tuple[Series, ...]  # in drawing order
+    bands: tuple[Band, ...] = ()  # ranges of accepted values
+    levels: tuple[Level, ...] = ()  # thresholds and expected values
+    # If not empty, the vertical axis has these rows instead of numbers, from the top; y is the index of a row
     lanes: tuple[str, ...] = ()
+    # Grid lines of the horizontal axis: (first, distance); None if the renderer chooses
     grid: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Panels below each other that share the horizontal axis.
+    """Panels below each other that share the horizontal axis."""
 
-    Attributes:
-        id: Unique within the exercise.
-        title: Its title.
-        about: A description for readers who cannot see it.
-        criteria: Ids of the criteria that it illustrates.
-        x_title: Title of the horizontal axis.
-        x_unit: Its unit.
-        panels: Its panels, from the top.
-        moments: Lines through all panels.
-        square: Whether both axes have the same scale.
-    """
-
-    id: str
-    title: str
-    about: str
-    criteria: tuple[str, ...]
-    x_title: str
-    x_unit: str
-    panels: tuple[Panel, ...]
-    moments: tuple[Moment, ...] = ()
-    square: bool = False
+    id: str  # unique within the exercise
+    title: str  # its title
+    about: str  # a description for readers who cannot see it
+    criteria: tuple[str, ...]  # ids of the criteria that it illustrates
+    x_title: str  # title of the horizontal axis
+    x_unit: str  # its unit
+    panels: tuple[Panel, ...]  # its panels, from the top
+    moments: tuple[Moment, ...] = ()  # lines through all panels
+    square: bool = False  # whether both axes have the same scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,16 +123,9 @@ Figure = Chart | GraphFigure
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """A few lines around a place in a student's file.
+    """A few lines around a place in a student's file."""
 
-    Attributes:
-        file: Relative to the submission.
-        line: The line of interest, from 1.
-        first: Number of the first line shown.
-        lines: The text, student-controlled, without line ends.
-    """
-
-    file: str
-    line: int
-    first: int
-    lines: tuple[str, ...]
+    file: str  # relative to the submission
+    line: int  # the line of interest, from 1
+    first: int  # number of the first line shown
+    lines: tuple[str, ...]  # the text, student-controlled, without line ends

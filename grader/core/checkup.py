@@ -31,19 +31,12 @@ NO_SANDBOX = "none"
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """One property of a tier.
+    """One property of a tier."""
 
-    Attributes:
-        name: One of `PROPERTIES`.
-        holds: Whether the self-test confirmed it.
-        mechanism: What provides it, e.g. `mount namespace`; `none` if nothing does.
-        found: What the self-test found instead, or a qualification; one line, may be empty.
-    """
-
-    name: str
-    holds: bool
-    mechanism: str
-    found: str = ""
+    name: str  # one of `PROPERTIES`
+    holds: bool  # whether the self-test confirmed it
+    mechanism: str  # what provides it, e.g. `mount namespace`; `none` if nothing does.
+    found: str = ""  # what the self-test found instead, or a qualification; one line, may be empty
 
     def __str__(self) -> str:
         """Return the property as reports show it."""
@@ -54,23 +47,14 @@ class Property:
 
 @dataclass(frozen=True, slots=True)
 class TierReport:
-    """The result of testing one tier on this machine, for this user.
+    """The result of testing one tier on this machine, for this user."""
 
-    Attributes:
-        name: Tier name, a key of `TIERS`.
-        tier: Its letter: `A2`, `A1`, `B`, `C` or `D`.
-        usable: Whether a student's node runs in it and it has all `REQUIRED` properties.
-        why: Why it is not usable, one line; empty if it is.
-        properties: In the order of `PROPERTIES`; empty if no process could be started in it.
-        remedy: The one command or action that fixes the problem; empty if there is none.
-    """
-
-    name: str
-    tier: str
-    usable: bool
-    why: str
-    properties: tuple[Property, ...] = ()
-    remedy: str = ""
+    name: str  # tier name, a key of `TIERS`
+    tier: str  # its letter: `A2`, `A1`, `B`, `C` or `D`
+    usable: bool  # whether a student's node runs in it and it has all `REQUIRED` properties
+    why: str  # why it is not usable, one line; empty if it is
+    properties: tuple[Property, ...] = ()  # in the order of `PROPERTIES`; empty if no process could be started in it
+    remedy: str = ""  # the one command or action that fixes the problem; empty if there is none
 
 
 def missing(properties: Sequence[Property]) -> tuple[Property, ...]:
@@ -100,38 +84,23 @@ def summarised(isolation: str, properties: Sequence[Property]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One fact about this machine.
+    """One fact about this machine."""
 
-    Attributes:
-        name: Its name, e.g. `kernel`.
-        value: Its value, one line.
-        fits: Whether it is sufficient for grading.
-        remedy: The command or action that fixes it; empty if no fix is needed or known.
-    """
-
-    name: str
-    value: str
-    fits: bool = True
-    remedy: str = ""
+    name: str  # its name, e.g. `kernel`
+    value: str  # its value, one line
+    fits: bool = True  # whether it is sufficient for grading
+    remedy: str = ""  # the command or action that fixes it; empty if no fix is needed or known
 
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """A trial node that published over real DDS.
+    """A trial node that published over real DDS."""
 
-    Attributes:
-        tier: The tier of isolation it ran in.
-        expected: Messages it published.
-        arrived: Messages that the grader received.
-        took_s: Seconds from the start to the result.
-        problem: Why it could not be tried; empty if it could.
-    """
-
-    tier: str
-    expected: int
-    arrived: int
-    took_s: float
-    problem: str = ""
+    tier: str  # the tier of isolation it ran in
+    expected: int  # messages it published
+    arrived: int  # messages that the grader received
+    took_s: float  # seconds from the start to the result
+    problem: str = ""  # why it could not be tried; empty if it could
 
     @property
     def succeeded(self) -> bool:
@@ -141,22 +110,13 @@ class Exchange:
 
 @dataclass(frozen=True, slots=True)
 class Checkup:
-    """The result of checking this machine.
+    """The result of checking this machine."""
 
-    Attributes:
-        facts: Software and hardware.
-        exchange: A test exchange of messages, or None without ROS.
-        tiers: Every tier, strongest first; empty without ROS.
-        used: The tier that grading would use; empty if it would refuse.
-        remedy: The one command or action that makes a tier work; empty if one does, or none is known.
-        limits: The default limits of students' processes.
-    """
-
-    facts: tuple[Fact, ...]
-    exchange: Exchange | None
-    tiers: tuple[TierReport, ...]
-    used: str
-    remedy: str
+    facts: tuple[Fact, ...]  # software and hardware
+    exchange: Exchange | None  # a test exchange of messages, or None without ROS
+    tiers: tuple[TierReport, ...]  # every tier, strongest first; empty without ROS
+    used: str  # the tier that grading would use; empty if it would refuse
+    remedy: str  # the one command or action that makes a tier work; empty if one does, or none is known
     limits: Limits
 
     @property

@@ -1,26 +1,11 @@
-"""The errors of the grader, grouped by who has to act.
-
-    GraderError
-      ├─ RubricError       the author of the rubric
-      ├─ SubmissionError   the student, or the user who gave the path
-      ├─ RecordingError    the user who gave the /odom recording
-      ├─ EvidenceError     the user who gave the evidence
-      ├─ ClassError        the user who gave the submissions, roster, late days or result folder of a class
-      ├─ VariantError      the user who named a student to get the variant of
-      ├─ KeyFileError      the user who gave the course key or the seed key
-      ├─ EnvironmentFault  the administrator of this machine (ROS, sandbox)
-      └─ HarnessError      the developers or the machine, during a run
-
-A crash of a student's program is not an error but a Fault in the trace.
-"""
+"""The errors of the grader, grouped by who has to act; a crash of a student's program is a Fault in the trace."""
 
 
 class GraderError(Exception):
     """A problem with a place and a fix.
 
-    Args:
-        message: `where: what was expected, what was found`, one line.
-        hint: One thing to do, without the word "hint"; empty if there is none.
+    The message is one line, `where: what was expected, what was found`. The hint is one thing to do, without the word
+    "hint"; empty if there is none.
     """
 
     def __init__(self, message: str, hint: str = "") -> None:

@@ -14,33 +14,53 @@ from grader.core.trace import Trace
 
 
 class ProblemKind(Enum):
-    """The kinds of problems that diagnosis distinguishes; a check states one only if a diagnosis needs it."""
+    """The kinds of problems that checks find; diagnosis and the page of a class tell problems apart by them."""
 
+    ABSENT = "absent"  # there is no such publisher, subscription, server, node or parameter
+    OTHER_NAME = "other_name"  # there is one of another name
+    OTHER_TYPE = "other_type"  # there is one of another type
+    SILENT = "silent"  # it is there, and sends nothing
+    TOO_FEW = "too_few"  # fewer messages, requests or responses than expected
+    TOO_MANY = "too_many"  # more of them
+    TOO_LATE = "too_late"  # what is expected comes, but late
+    WRONG_RATE = "wrong_rate"  # the time between messages, requests or logs is wrong
+    RATE_CHANGES = "rate_changes"  # the rate is right on average, but not to the end
     BURSTS = "bursts"  # several messages arrive at once
     STOPPED = "stopped"  # messages arrived, then stopped
     NO_MESSAGE = "no_message"  # no message arrived
+    NO_FIELD = "no_field"  # the message type has no such field
     NO_NUMBER = "no_number"  # the message type contains no number
+    WRONG_VALUE = "wrong_value"  # a value differs from the expected one
+    NOT_RANDOM = "not_random"  # the values follow a pattern
     CONSTANT = "constant"  # the values are all the same
     NEVER_CHANGES = "never_changes"  # the answer cannot change, because the input stays on one side of the threshold
     WRONG_ANSWER = "wrong_answer"  # an answer does not fit its input, or one of the two answers never occurs
+    NO_ANSWER = "no_answer"  # an input or a request is never answered
+    REFUSED = "refused"  # a goal or a transition is refused
+    BEHIND = "behind"  # each answer fits an earlier input
+    CONTRADICTION = "contradiction"  # two answers come at one instant
     KEPT_APART = "kept_apart"  # types or QoS of publisher and subscription are incompatible
     NO_EDGE = "no_edge"  # two processes are not connected in the graph
     COUNT_START = "count_start"  # a count starts at the wrong number
     ONE_PER_MESSAGE = "one_per_message"  # every message is logged
+    NO_NODE = "no_node"  # a program writes, but has no node
+    NOT_LOGGED = "not_logged"  # nothing is logged, or not all of it
+    PRINTED = "printed"  # it is printed instead of logged
+    AMONG_OTHERS = "among_others"  # the right values are logged among so many others that they show nothing
+    ERRORS_LOGGED = "errors_logged"  # records say that something failed
+    ENDED = "ended"  # a program ends by itself too early
+    STILL_RUNNING = "still_running"  # a program does not end when it is stopped
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One problem.
-
-    Attributes:
-        kind: What is wrong.
-        topics: The topics concerned, if a check looks at several.
-        start: The number that a count starts at; None for problems of other kinds.
-    """
+    """One problem."""
 
     kind: ProblemKind
-    topics: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()  # the topics concerned, if a check looks at several
+    # What tells problems of this kind apart, e.g. `swapped` for wrong positions; empty if nothing does
+    detail: str = ""
+    # The number that a count starts at; None for problems of other kinds; not shown in reports
     start: int | None = None
 
 
@@ -71,15 +91,11 @@ ORDER = tuple(Shows)
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What a student sees of one criterion.
+    """What a student sees of one criterion."""
 
-    Attributes:
-        shows: How much of the result.
-        until: The last day on which this applies, as `2026-12-01`; everything is shown afterwards. `due_date` and
-            `published` are events that only a platform knows; empty if it always applies.
-    """
-
-    shows: Shows = Shows.ALL
+    shows: Shows = Shows.ALL  # how much of the result
+    # The last day on which this applies, as `2026-12-01`; everything is shown afterwards. `due_date` and `published`
+    # are events that only a platform knows; empty if it always applies.
     until: str = ""
 
     def on(self, day: str) -> Shows:
@@ -103,15 +119,10 @@ Value = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """The values of one exercise for one student.
+    """The values of one exercise for one student."""
 
-    Attributes:
-        student: The student, as staff wrote the name; empty if the values belong to nobody.
-        values: Name and value, in the order of the rubric.
-    """
-
-    student: str
-    values: tuple[tuple[str, Value], ...]
+    student: str  # the student, as staff wrote the name; empty if the values belong to nobody
+    values: tuple[tuple[str, Value], ...]  # name and value, in the order of the rubric
 
     @property
     def text(self) -> str:
@@ -121,15 +132,10 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """The values of all exercises for one student.
+    """The values of all exercises for one student."""
 
-    Attributes:
-        student: The student.
-        values: Exercise id -> name -> value.
-    """
-
-    student: str
-    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    student: str  # the student
+    values: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)  # exercise id -> name -> value
 
 
 def variant_notes(variant: Variant | None) -> tuple[str, ...]:
@@ -167,25 +173,17 @@ class Location:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check found in a trace.
+    """What a check found in a trace."""
 
-    Attributes:
-        credit: Share of the points earned, in [0, 1].
-        reason: One sentence in the form `where: what was found, what was expected`; no markup.
-        evidence: Plain JSON values behind the reason; keys in a fixed order.
-        location: Place in the student's file, if the trace names one.
-        hint: One thing to do; empty if no advice is very likely to be right.
-        blocked_by: Id of the criterion that must be met before this one can be judged; credit is then 0.
-        problem: The problem found, if diagnosis can explain it further; not shown in reports.
-    """
-
-    credit: Fraction
-    reason: str
+    credit: Fraction  # share of the points earned, in [0, 1]
+    reason: str  # one sentence in the form `where: what was found, what was expected`; no markup
+    # Plain JSON values behind the reason; keys in a fixed order
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    location: Location | None = None
-    hint: str = ""
+    location: Location | None = None  # place in the student's file, if the trace names one
+    hint: str = ""  # one thing to do; empty if no advice is very likely to be right
+    # Id of the criterion that must be met before this one can be judged; credit is then 0
     blocked_by: str | None = None
-    problem: Problem | None = None
+    problem: Problem | None = None  # the problem found, if the check tells several problems apart
 
 
 class Check(Protocol):
@@ -193,7 +191,6 @@ class Check(Protocol):
 
     def judge(self, trace: Trace) -> Finding:
         """Judge the trace. This is a pure function, and nothing that a student does makes it raise."""
-        ...
 
 
 @runtime_checkable
@@ -202,62 +199,36 @@ class SourceCheck(Protocol):
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Judge the trace and the files, by their required names; a pure function like `judge`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """One row of a rubric.
+    """One row of a rubric."""
 
-    Attributes:
-        id: Unique within the exercise; never changes.
-        title: Its title.
-        points: Above 0.
-        scenario: Id of the scenario whose trace is judged.
-        check: The check that judges it.
-        needs: Ids of criteria that must be met or partly met before this one is judged.
-        hint: Hint for a student who did not meet it, if the check has no better one.
-        chapter: The part of the course text that requires it, e.g. `Exercise 1, acceptance criterion 2`; may be empty.
-        feedback: How much of its result a student sees.
-        check_name: Name of its check in the rubric.
-    """
-
-    id: str
-    title: str
-    points: Fraction
-    scenario: str
-    check: Check
-    needs: tuple[str, ...] = ()
-    hint: str = ""
+    id: str  # unique within the exercise; never changes
+    title: str  # its title
+    points: Fraction  # above 0
+    scenario: str  # id of the scenario whose trace is judged
+    check: Check  # the check that judges it
+    needs: tuple[str, ...] = ()  # ids of criteria that must be met or partly met before this one is judged
+    hint: str = ""  # hint for a student who did not meet it, if the check has no better one
+    # The part of the course text that requires it, e.g. `Exercise 1, acceptance criterion 2`; may be empty
     chapter: str = ""
-    feedback: Feedback = OPEN
-    check_name: str = field(default="", compare=False)
+    feedback: Feedback = OPEN  # how much of its result a student sees
+    check_name: str = field(default="", compare=False)  # name of its check in the rubric
 
 
 @dataclass(frozen=True, slots=True)
 class Exercise:
-    """One rubric file.
+    """One rubric file."""
 
-    Attributes:
-        id: Unique, e.g. `velocity_publisher`.
-        number: Number in the chapter, as text.
-        title: Its title.
-        required: Whether the chapter requires it.
-        files: File names that a submission must contain, in order.
-        scenarios: Its scenarios, in the order of recording.
-        criteria: Its criteria, in order.
-        digest: `sha256:` digest of the rubric file and its own check files.
-        by_request: Whether it is graded only on request.
-        variant: The values for this student; None if nothing varies.
-    """
-
-    id: str
-    number: str
-    title: str
-    required: bool
-    files: tuple[str, ...]
-    scenarios: tuple[Scenario, ...]
-    criteria: tuple[Criterion, ...]
-    digest: str
-    by_request: bool = False
-    variant: Variant | None = None
+    id: str  # unique, e.g. `velocity_publisher`
+    number: str  # number in the chapter, as text
+    title: str  # its title
+    required: bool  # whether the chapter requires it
+    files: tuple[str, ...]  # file names that a submission must contain, in order
+    scenarios: tuple[Scenario, ...]  # its scenarios, in the order of recording
+    criteria: tuple[Criterion, ...]  # its criteria, in order
+    digest: str  # `sha256:` digest of the rubric file and its own check files
+    by_request: bool = False  # whether it is graded only on request
+    variant: Variant | None = None  # the values for this student; None if nothing varies

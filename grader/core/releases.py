@@ -7,17 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """A release of ROS 2.
+    """A release of ROS 2."""
 
-    Attributes:
-        name: As in `ROS_DISTRO`.
-        fast_dds: Major version of Fast DDS, which decides the names in its profiles.
-        tried: Whether this project is tested on it; other releases cause a warning.
-    """
-
-    name: str
-    fast_dds: int
-    tried: bool = False
+    name: str  # as in `ROS_DISTRO`
+    fast_dds: int  # major version of Fast DDS, which decides the names in its profiles
+    tried: bool = False  # whether this project is tested on it; other releases cause a warning
 
     @property
     def messages(self) -> str:

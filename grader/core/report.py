@@ -19,36 +19,22 @@ NOT_JUDGED = "not judged: "
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The result of one criterion.
-
-    Attributes:
-        id: Criterion id.
-        title: Criterion title.
-        outcome: See Outcome.
-        score: Points earned.
-        max_score: Maximum points.
-        reason: One sentence, no markup.
-        hint: One thing to do; empty if there is none.
-        location: Place in the student's file.
-        evidence: Plain JSON values.
-        blocked_by: Id of the criterion that has to be met before this one can be judged; empty if there is none.
-        missing_file: The missing file that both need, if that is the reason; empty otherwise.
-        same_cause_as: Id of the criterion that lost its points for the same cause and explains it; empty if none does.
-        problem: The problem that its check found, for diagnosis; not shown in reports.
-    """
+    """The result of one criterion."""
 
     id: str
     title: str
     outcome: Outcome
     score: Fraction
     max_score: Fraction
-    reason: str
-    hint: str = ""
-    location: Location | None = None
-    evidence: Mapping[str, Any] = field(default_factory=dict)
-    blocked_by: str = ""
-    missing_file: str = ""
+    reason: str  # one sentence, no markup
+    hint: str = ""  # one thing to do; empty if there is none
+    location: Location | None = None  # place in the student's file
+    evidence: Mapping[str, Any] = field(default_factory=dict)  # plain JSON values
+    blocked_by: str = ""  # id of the criterion that has to be met before this one can be judged; empty if there is none
+    missing_file: str = ""  # the missing file that both need, if that is the reason; empty otherwise
+    # Id of the criterion that lost its points for the same cause and explains it; empty if none does
     same_cause_as: str = ""
+    # The problem that its check found, for programs; None if the check finds only one, or a fault
     problem: Problem | None = None
 
 
@@ -67,45 +53,27 @@ class ReportedFault:
 
 @dataclass(frozen=True, slots=True)
 class ExerciseReport:
-    """The part of a report on one exercise.
-
-    Attributes:
-        id: Exercise id.
-        number: Number in the chapter, as text.
-        title: Exercise title.
-        required: Whether the chapter requires it.
-        clock: The wall clock if any of its scenarios ran on it.
-        clock_reason: Why it was not the virtual clock; empty if it was.
-        verdicts: In rubric order.
-        faults: In order of scenario and time.
-        notes: Sentences that readers must know.
-        graph: The ROS graph of the exercise, if one was recorded with all its processes.
-        figures: Charts of what the nodes did; left out in plain-text and data formats.
-        excerpts: The source around the places that verdicts and faults name.
-        expected: Criterion id -> what it requires, in one phrase.
-        feedback: Criterion id -> how much of its result a student sees; not shown in reports.
-        situations: Criterion id -> scenario that it is judged on; not shown in reports.
-        variant: The values of this student's variant; None if there are none.
-        starts: How each file was started; empty in reports on evidence of earlier versions.
-    """
+    """The part of a report on one exercise."""
 
     id: str
-    number: str
+    number: str  # number in the chapter, as text
     title: str
-    required: bool
-    clock: ClockKind
-    clock_reason: str
-    verdicts: tuple[Verdict, ...]
-    faults: tuple[ReportedFault, ...] = ()
-    notes: tuple[str, ...] = ()
-    graph: GraphSnapshot | None = None
-    figures: tuple[Figure, ...] = ()
-    excerpts: tuple[Excerpt, ...] = ()
-    expected: Mapping[str, str] = field(default_factory=dict)
+    required: bool  # whether the chapter requires it
+    clock: ClockKind  # the wall clock if any of its scenarios ran on it
+    clock_reason: str  # why it was not the virtual clock; empty if it was
+    verdicts: tuple[Verdict, ...]  # in rubric order
+    faults: tuple[ReportedFault, ...] = ()  # in order of scenario and time
+    notes: tuple[str, ...] = ()  # sentences that readers must know
+    graph: GraphSnapshot | None = None  # the ROS graph of the exercise, if one was recorded with all its processes
+    figures: tuple[Figure, ...] = ()  # charts of what the nodes did; left out in plain-text and data formats
+    excerpts: tuple[Excerpt, ...] = ()  # the source around the places that verdicts and faults name
+    expected: Mapping[str, str] = field(default_factory=dict)  # criterion id -> what it requires, in one phrase
+    # Criterion id -> how much of its result a student sees; not shown in reports
     feedback: Mapping[str, Feedback] = field(default_factory=dict)
+    # Criterion id -> scenario that it is judged on; not shown in reports
     situations: Mapping[str, str] = field(default_factory=dict)
-    variant: Variant | None = None
-    starts: tuple[Start, ...] = ()
+    variant: Variant | None = None  # the values of this student's variant; None if there are none
+    starts: tuple[Start, ...] = ()  # how each file was started; empty in reports on evidence of earlier versions
 
     @property
     def score(self) -> Fraction:
@@ -120,69 +88,42 @@ class ExerciseReport:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """The software that a report was made with.
-
-    Attributes:
-        grader: Version of the grader.
-        ros_distro: ROS release.
-        rclpy: Version of rclpy.
-        rmw: The middleware.
-        python: Version of Python.
-        isolation: Name of the sandbox tier; `none` without a sandbox.
-        containment: What the self-test found the tier to prevent; empty without a sandbox.
-    """
+    """The software that a report was made with."""
 
     grader: str
     ros_distro: str
     rclpy: str
     rmw: str
     python: str
-    isolation: str
-    containment: tuple[Property, ...] = ()
+    isolation: str  # name of the sandbox tier; `none` without a sandbox
+    containment: tuple[Property, ...] = ()  # what the self-test found the tier to prevent; empty without a sandbox
 
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What is needed to reproduce a report, besides the versions of its environment and its seed.
+    """What is needed to reproduce a report, besides the versions of its environment and its seed."""
 
-    Attributes:
-        command: The arguments of the command, before shell quoting; empty if no command made the report.
-        rubrics: Exercise id and digest of its rubric, in the order graded.
-        recording: Digest of the /odom recording that was played; empty if none was.
-    """
-
+    # The arguments of the command, before shell quoting; empty if no command made the report
     command: tuple[str, ...] = ()
-    rubrics: tuple[tuple[str, str], ...] = ()
-    recording: str = ""
+    rubrics: tuple[tuple[str, str], ...] = ()  # exercise id and digest of its rubric, in the order graded
+    recording: str = ""  # digest of the /odom recording that was played; empty if none was
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The result of grading one submission.
-
-    Attributes:
-        name: Submission name.
-        path: Where it came from, as the user typed it.
-        digest: Submission digest.
-        environment: What it was made with.
-        seed: The seed of every drawn value, printed so that a run can be repeated; None if it is not shown.
-        exercises: In the order graded.
-        duration_s: Wall time of the run; the only value that differs between two runs.
-        notes: Sentences about the submission's files.
-        reproduce: How to reproduce this report.
-        pending: Ids of the exercises that were not graded yet when the report was made; their criteria are undecided.
-            Empty for a complete report.
-    """
+    """The result of grading one submission."""
 
     name: str
-    path: str
+    path: str  # where it came from, as the user typed it
     digest: str
-    environment: Environment
-    seed: int | None
-    exercises: tuple[ExerciseReport, ...]
-    duration_s: float
-    notes: tuple[str, ...] = ()
+    environment: Environment  # what it was made with
+    seed: int | None  # the seed of every drawn value, printed so that a run can be repeated; None if it is not shown
+    exercises: tuple[ExerciseReport, ...]  # in the order graded
+    duration_s: float  # wall time of the run; the only value that differs between two runs
+    notes: tuple[str, ...] = ()  # sentences about the submission's files
     reproduce: Reproduction = Reproduction()
+    # Ids of the exercises that were not graded yet when the report was made; their criteria are undecided. Empty for a
+    # complete report.
     pending: tuple[str, ...] = ()
 
     @property
@@ -208,147 +149,82 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """The rate of messages, as `ros2 topic hz` prints it; times in seconds.
+    """The rate of messages, as `ros2 topic hz` prints it; times in seconds."""
 
-    Attributes:
-        rate_hz: (n - 1) / (t_last - t_first).
-        min_s: Shortest interval.
-        max_s: Longest interval.
-        std_dev_s: Standard deviation of the intervals.
-    """
-
-    rate_hz: float
+    rate_hz: float  # (n - 1) / (t_last - t_first)
     min_s: float
     max_s: float
-    std_dev_s: float
+    std_dev_s: float  # standard deviation of the intervals
 
 
 @dataclass(frozen=True, slots=True)
 class TopicSummary:
-    """One topic of the students' nodes.
+    """One topic of the students' nodes."""
 
-    Attributes:
-        name: Absolute name.
-        types: Message types seen on it.
-        publishers: Its publishers, in order of appearance.
-        subscriptions: Its subscriptions, in order of appearance.
-        messages: How many messages the nodes published on it.
-        first_s: When the first one came; None if none came.
-        pace: None for fewer than two messages at different times.
-        ranges: Numeric field, dotted -> least and greatest value.
-    """
-
-    name: str
-    types: tuple[str, ...]
-    publishers: tuple[Endpoint, ...]
-    subscriptions: tuple[Endpoint, ...]
-    messages: int
-    first_s: float | None
-    pace: Pace | None
-    ranges: Mapping[str, tuple[float, float]]
+    name: str  # absolute name
+    types: tuple[str, ...]  # message types seen on it
+    publishers: tuple[Endpoint, ...]  # its publishers, in order of appearance
+    subscriptions: tuple[Endpoint, ...]  # its subscriptions, in order of appearance
+    messages: int  # how many messages the nodes published on it
+    first_s: float | None  # when the first one came; None if none came
+    pace: Pace | None  # None for fewer than two messages at different times
+    ranges: Mapping[str, tuple[float, float]]  # numeric field, dotted -> least and greatest value
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What nodes did in one scenario, without a rubric and without a mark.
+    """What nodes did in one scenario, without a rubric and without a mark."""
 
-    Attributes:
-        processes: Names of the files that ran.
-        clock: Which clock they ran on.
-        clock_reason: Why virtual time is not suitable for them; empty if it is.
-        duration_s: How long they were observed.
-        nodes: Node names, sorted.
-        topics: Sorted by name.
-        offers: Services, clients and parameters, as the processes say.
-        records: Log records, in order.
-        lines: Other output, in order.
-        faults: In order.
-        notes: Sentences a reader must know.
-        graph: The richest snapshot of the graph, if there is any.
-        isolation: The sandbox tier.
-        starts: How each file was started.
-    """
-
-    processes: tuple[str, ...]
-    clock: ClockKind
-    clock_reason: str
-    duration_s: float
-    nodes: tuple[str, ...]
-    topics: tuple[TopicSummary, ...]
-    offers: tuple[Offer, ...]
-    records: tuple[LogRecord, ...]
-    lines: tuple[OutputLine, ...]
+    processes: tuple[str, ...]  # names of the files that ran
+    clock: ClockKind  # which clock they ran on
+    clock_reason: str  # why virtual time is not suitable for them; empty if it is
+    duration_s: float  # how long they were observed
+    nodes: tuple[str, ...]  # node names, sorted
+    topics: tuple[TopicSummary, ...]  # sorted by name
+    offers: tuple[Offer, ...]  # services, clients and parameters, as the processes say
+    records: tuple[LogRecord, ...]  # log records, in order
+    lines: tuple[OutputLine, ...]  # other output, in order
     faults: tuple[Fault, ...]
-    notes: tuple[str, ...]
-    graph: GraphSnapshot | None
+    notes: tuple[str, ...]  # sentences a reader must know
+    graph: GraphSnapshot | None  # the richest snapshot of the graph, if there is any
     isolation: str
-    starts: tuple[Start, ...] = ()
+    starts: tuple[Start, ...] = ()  # how each file was started
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a check.
+    """One parameter of a check."""
 
-    Attributes:
-        name: As in rubrics.
-        value: As a rubric writes it; empty where there is none.
-        meaning: What the manual says of it.
-        required: Whether a rubric has to give it.
-    """
-
-    name: str
-    value: str
-    meaning: str
-    required: bool = False
+    name: str  # as in rubrics
+    value: str  # as a rubric writes it; empty where there is none
+    meaning: str  # what the manual says of it
+    required: bool = False  # whether a rubric has to give it
 
 
 @dataclass(frozen=True, slots=True)
 class CheckExplanation:
-    """What a check asks of a recording, whatever rubric uses it.
+    """What a check asks of a recording, whatever rubric uses it."""
 
-    Attributes:
-        name: As in rubrics.
-        asks: What it asks, in one sentence or two.
-        details: How it measures that; may be empty.
-        parameters: In order, with their defaults.
-        used_by: Criteria that ask it, as `exercise/criterion`.
-    """
-
-    name: str
-    asks: str
-    details: str
-    parameters: tuple[Parameter, ...]
-    used_by: tuple[str, ...]
+    name: str  # as in rubrics
+    asks: str  # what it asks, in one sentence or two
+    details: str  # how it measures that; may be empty
+    parameters: tuple[Parameter, ...]  # in order, with their defaults
+    used_by: tuple[str, ...]  # criteria that ask it, as `exercise/criterion`
 
 
 @dataclass(frozen=True, slots=True)
 class CriterionExplanation:
-    """What a criterion asks of a submission.
-
-    Attributes:
-        id: Criterion id.
-        title: Criterion title.
-        exercise: Number, title and id of its exercise.
-        points: Points to be had.
-        chapter: Which part of the chapter asks for it; empty if none does.
-        needs: Criteria that must be met first.
-        hint: What its rubric tells a student who did not meet it.
-        situation: What runs, for how long, and what is published meanwhile.
-        check: Name of the check.
-        asks: What the check asks.
-        details: How the check measures that.
-        parameters: With the values of the rubric.
-    """
+    """What a criterion asks of a submission."""
 
     id: str
     title: str
-    exercise: str
-    points: Fraction
-    chapter: str
-    needs: tuple[str, ...]
-    hint: str
-    situation: str
+    exercise: str  # number, title and id of its exercise
+    points: Fraction  # points to be had
+    chapter: str  # which part of the chapter asks for it; empty if none does
+    needs: tuple[str, ...]  # criteria that must be met first
+    hint: str  # what its rubric tells a student who did not meet it
+    situation: str  # what runs, for how long, and what is published meanwhile
     check: str
-    asks: str
-    details: str
-    parameters: tuple[Parameter, ...]
+    asks: str  # what the check asks
+    details: str  # how the check measures that
+    parameters: tuple[Parameter, ...]  # with the values of the rubric

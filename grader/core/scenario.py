@@ -94,17 +94,11 @@ def _cases(item: object) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """How long a scenario is observed.
+    """How long a scenario is observed."""
 
-    Attributes:
-        duration_ns: Observed time.
-        after_first_message_on: If set, observation starts with the first message on this topic.
-        wait_at_most_ns: Longest wait for that first message.
-    """
-
-    duration_ns: LongTime
-    after_first_message_on: Topic | None = None
-    wait_at_most_ns: FixedTime = 60 * NS_PER_S
+    duration_ns: LongTime  # observed time
+    after_first_message_on: Topic | None = None  # if set, observation starts with the first message on this topic
+    wait_at_most_ns: FixedTime = 60 * NS_PER_S  # longest wait for that first message
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,23 +133,16 @@ class NumberStream:
     """A stimulus: numbers published on a topic, each held for a while.
 
     They are published with the message type that the student's node subscribes to.
-
-    Attributes:
-        topic: Topic name, absolute.
-        type: Message type if no subscription has another one, e.g. `std_msgs/msg/Float32`.
-        values: Numbers in order.
-        period_ns: Time between two messages.
-        hold_ns: How long each number is repeated. If this is drawn, each number gets its own time, and the last one is
-            repeated until the end of an observation that starts with the scenario.
-        start_ns: Time of the first message since scenario start.
     """
 
-    topic: Topic
-    type: MessageType
-    values: Annotated[tuple[NumberItem, ...], Kind("numbers")]
-    period_ns: FixedTime
+    topic: Topic  # topic name, absolute
+    type: MessageType  # message type if no subscription has another one, e.g. `std_msgs/msg/Float32`
+    values: Annotated[tuple[NumberItem, ...], Kind("numbers")]  # numbers in order
+    period_ns: FixedTime  # time between two messages
+    # How long each number is repeated. If this is drawn, each number gets its own time, and the last one is repeated
+    # until the end of an observation that starts with the scenario.
     hold_ns: LongTime
-    start_ns: Time
+    start_ns: Time  # time of the first message since scenario start
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,16 +150,11 @@ class OdometryStream:
     """A stimulus: the recorded odometry.
 
     It is played with its original timing by a publisher that disappears afterwards.
-
-    Attributes:
-        topic: Topic name, absolute.
-        start_ns: When the publisher appears and the first message is sent.
-        duration_ns: How much of the recording is played; which part is drawn from the seed.
     """
 
-    topic: Topic
-    start_ns: Time
-    duration_ns: LongTime
+    topic: Topic  # topic name, absolute
+    start_ns: Time  # when the publisher appears and the first message is sent
+    duration_ns: LongTime  # how much of the recording is played; which part is drawn from the seed
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,17 +166,11 @@ class Choose:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A text with a drawn number in place of `{}`: `Battery: {}% remaining`.
+    """A text with a drawn number in place of `{}`: `Battery: {}% remaining`."""
 
-    Attributes:
-        text: Holds `{}` once.
-        number: What is drawn.
-        decimals: How many decimals are written.
-    """
-
-    text: str
-    number: Between
-    decimals: int = 1
+    text: str  # holds `{}` once
+    number: Between  # what is drawn
+    decimals: int = 1  # how many decimals are written
 
 
 #: The value of a field in a planned message: mappings are nested messages, tuples are sequences. Mappings are not
@@ -207,78 +183,51 @@ FieldsItem = Mapping[str, FieldSpec] | AnyOrder | InOrder | SomeOf
 
 @dataclass(frozen=True, slots=True)
 class MessageStream:
-    """A stimulus: messages of one type, one per period; omitted fields keep their defaults.
+    """A stimulus: messages of one type, one per period; omitted fields keep their defaults."""
 
-    Attributes:
-        topic: Topic name, absolute.
-        type: e.g. `std_msgs/msg/String`; unlike that of a number stream, it does not depend on the student's node.
-        values: Fields of each message.
-        period_ns: Time between two messages.
-        start_ns: Time of the first message.
-        repeats: How often each message is sent, once per period; drawn separately for each message.
-        stop_ns: When the publisher disappears; 0 for never.
-        best_effort: Whether it offers only best-effort reliability.
-        latched: Whether it offers transient-local durability.
-    """
-
-    topic: Topic
+    topic: Topic  # topic name, absolute
+    # e.g. `std_msgs/msg/String`; unlike that of a number stream, it does not depend on the student's node
     type: MessageType
-    values: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)
-    period_ns: FixedTime
-    start_ns: Time = 0
-    repeats: Count = 1
-    stop_ns: TimeOrNever = 0
-    best_effort: bool = False
-    latched: bool = False
+    values: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)  # fields of each message
+    period_ns: FixedTime  # time between two messages
+    start_ns: Time = 0  # time of the first message
+    repeats: Count = 1  # how often each message is sent, once per period; drawn separately for each message
+    stop_ns: TimeOrNever = 0  # when the publisher disappears; 0 for never
+    best_effort: bool = False  # whether it offers only best-effort reliability
+    latched: bool = False  # whether it offers transient-local durability
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceServer:
-    """A stimulus: a server that answers the student's client; without responses it never answers.
+    """A stimulus: a server that answers the student's client; without responses it never answers."""
 
-    Attributes:
-        service: Absolute name.
-        type: e.g. `std_srvs/srv/Trigger`.
-        responses: Fields of each response in order.
-        start_ns: When it appears.
-        stop_ns: When it disappears; 0 for never.
-        delay_ns: Time from a request to its response.
-        cycle: Whether the responses begin again after the last one; otherwise the last one is repeated.
-        answers: After this many responses it accepts one more request and disappears without answering; 0 for never.
-    """
-
-    service: Topic
-    type: ServiceType
+    service: Topic  # absolute name
+    type: ServiceType  # e.g. `std_srvs/srv/Trigger`
+    # Fields of each response in order
     responses: Annotated[tuple[FieldsItem, ...], Kind("messages, or none")] = field(hash=False)
-    start_ns: Time = 0
-    stop_ns: TimeOrNever = 0
-    delay_ns: Time = 0
-    cycle: bool = False
+    start_ns: Time = 0  # when it appears
+    stop_ns: TimeOrNever = 0  # when it disappears; 0 for never
+    delay_ns: Time = 0  # time from a request to its response
+    cycle: bool = False  # whether the responses begin again after the last one; otherwise the last one is repeated
+    # After this many responses it accepts one more request and disappears without answering; 0 for never
     answers: CountOrNever = 0
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceCalls:
-    """A stimulus: clients that call the student's server; a call waits until the server exists.
+    """A stimulus: clients that call the student's server; a call waits until the server exists."""
 
-    Attributes:
-        service: Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions
-            are calls of the services behind them.
-        type: e.g. `std_srvs/srv/Trigger`.
-        requests: Fields of each request in order; with fewer requests than calls, they repeat from the first one.
-        calls: Number of requests of each client.
-        clients: Number of clients; all of them send their k-th call at the same instant.
-        period_ns: Time between two calls of a client, which does not wait for responses.
-        start_ns: When the clients appear and send their first call.
-    """
-
+    # Absolute name; `~/NAME` is a service of the student's only node. Parameters and lifecycle transitions are calls of
+    # the services behind them.
     service: Topic
-    type: ServiceType
+    type: ServiceType  # e.g. `std_srvs/srv/Trigger`
+    # Fields of each request in order; with fewer requests than calls, they repeat from the first one
     requests: Annotated[tuple[FieldsItem, ...], Kind("messages")] = field(hash=False)
-    calls: Count = 1
+    calls: Count = 1  # number of requests of each client
+    # Number of clients; all of them send their k-th call at the same instant
     clients: Annotated[int, Kind("clients")] = 1
-    period_ns: FixedTime = NS_PER_S
-    start_ns: Time = 0
+    period_ns: FixedTime = NS_PER_S  # time between two calls of a client, which does not wait for responses
+    start_ns: Time = 0  # when the clients appear and send their first call
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,20 +236,13 @@ class ActionGoal:
 
     In the trace it appears as calls of the action's services, `/NAME/_action/send_goal`, `get_result` and
     `cancel_goal`; feedback and status are messages on `/NAME/_action/feedback` and `/NAME/_action/status`.
-
-    Attributes:
-        action: Absolute name.
-        type: e.g. `test_msgs/action/Fibonacci`.
-        goal: Fields of the goal.
-        start_ns: When the client appears and sends the goal; it waits for the server, as a real client does.
-        cancel_after_ns: Time from the acceptance of the goal to the request to cancel it; 0 for never.
     """
 
-    action: Topic
-    type: ActionType
-    goal: Fields = field(hash=False)
-    start_ns: Time = 0
-    cancel_after_ns: TimeOrNever = 0
+    action: Topic  # absolute name
+    type: ActionType  # e.g. `test_msgs/action/Fibonacci`
+    goal: Fields = field(hash=False)  # fields of the goal
+    start_ns: Time = 0  # when the client appears and sends the goal; it waits for the server, as a real client does
+    cancel_after_ns: TimeOrNever = 0  # time from the acceptance of the goal to the request to cancel it; 0 for never
 
 
 Stimulus = NumberStream | OdometryStream | MessageStream | ServiceServer | ServiceCalls | ActionGoal
@@ -327,39 +269,24 @@ def is_open(stimulus: Stimulus) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One situation that is recorded once.
+    """One situation that is recorded once."""
 
-    Attributes:
-        id: Unique within the exercise.
-        processes: File names of the student processes that run in it, in start order.
-        span: When and how long it is observed.
-        stimuli: What the grader publishes.
-        limits: Limits of the processes and of the recording.
-        starts_ns: `(process, t_ns)` of processes that start late; the others start at 0.
-        may_exit: Processes that may end by themselves; exit code 0 is then no fault.
-        shutdown_ns: How long the processes may take to end after the stop signal; 0 if this is not checked.
-    """
-
-    id: str
-    processes: tuple[str, ...]
-    span: Span
-    stimuli: tuple[Stimulus, ...] = ()
+    id: str  # unique within the exercise
+    processes: tuple[str, ...]  # file names of the student processes that run in it, in start order
+    span: Span  # when and how long it is observed
+    stimuli: tuple[Stimulus, ...] = ()  # what the grader publishes
+    # Limits of the processes and of the recording
     limits: Limits = Limits()  # noqa: RUF009 - a value that never changes
+    # `(process, t_ns)` of processes that start late; the others start at 0
     starts_ns: tuple[tuple[str, Time], ...] = ()
-    may_exit: tuple[str, ...] = ()
-    shutdown_ns: int = 0
+    may_exit: tuple[str, ...] = ()  # processes that may end by themselves; exit code 0 is then no fault
+    shutdown_ns: int = 0  # how long the processes may take to end after the stop signal; 0 if this is not checked
 
 
 @dataclass(frozen=True, slots=True)
 class TimedMessage:
-    """A recorded message to be played.
+    """A recorded message to be played."""
 
-    Attributes:
-        t_ns: Time since the start of the stream.
-        cdr: The message as it goes over the wire (CDR with its 4-byte header).
-        value: The decoded fields, for judging.
-    """
-
-    t_ns: int
-    cdr: bytes
-    value: Mapping[str, Any]
+    t_ns: int  # time since the start of the stream
+    cdr: bytes  # the message as it goes over the wire (CDR with its 4-byte header)
+    value: Mapping[str, Any]  # the decoded fields, for judging

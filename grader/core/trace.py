@@ -41,20 +41,13 @@ class StartWay(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How one process was started.
+    """How one process was started."""
 
-    Attributes:
-        process: File name of the student process.
-        file: The file that ran, relative to the submission.
-        way: The way of starting.
-        target: `MODULE` or `MODULE:FUNCTION`; empty for a script.
-        hidden: Files and folders of the submission that are imported instead of a module of Python or ROS.
-    """
-
-    process: str
-    file: str
-    way: StartWay
-    target: str = ""
+    process: str  # file name of the student process
+    file: str  # the file that ran, relative to the submission
+    way: StartWay  # the way of starting
+    target: str = ""  # `MODULE` or `MODULE:FUNCTION`; empty for a script
+    # Files and folders of the submission that are imported instead of a module of Python or ROS
     hidden: tuple[str, ...] = ()
 
     @property
@@ -70,21 +63,13 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One message that a student's node published.
+    """One message that a student's node published."""
 
-    Attributes:
-        t_ns: When it was published.
-        topic: Absolute name.
-        type: e.g. `geometry_msgs/msg/Twist`.
-        value: Fields as plain JSON values, nested by name; NaN and infinities are floats.
-        cdr: The bytes as they came over the wire.
-    """
-
-    t_ns: int
-    topic: str
-    type: str
-    value: Mapping[str, Any]
-    cdr: bytes = b""
+    t_ns: int  # when it was published
+    topic: str  # absolute name
+    type: str  # e.g. `geometry_msgs/msg/Twist`
+    value: Mapping[str, Any]  # fields as plain JSON values, nested by name; NaN and infinities are floats
+    cdr: bytes = b""  # the bytes as they came over the wire
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,27 +85,16 @@ class Delivery:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One request of a service call between the grader and a student's node.
+    """One request of a service call between the grader and a student's node."""
 
-    Attributes:
-        t_ns: When the grader sent or received it.
-        service: Absolute name.
-        type: e.g. `std_srvs/srv/Trigger`.
-        number: Pairs it with its response; counts from 1 within a service and a sender.
-        sender: `grader` for a call to a student's server, `student` for a call of a student's client.
-        client: Number of the grader's client, from 1; 0 for a student's client.
-        value: Fields as plain JSON values, as for Message.
-        cdr: The bytes, if they are known.
-    """
-
-    t_ns: int
-    service: str
-    type: str
-    number: int
-    sender: str
-    client: int
-    value: Mapping[str, Any]
-    cdr: bytes = b""
+    t_ns: int  # when the grader sent or received it
+    service: str  # absolute name
+    type: str  # e.g. `std_srvs/srv/Trigger`
+    number: int  # pairs it with its response; counts from 1 within a service and a sender
+    sender: str  # `grader` for a call to a student's server, `student` for a call of a student's client
+    client: int  # number of the grader's client, from 1; 0 for a student's client
+    value: Mapping[str, Any]  # fields as plain JSON values, as for Message
+    cdr: bytes = b""  # the bytes, if they are known
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,25 +116,15 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class LogRecord:
-    """One record written through an rclpy logger.
+    """One record written through an rclpy logger."""
 
-    Attributes:
-        t_ns: When it was written.
-        process: File name of the student process, e.g. `odom_subscriber.py`.
-        severity: DEBUG, INFO, WARN, ERROR or FATAL.
-        logger: Logger name, usually the node's.
-        text: The message; may hold line breaks.
-        file: Where it was logged, relative to the submission; empty if unknown.
-        line: Line in that file, from 1; 0 if unknown.
-    """
-
-    t_ns: int
-    process: str
-    severity: str
-    logger: str
-    text: str
-    file: str = ""
-    line: int = 0
+    t_ns: int  # when it was written
+    process: str  # file name of the student process, e.g. `odom_subscriber.py`
+    severity: str  # DEBUG, INFO, WARN, ERROR or FATAL
+    logger: str  # logger name, usually the node's
+    text: str  # the message; may hold line breaks
+    file: str = ""  # where it was logged, relative to the submission; empty if unknown
+    line: int = 0  # line in that file, from 1; 0 if unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,48 +139,28 @@ class OutputLine:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """One publisher or subscription in the live graph.
+    """One publisher or subscription in the live graph."""
 
-    Attributes:
-        kind: `publisher` or `subscription`.
-        topic: Absolute name.
-        type: Message type.
-        node: Fully qualified node name, e.g. `/odom_subscriber`.
-        participant: Number of the DDS participant in order of appearance, one for each process; -1 is the grader.
-        reliability: `reliable` or `best_effort`.
-        durability: `volatile` or `transient_local`.
-        depth: History depth, 0 if unknown.
-        deadline_ns: Offered or requested deadline, 0 for none.
-        liveliness: `automatic` or `manual_by_topic`.
-    """
-
-    kind: str
-    topic: str
-    type: str
-    node: str
-    participant: int
-    reliability: str
-    durability: str
-    depth: int = 0
-    deadline_ns: int = 0
-    liveliness: str = "automatic"
+    kind: str  # `publisher` or `subscription`
+    topic: str  # absolute name
+    type: str  # message type
+    node: str  # fully qualified node name, e.g. `/odom_subscriber`
+    participant: int  # number of the DDS participant in order of appearance, one for each process; -1 is the grader
+    reliability: str  # `reliable` or `best_effort`
+    durability: str  # `volatile` or `transient_local`
+    depth: int = 0  # history depth, 0 if unknown
+    deadline_ns: int = 0  # offered or requested deadline, 0 for none
+    liveliness: str = "automatic"  # `automatic` or `manual_by_topic`
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceEnd:
-    """One server or client of a service in the live graph, without those that every node has.
+    """One server or client of a service in the live graph, without those that every node has."""
 
-    Attributes:
-        kind: `service` or `client`.
-        service: Absolute name.
-        type: e.g. `std_srvs/srv/Trigger`.
-        node: Fully qualified node name.
-    """
-
-    kind: str
-    service: str
-    type: str
-    node: str
+    kind: str  # `service` or `client`
+    service: str  # absolute name
+    type: str  # e.g. `std_srvs/srv/Trigger`
+    node: str  # fully qualified node name
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,32 +175,27 @@ class GraphSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A student's process raised, hung or exited; after the stop signal only if the scenario checks the shutdown.
+    """A student's process raised, hung or exited; after the stop signal only if the scenario checks the shutdown."""
 
-    Attributes:
-        t_ns: Time of the fault.
-        process: File name of the student process.
-        kind: What happened.
-        text: One line, e.g. `AttributeError: 'NoneType' object has no attribute 'pose'` or `exited with code 0`.
-        file: File of the innermost frame that is the student's own, relative to the submission; empty if unknown.
-        line: Its line, from 1; 0 if unknown.
-        frames: The student's own frames, outermost first, as `file:line in function`.
-        exit_code: The exit code of a process that ended by itself; None for any other fault, or if it is not known.
-        signal: Name of the signal that ended the process, e.g. `SIGSEGV`; empty if there was none, or a limit explains
-            it.
-        python: Version of the Python that could not compile the file, e.g. `(3, 12)`; None for any other fault.
-    """
-
-    t_ns: int
-    process: str
+    t_ns: int  # time of the fault
+    process: str  # file name of the student process
     kind: FaultKind
-    text: str
+    text: str  # one line, e.g. `AttributeError: 'NoneType' object has no attribute 'pose'` or `exited with code 0`.
+    # File of the innermost frame that is the student's own, relative to the submission; empty if unknown
     file: str = ""
-    line: int = 0
-    frames: tuple[str, ...] = ()
+    line: int = 0  # its line, from 1; 0 if unknown
+    frames: tuple[str, ...] = ()  # the student's own frames, outermost first, as `file:line in function`
+    # The exit code of a process that ended by itself; None for any other fault, or if it is not known
     exit_code: int | None = None
+    # Name of the signal that ended the process, e.g. `SIGSEGV`; empty if there was none, or a limit explains it.
     signal: str = ""
+    # Version of the Python that could not compile the file, e.g. `(3, 12)`; None for any other fault.
     python: tuple[int, int] | None = None
+
+    @property
+    def exception(self) -> str:
+        """Name of the type of an exception or syntax error, which begins its text; empty for other faults."""
+        return self.text.partition(":")[0] if self.kind in (FaultKind.EXCEPTION, FaultKind.SYNTAX_ERROR) else ""
 
     def said(self, pattern: str) -> re.Match[str] | None:
         """Search Python's text of an exception or syntax error for a pattern; None for other faults."""
@@ -266,21 +205,13 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What a process reports to offer or use besides topics; shown in reports, but never judged.
+    """What a process reports to offer or use besides topics; shown in reports, but never judged."""
 
-    Attributes:
-        t_ns: When it reported this.
-        process: File name of the student process.
-        kind: `service`, `client` or `parameter`.
-        name: Absolute name; for a parameter `/node:name`.
-        detail: Service type, or the parameter's value.
-    """
-
-    t_ns: int
-    process: str
-    kind: str
-    name: str
-    detail: str
+    t_ns: int  # when it reported this
+    process: str  # file name of the student process
+    kind: str  # `service`, `client` or `parameter`
+    name: str  # absolute name; for a parameter `/node:name`
+    detail: str  # service type, or the parameter's value
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,37 +237,26 @@ Observation = Message | Delivery | Request | Response | LogRecord | OutputLine |
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """The recording of one scenario.
-
-    Attributes:
-        scenario: Scenario id.
-        clock: Which clock the nodes ran on.
-        clock_reason: Why virtual time is not suitable for these nodes; empty if it is.
-        stop_ns: When observation ended; the window is [0, stop_ns). Later observations followed the stop signal.
-        observations: In order.
-        notes: Sentences that readers must know (entry without a guard, a limit reached, lost messages).
-        harness_problem: A failure of the grader or the machine that prevents judging; empty if there was none.
-        starts: How each process was started; empty in traces of earlier versions.
-        reached: Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence.
-    """
+    """The recording of one scenario."""
 
     scenario: str
-    clock: ClockKind
-    stop_ns: int
+    clock: ClockKind  # which clock the nodes ran on
+    stop_ns: int  # when observation ended; the window is [0, stop_ns). Later observations followed the stop signal.
     observations: tuple[Observation, ...]
-    clock_reason: str = ""
+    clock_reason: str = ""  # why virtual time is not suitable for these nodes; empty if it is
+    # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
-    harness_problem: str = ""
-    starts: tuple[Start, ...] = ()
+    harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
+    # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:
         """Cache a value that is computed from this trace, for the lifetime of the trace.
 
-        Args:
-            key: Identifies the computation and its parameters.
-            work: Computes the value; a pure function whose result does not refer to the trace.
+        The key identifies the computation and its parameters. The work is a pure function whose result does not
+        refer to the trace.
         """
         if key not in self._known:
             self._known[key] = work()

@@ -7,13 +7,14 @@ numbers are not compared, and events near an edge of the window are left out.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds, within
-from grader.core.trace import ClockKind, Delivery, Fault, GraphSnapshot, LogRecord, Message, Request, Response, Trace
+from grader.core.trace import ClockKind, Delivery, Fault, GraphSnapshot, Message, Request, Response, Trace
 from grader.judging.findings import faults_before_stop
 
 #: Rates and counts agree within this share, plus the absolute number below.
@@ -54,10 +55,9 @@ class Aspect(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference between what a program did on two clocks.
+    """A difference between what a program did on two clocks: a rate in Hz, a number, a count or a word on each.
 
     Attributes:
-        aspect: What differs.
         name: Topic, field, service or file.
         virtual: Result in virtual time: a rate in Hz, a number, a count, a word.
         wall: Result on the wall clock.
@@ -100,12 +100,7 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
 
 
 def sentence(difference: Difference, clock: ClockKind) -> str:
-    """Return a sentence about a difference, for the report's reason of a clock.
-
-    Args:
-        difference: The difference.
-        clock: Clock of the first recording; on the wall clock, the difference comes from what runs beside the program.
-    """
+    """Return a sentence about a difference for the report's reason of a clock, given the first recording's clock."""
     name = difference.name[:200]
     first, second = (_shown(value, difference.aspect) for value in (difference.virtual, difference.wall))
     where = ("in virtual time", "on the wall clock")
@@ -243,7 +238,8 @@ def _answers(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     inputs = sorted({d.topic for d in virtual.trace.of(Delivery)})
     outputs = sorted({m.topic for m in virtual.trace.messages()})
     for output in outputs if inputs else ():
-        for given in inputs if _are_decisions(virtual, output) else ():
+        numbers_sent = {number for m in virtual.trace.messages(output) for _, number in _numbers(m.value)}
+        for given in inputs if len(numbers_sent) <= DECISIONS else ():
             pairs = _paired(_decided(virtual, given, output), _decided(wall, given, output))
             wrong = [(one, other) for one, other in pairs if not _alike(one, other)]
             if wrong:
@@ -260,10 +256,6 @@ def _paired(before: Sequence[_Decision], after: Sequence[_Decision]) -> Iterator
         for other in after:
             if abs(one.stop_ns - other.stop_ns) < SAME_NS and one.given == other.given:
                 yield one.answer, other.answer
-
-
-def _are_decisions(window: _Window, topic: str) -> bool:
-    return len({n for m in window.trace.messages(topic) for _, n in _numbers(m.value)}) <= DECISIONS
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,28 +302,20 @@ def _exchanges(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     for kind in (Request, Response):
         counts = [_sent(window, kind) for window in (virtual, wall)]
         for service in sorted(counts[0].keys() | counts[1].keys()):
-            one, other = (count.get(service, 0) for count in counts)
+            one, other = (count[service] for count in counts)
             if differ_in_count(one, other):
                 yield Difference(Aspect.CALLS, service, one, other)
 
 
-def _sent(window: _Window, kind: type[Request] | type[Response]) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    for one in window.trace.of(kind):
-        if one.sender == "student" and window.holds(one.t_ns):
-            counts[one.service] = counts.get(one.service, 0) + 1
-    return counts
+def _sent(window: _Window, kind: type[Request] | type[Response]) -> Counter[str]:
+    return Counter(o.service for o in window.trace.of(kind) if o.sender == "student" and window.holds(o.t_ns))
 
 
 def _logs(virtual: _Window, wall: _Window) -> Iterator[Difference]:
     for process in sorted({r.process for r in (*virtual.trace.records(), *wall.trace.records())}):
-        one, other = (_logged(window, process) for window in (virtual, wall))
-        if differ_in_count(len(one), len(other)):
-            yield Difference(Aspect.LOGS, process, len(one), len(other))
-
-
-def _logged(window: _Window, process: str) -> list[LogRecord]:
-    return [r for r in window.trace.records(process) if window.holds(r.t_ns)]
+        one, other = (sum(w.holds(r.t_ns) for r in w.trace.records(process)) for w in (virtual, wall))
+        if differ_in_count(one, other):
+            yield Difference(Aspect.LOGS, process, one, other)
 
 
 def _endpoints(virtual: _Window, wall: _Window) -> Iterator[Difference]:

@@ -45,15 +45,7 @@ def illustrated(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> ExerciseReport:
-    """Return the report with figures, lines of the source, and the expected results.
-
-    Args:
-        report: The judged report.
-        exercise: The exercise.
-        traces: Scenario id -> trace.
-        submission: Tells which files were found.
-        sources: Wanted file name -> its text.
-    """
+    """Return the report with figures, lines of the source, and the expected results."""
     return replace(
         report,
         figures=figures_of(exercise, traces),
@@ -152,7 +144,8 @@ def graph_figure(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphFigure
     distinct = [stage for stage in told.values() if stage.graph.nodes]
     if not distinct:
         return None
-    return GraphFigure("graph", "The live ROS graph", _describe_graphs(distinct), (), tuple(distinct))
+    about = " ".join(f"{stage.title.capitalize()}: {_said(stage.graph)}." for stage in distinct)
+    return GraphFigure("graph", "The live ROS graph", about, (), tuple(distinct))
 
 
 def _stages(scenario: Scenario, exercise: Exercise, trace: Trace) -> list[Stage]:
@@ -173,10 +166,6 @@ def _own(graph: GraphSnapshot) -> GraphSnapshot:
 
 def _size(graph: GraphSnapshot) -> int:
     return len(graph.endpoints) + len(graph.services)
-
-
-def _describe_graphs(stages: list[Stage]) -> str:
-    return " ".join(f"{s.title.capitalize()}: {_said(s.graph)}." for s in stages)
 
 
 def _said(graph: GraphSnapshot) -> str:
@@ -208,20 +197,26 @@ def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
         _prints(trace, process, lanes, rows)
     _exchanges(trace, lanes, rows)
     _faults(trace, lanes, rows)
-    moments = [Moment(seconds(m.t_ns), f"{m.detail} begins") for m in trace.marks("stream_starts")]
-    moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("stream_stops")]
-    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server appears") for m in trace.marks("server_starts")]
-    moments += [Moment(seconds(m.t_ns), f"{m.detail}: server disappears") for m in trace.marks("server_stops")]
-    moments += [Moment(seconds(m.t_ns), f"{m.detail} starts") for m in trace.marks("process_starts")]
-    moments += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("exited")]
-    moments += [Moment(seconds(trace.stop_ns), "end")]
-    return time_chart(
-        "timeline",
-        "Logs and faults over time",
-        _about(trace, processes),
-        (Panel("", "", tuple(rows), lanes=tuple(lanes)),),
-        tuple(moments),
+    moments = [*_marked(trace, *_SAID_OF_MARKS), Moment(seconds(trace.stop_ns), "end")]
+    panels = (Panel("", "", tuple(rows), lanes=tuple(lanes)),)
+    return Chart(
+        "timeline", "Logs and faults over time", _about(trace, processes), (), "time", "s", panels, tuple(moments)
     )
+
+
+#: Name of a mark -> what follows its detail in charts.
+_SAID_OF_MARKS = {
+    "stream_starts": " begins",
+    "stream_stops": " ends",
+    "server_starts": ": server appears",
+    "server_stops": ": server disappears",
+    "process_starts": " starts",
+    "exited": " ends",
+}
+
+
+def _marked(trace: Trace, *names: str) -> list[Moment]:
+    return [Moment(seconds(m.t_ns), f"{m.detail}{_SAID_OF_MARKS[n]}") for n in names for m in trace.marks(n)]
 
 
 def _logs(trace: Trace, process: str, lanes: list[str], rows: list[Series]) -> None:
@@ -311,26 +306,21 @@ def written_in_lane(name: str, items: Sequence[LogRecord | OutputLine], lane: in
     return series(name, points, look=Look.DOTS, tone=tone, texts=[clean(o.text) for o in items])
 
 
-def happenings(trace: Trace) -> tuple[Moment, ...]:
-    """Return the faults of a trace and the ends of its streams as moments."""
-    found = [Moment(seconds(m.t_ns), f"{m.detail} begins") for m in trace.marks("stream_starts")]
-    found += [Moment(seconds(m.t_ns), f"{m.detail} ends") for m in trace.marks("stream_stops")]
-    faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
-    found += [Moment(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
-    return tuple(found)
-
-
-_MOST_FAULTS = 5
-
-
 def plain_topic(topic: str) -> str:
     """Return a topic's name as a title: `/fan_speed` becomes `fan speed`."""
     return quote(topic.strip("/").replace("/", " ").replace("_", " "), 40) or topic
 
 
-def time_chart(id_: str, title: str, about: str, panels: tuple[Panel, ...], moments: tuple[Moment, ...]) -> Chart:
-    """Return a chart over time."""
-    return Chart(id_, title, about, (), "time", "s", panels, moments)
+#: Maximum number of faults that a chart shows.
+_MOST_FAULTS = 5
+
+
+def time_chart(trace: Trace, id_: str, title: str, about: str, *panels: Panel) -> Chart:
+    """Return a chart over time, with the faults of a trace and the ends of its streams."""
+    moments = _marked(trace, "stream_starts", "stream_stops")
+    faults = [f for f in trace.faults() if f.t_ns <= trace.stop_ns]
+    moments += [Moment(seconds(f.t_ns), f.kind.value.replace("_", " "), Tone.BAD) for f in faults[:_MOST_FAULTS]]
+    return Chart(id_, title, about, (), "time", "s", panels, tuple(moments))
 
 
 def input_panel(topic: str, values: Sequence[Reading], threshold: float, look: Look) -> Panel:
@@ -340,11 +330,12 @@ def input_panel(topic: str, values: Sequence[Reading], threshold: float, look: L
     return Panel(name, unit_of(topic).strip(), (series(name, points_of(values), look=look),), levels=(level,))
 
 
-def answer_panel(topic: str, answers: Sequence[Reading], expected: Series) -> Panel:
+def answer_panel(topic: str, answers: Sequence[Reading], expected: Sequence[Reading]) -> Panel:
     """Return a panel with a controller's answers and the expected ones."""
     name = plain_topic(topic)
+    wanted = series("expected", points_of(expected), look=Look.STEP, tone=Tone.FAINT)
     dots = series(name, points_of(answers), look=Look.STEP, tone=Tone.SECOND)
-    return Panel(name, unit_of(topic).strip(), (expected, dots))
+    return Panel(name, unit_of(topic).strip(), (wanted, dots))
 
 
 def which_answers(answers: Sequence[Reading]) -> str:

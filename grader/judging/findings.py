@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from grader.core.exercise import Finding, Location, Problem
+from grader.core.exercise import Finding, Location, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace
 from grader.judging.values import HIDDEN_TOPICS, student_endpoints
@@ -34,9 +34,20 @@ def met(reason: str, evidence: Mapping[str, object] | None = None) -> Finding:
     return Finding(Fraction(1), reason, evidence or {})
 
 
-def partly(reason: str, evidence: Mapping[str, object] | None = None, *, hint: str = "") -> Finding:
+def partly(
+    reason: str,
+    evidence: Mapping[str, object] | None = None,
+    *,
+    hint: str = "",
+    problem: Problem | ProblemKind | None = None,
+) -> Finding:
     """Return a finding with half credit."""
-    return Finding(HALF, reason, evidence or {}, hint=hint)
+    return Finding(HALF, reason, evidence or {}, hint=hint, problem=_as_problem(problem))
+
+
+def only_printed(reason: str, evidence: Mapping[str, object] | None, hint: str) -> Finding:
+    """Return half credit for what is right, but printed instead of logged."""
+    return partly(reason, evidence, hint=hint, problem=ProblemKind.PRINTED)
 
 
 def not_met(  # noqa: PLR0913  each is a field of the finding
@@ -46,7 +57,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     hint: str = "",
     fault: Fault | None = None,
     blocked_by: str | None = None,
-    problem: Problem | None = None,
+    problem: Problem | ProblemKind | None = None,
 ) -> Finding:
     """Return a finding without credit.
 
@@ -56,18 +67,23 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         hint: One thing to do.
         fault: The fault that explains it; it becomes the location and part of the evidence.
         blocked_by: Criterion id, or name of a check in the same scenario, that must be met first.
-        problem: The kind of problem, if diagnosis can add details.
+        problem: The problem, where a check tells several apart; a fault needs none.
     """
     known = dict(evidence or {})
     if fault is not None:
         known[FAULT_KEY] = fault_evidence(fault)
     location = fault_location(fault) if fault is not None else None
-    return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=problem)
+    found = _as_problem(problem)
+    return Finding(Fraction(0), reason, known, location=location, hint=hint, blocked_by=blocked_by, problem=found)
+
+
+def _as_problem(problem: Problem | ProblemKind | None) -> Problem | None:
+    return Problem(problem) if isinstance(problem, ProblemKind) else problem
 
 
 def waiting_for(needed: str, finding: Finding) -> Finding:
     """Return a finding that waits for a criterion or check, without its location."""
-    return not_met(finding.reason, finding.evidence, hint=finding.hint, blocked_by=needed)
+    return not_met(finding.reason, finding.evidence, hint=finding.hint, blocked_by=needed, problem=finding.problem)
 
 
 def fault_location(fault: Fault) -> Location | None:
@@ -80,6 +96,7 @@ def fault_evidence(fault: Fault) -> dict[str, object]:
     return {
         "process": fault.process,
         "kind": fault.kind.value,
+        "exception": fault.exception,
         "text": fault.text,
         "file": fault.file,
         "line": fault.line,
@@ -215,7 +232,7 @@ def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -
         return found
     seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
     reason = f"{service}: not in the ROS graph in {span(trace.stop_ns)}{f'; seen: {listed(seen)}' if seen else ''}"
-    return not_met(reason, {"service": service, "seen": seen[:20]})
+    return not_met(reason, {"service": service, "seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
 def _explain(
@@ -228,7 +245,9 @@ def _explain(
     if type_ is not None and typed is not None:
         reason = f"{name}: {quote(typed.node)} {words.typed} {quote(typed.type)}, expected {type_}"
         evidence = {key: name, "type": typed.type, "node": typed.node}
-        return not_met(reason, evidence, hint=words.type_hint.format(name=name, type=type_))
+        return not_met(
+            reason, evidence, hint=words.type_hint.format(name=name, type=type_), problem=ProblemKind.OTHER_TYPE
+        )
     others = {n: e for e, n in reversed(named) if n != name}
     other = _most_alike(name, [n for e, n in named if n != name and e.type == type_], list(others))
     if other is None:
@@ -236,7 +255,12 @@ def _explain(
     end = others[other]
     reason = f"{name}: {words.none}; {quote(end.node)} {words.instead} {quote(other)} [{quote(end.type)}]"
     evidence = {key: other, "type": end.type, "node": end.node}
-    return not_met(reason, evidence, hint=f"{words.name_hint.format(name=name)} instead of {quote(other)}")
+    return not_met(
+        reason,
+        evidence,
+        hint=f"{words.name_hint.format(name=name)} instead of {quote(other)}",
+        problem=ProblemKind.OTHER_NAME,
+    )
 
 
 def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> str | None:
@@ -262,7 +286,12 @@ def _other_type(messages: list[Message], topic: str, type_: str | None) -> Findi
         return None
     found, count = types.most_common(1)[0]
     reason = f"{topic}: {counted(count, 'message')} of type {quote(found)}, expected {type_}"
-    return not_met(reason, {"topic": topic, "type": found, "messages": count}, hint=f"publish {type_} on {topic}")
+    return not_met(
+        reason,
+        {"topic": topic, "type": found, "messages": count},
+        hint=f"publish {type_} on {topic}",
+        problem=ProblemKind.OTHER_TYPE,
+    )
 
 
 def _other_topic(messages: list[Message], topic: str, type_: str | None) -> Finding | None:
@@ -275,7 +304,7 @@ def _other_topic(messages: list[Message], topic: str, type_: str | None) -> Find
     reason = f"{topic}: no message; {quote(found)} has {counted(count, 'message')} of type {quote(kind)}"
     reason += "" if type_ in (None, kind) else f", expected {type_}"
     hint = f"publish on {topic} instead of {quote(found)}"
-    return not_met(reason, {"topic": found, "type": kind, "messages": count}, hint=hint)
+    return not_met(reason, {"topic": found, "type": kind, "messages": count}, hint=hint, problem=ProblemKind.OTHER_NAME)
 
 
 def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | None:
@@ -290,11 +319,13 @@ def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | 
     wrong = found.topic != topic or (type_ is not None and found.type != type_)
     reason += f"; expected {type_ + ' on ' if type_ else ''}{topic}" if wrong else ""
     hint = "publish from a timer that runs from the start, and spin the node"
-    return not_met(reason, {"topic": found.topic, "type": found.type, "messages": 0}, hint=hint)
+    return not_met(
+        reason, {"topic": found.topic, "type": found.type, "messages": 0}, hint=hint, problem=ProblemKind.SILENT
+    )
 
 
 def _nothing(trace: Trace, topic: str, kind: str) -> Finding:
     others = dict.fromkeys(f"{e.topic} [{e.type}]" for e in student_endpoints(trace, kind))
     reason = f"{topic}: no {kind} in {span(trace.stop_ns)}"
     reason += f"; {kind}s seen: {listed(list(others))}" if others else ""
-    return not_met(reason, {"topic": topic, "seen": list(others)[:20]})
+    return not_met(reason, {"topic": topic, "seen": list(others)[:20]}, problem=ProblemKind.ABSENT)

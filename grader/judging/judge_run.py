@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import statistics
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -18,7 +18,7 @@ from grader.judging.charts import illustrated
 from grader.judging.diagnosis import diagnose, placed
 from grader.judging.findings import FAULT_KEY
 from grader.judging.run_check import Answer, check_name, run_check
-from grader.judging.values import on_student_topic
+from grader.judging.values import leaves, on_student_topic
 from grader.judging.wording import listed, quote
 
 
@@ -51,9 +51,7 @@ def judge_run(
 
 
 def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> ExerciseReport:
-    own: Mapping[str, Trace] = {
-        scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id
-    }
+    own = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     report = judge_exercise(exercise, own, run.submission, run.sources)
     return illustrated(report, exercise, own, run.submission, run.sources) if pictures else report
 
@@ -77,35 +75,19 @@ def judge_exercise(
     is undecided.
     """
     answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}
-    builder = VerdictBuilder(exercise, answers, submission)
+    verdicts = VerdictBuilder(exercise, answers, submission).verdicts()
     recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
-    return ExerciseReport(
-        id=exercise.id,
-        number=exercise.number,
-        title=exercise.title,
-        required=exercise.required,
+    return replace(
+        not_graded_yet(exercise),
         clock=ClockKind.WALL if reasons else ClockKind.VIRTUAL,
         clock_reason=next((r for r in reasons if r), ""),
-        verdicts=_explained(builder.verdicts(), exercise, traces, submission, sources),
+        verdicts=verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources),
         faults=_faults(recorded),
         notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources)),
         graph=_graph(exercise, traces),
-        feedback={c.id: c.feedback for c in exercise.criteria},
-        situations={c.id: c.scenario for c in exercise.criteria},
-        variant=exercise.variant,
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
     )
-
-
-def _explained(
-    verdicts: tuple[Verdict, ...],
-    exercise: Exercise,
-    traces: Mapping[str, Trace],
-    submission: Submission,
-    sources: Mapping[str, str] | None,
-) -> tuple[Verdict, ...]:
-    return verdicts if sources is None else diagnose(verdicts, exercise, traces, submission, sources)
 
 
 def _notes(
@@ -288,9 +270,8 @@ def _earned(criterion: Criterion, finding: Finding) -> Verdict:
 def _without_points(
     criterion: Criterion, outcome: Outcome, reason: str, *, hint: str = "", evidence: Mapping[str, object] | None = None
 ) -> Verdict:
-    points = criterion.points
-    known = evidence or {}
-    return Verdict(criterion.id, criterion.title, outcome, Fraction(0), points, reason, hint=hint, evidence=known)
+    known, none = evidence or {}, Fraction(0)
+    return Verdict(criterion.id, criterion.title, outcome, none, criterion.points, reason, hint=hint, evidence=known)
 
 
 def _fault_of(finding: Finding) -> tuple[object, ...] | None:
@@ -303,9 +284,7 @@ def _fault_of(finding: Finding) -> tuple[object, ...] | None:
 
 def not_graded_yet(exercise: Exercise) -> ExerciseReport:
     """Return a report with every criterion undecided, so that no part of it looks like a result."""
-    verdicts = (
-        Verdict(c.id, c.title, Outcome.UNDECIDED, Fraction(0), c.points, "not graded yet") for c in exercise.criteria
-    )
+    verdicts = (_without_points(c, Outcome.UNDECIDED, "not graded yet") for c in exercise.criteria)
     return ExerciseReport(
         id=exercise.id,
         number=exercise.number,
@@ -322,13 +301,7 @@ def not_graded_yet(exercise: Exercise) -> ExerciseReport:
 
 
 def summarise(trace: Trace, processes: Sequence[str], isolation: str) -> Summary:
-    """Return a summary of what the nodes of a trace did.
-
-    Args:
-        trace: The trace.
-        processes: Names of the files that ran.
-        isolation: The sandbox tier.
-    """
+    """Return a summary of what the nodes of a trace did."""
     graphs = trace.graphs()
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
@@ -376,16 +349,8 @@ def _pace(messages: Sequence[Message]) -> Pace | None:
 def _ranges(messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
     ranges: dict[str, tuple[float, float]] = {}
     for message in messages:
-        for name, value in _numbers(message.value, ""):
-            low, high = ranges.get(name, (value, value))
-            ranges[name] = (min(low, value), max(high, value))
+        for name, value in leaves(message.value).items():
+            if math.isfinite(value):
+                low, high = ranges.get(name, (value, value))
+                ranges[name] = (min(low, value), max(high, value))
     return ranges
-
-
-def _numbers(value: object, name: str) -> Iterator[tuple[str, float]]:
-    """Yield the finite numbers of a message by dotted name; lists are left out, because they have no names."""
-    if isinstance(value, Mapping):
-        for key, field in value.items():
-            yield from _numbers(field, f"{name}.{key}" if name else key)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
-        yield name, float(value)

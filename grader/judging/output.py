@@ -12,6 +12,7 @@ from functools import lru_cache
 from grader.core.trace import LogRecord, OutputLine, Trace
 from grader.judging.findings import AT_ONCE_NS, first_fault
 from grader.judging.texts import Printed, clean, printed_numbers, template_of, with_decimal_points
+from grader.judging.values import per_trace
 from grader.judging.wording import counted, number, quote
 
 #: Warnings that rclpy writes through the node's own logger when QoS policies are incompatible.
@@ -31,12 +32,9 @@ _INTERPRETER = re.compile(
 )
 
 
+@per_trace
 def student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     """Return the records of a process without those of rclpy and the layers below it."""
-    return trace.once((student_records, process), lambda: _student_records(trace, process))
-
-
-def _student_records(trace: Trace, process: str) -> tuple[LogRecord, ...]:
     return tuple(r for r in trace.records(process) if r.t_ns < trace.stop_ns and not _of_ros(r))
 
 
@@ -46,12 +44,9 @@ def _of_ros(record: LogRecord) -> bool:
     return bool(_RCLPY_TEXT.match(record.text[:400]) or _MIDDLEWARE.match(record.logger))
 
 
+@per_trace
 def printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     """Return the lines that a process printed, without tracebacks, interpreter warnings and blank lines."""
-    return trace.once((printed_lines, process), lambda: _printed_lines(trace, process))
-
-
-def _printed_lines(trace: Trace, process: str) -> tuple[OutputLine, ...]:
     faults = [" ".join(f.text.split()) for f in trace.faults(process)]
     lines = [o for o in trace.lines(process) if o.t_ns < trace.stop_ns and o.text.strip()]
     # the text of an exception may continue over several lines, without indentation like printed ones
@@ -212,12 +207,7 @@ class _Record:
 
 
 def followed(outputs: Sequence[Output], sought: Sequence[Sought]) -> frozenset[int]:
-    """Return the indices in `sought` of values that are logged, and not only among many other numbers.
-
-    Args:
-        outputs: The output to search.
-        sought: The values, ordered by time.
-    """
+    """Return the indices in `sought`, ordered by time, of values that are logged, not only among many other numbers."""
     places = _places(outputs, sought)
     # each number is indexed from the start and from the end, and counted once
     tried = [p for (_, index), p in places.items() if p.near and index >= 0]
@@ -312,9 +302,8 @@ def _wording(text: str, numbers: Sequence[Printed]) -> tuple[str, frozenset[str]
     """Return the text around the numbers as a shape; lists and bars of any length have the same one."""
     starts = [0, *(n.stop for n in numbers)]
     stops = [*(n.start for n in numbers), len(text)]
-    parts = [
-        _REPEATED.sub(r"\1", _DIGITS.sub("0", "".join(text[a:b].split()))) for a, b in zip(starts, stops, strict=True)
-    ]
+    bare = ("".join(text[a:b].split()) for a, b in zip(starts, stops, strict=True))
+    parts = [_REPEATED.sub(r"\1", _DIGITS.sub("0", part)) for part in bare]
     return parts[0], frozenset(parts[1:-1]), parts[-1]
 
 
@@ -338,25 +327,14 @@ _FOR_DEGREES: tuple[tuple[float, str], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class LoggedNumbers:
-    """The numbers logged for one message.
-
-    Attributes:
-        value: The value in the message.
-        numbers: The numbers logged for it.
-    """
+    """The value in a message, and the numbers logged for it."""
 
     value: float
     numbers: tuple[Printed, ...]
 
 
 def wrong_conversion(logged: Sequence[LoggedNumbers], factor: float, others: Sequence[float]) -> tuple[str, str]:
-    """Return a clause about what is logged instead of a converted value, and a hint; both empty if unclear.
-
-    Args:
-        logged: One entry for each message with a log.
-        factor: The correct conversion factor.
-        others: Factors that are also correct, whose numbers are ignored.
-    """
+    """Return a clause about what is logged instead of `factor` times a value, and a hint; both empty if unclear."""
     largest = max((abs(h.value) for h in logged), default=0.0)
     telling = [h for h in logged if h.numbers and abs(h.value) > _SMALL * largest]
     if len(telling) < _FEWEST:

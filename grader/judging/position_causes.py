@@ -16,22 +16,16 @@ _SURE = 0.8
 _SAMPLE = 40
 #: Maximum number of a template's pairs that are compared with older poses.
 _MOST_PAIRS = 12
-_TWIST = "twist.twist.linear.x"
+_TWIST = "twist.twist.linear"
 _TURN = "twist.twist.angular.z"
-_ORIENTATION = "pose.pose.orientation"
+_TURNED = "pose.pose.orientation"
 _POSITION_HINT = "the position is msg.pose.pose.position: log its x and its y"
 _SWAP_HINT = "log msg.pose.pose.position.x as x and msg.pose.pose.position.y as y"
 
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """What the logs show instead of the position.
-
-    Attributes:
-        name: One word for evidence.
-        sentence: What was found, written to follow a place and a colon.
-        hint: One thing to do; empty if nothing is very likely right.
-    """
+    """What the logs show instead of the position: a word for evidence, and a clause to follow a place and a colon."""
 
     name: str
     sentence: str
@@ -63,16 +57,10 @@ _VARIANTS = (
     _Variant("sign", X, Y, "the sign of y is the wrong way round", _SIGN_HINT, (1, -1)),
     _Variant("sign", X, Y, "the signs of x and y are the wrong way round", _SIGN_HINT, (-1, -1)),
     _Variant("sign", X, Y, "x and y have lost their signs", _SIGN_HINT, absolute=True),
-    _Variant(
-        "twist", _TWIST, "twist.twist.linear.y", "the logged values are the linear velocity (twist), not the pose"
-    ),
-    _Variant("twist", _TWIST, _TURN, "the logged values are the velocities (twist), not the pose"),
-    _Variant(
-        "orientation", f"{_ORIENTATION}.x", f"{_ORIENTATION}.y", "the logged values are x and y of the orientation"
-    ),
-    _Variant(
-        "orientation", f"{_ORIENTATION}.z", f"{_ORIENTATION}.w", "the logged values are z and w of the orientation"
-    ),
+    _Variant("twist", f"{_TWIST}.x", f"{_TWIST}.y", "the logged values are the linear velocity (twist), not the pose"),
+    _Variant("twist", f"{_TWIST}.x", _TURN, "the logged values are the velocities (twist), not the pose"),
+    _Variant("orientation", f"{_TURNED}.x", f"{_TURNED}.y", "the logged values are x and y of the orientation"),
+    _Variant("orientation", f"{_TURNED}.z", f"{_TURNED}.w", "the logged values are z and w of the orientation"),
     _Variant("no_y", X, "pose.pose.position.z", "the second value is z of the position, not y", _SWAP_HINT),
     _Variant("no_x", Y, "pose.pose.position.z", "the values are y and z of the position, not x and y", _SWAP_HINT),
 )
@@ -112,9 +100,8 @@ def _few(analysis: Analysis) -> Cause | None:
         return None
     first = moment(min(times))
     found = f"the position is logged once only, at {first}" if len(times) == 1 else f"only {len(times)} position logs"
-    return Cause(
-        "few", f"{found}, expected one every second", "log again and again: from a timer or a throttled callback"
-    )
+    hint = "log again and again: from a timer or a throttled callback"
+    return Cause("few", f"{found}, expected one every second", hint)
 
 
 def _variant(groups: Sequence[Group], track: Track) -> Cause | None:

@@ -11,7 +11,6 @@ from grader.core.trace import ClockKind, Delivery, LogRecord, OutputLine, Trace
 from grader.judging.output import printed_lines, student_records
 from grader.judging.texts import (
     SLACK_M,
-    Layout,
     Pair,
     Printed,
     candidate_pairs,
@@ -20,7 +19,7 @@ from grader.judging.texts import (
     template_of,
     with_decimal_points,
 )
-from grader.judging.values import JITTER_NS, Same, delivered
+from grader.judging.values import JITTER_NS, delivered, per_trace
 from grader.judging.values import field as number_in
 
 #: How long a pose stays acceptable after the next one arrived: a slow loop may read from a queue.
@@ -59,17 +58,17 @@ class Pose:
         return self.y if path == Y else _number(self.fields, path)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """The odometry played on a topic, in order, and the start and end of the stream."""
+    """The odometry played on a topic, in order, and the start and end of the stream; compared by identity."""
 
     deliveries: tuple[Delivery, ...]
     times_ns: tuple[int, ...]
     start_ns: int
     stop_ns: int
     jitter_ns: int
-    _spans: list[tuple[float, float]] = field(default_factory=list, init=False, repr=False, compare=False)
-    _made: dict[int, Pose] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _spans: list[tuple[float, float]] = field(default_factory=list, init=False, repr=False)
+    _made: dict[int, Pose] = field(default_factory=dict, init=False, repr=False)
 
     def current(self, t_ns: int) -> range:
         """Return the indices of the poses that a log written at `t_ns` may show; empty before the first."""
@@ -103,12 +102,9 @@ class Track:
         return self._spans[0]
 
 
+@per_trace
 def track_of(trace: Trace, topic: str) -> Track | None:
     """Return the odometry played on a topic, or None if there was none."""
-    return trace.once((track_of, topic), lambda: _track_of(trace, topic))
-
-
-def _track_of(trace: Trace, topic: str) -> Track | None:
     played = delivered(trace, topic)
     if not played:
         return None
@@ -175,11 +171,6 @@ def position(pose: Pose) -> tuple[float, float]:
     return pose.x, pose.y
 
 
-def single_texts(outputs: Iterable[LogRecord | OutputLine]) -> list[Text]:
-    """Return each record or line as a separate text."""
-    return [Text(o.t_ns, clean(o.text)) for o in outputs]
-
-
 def blocks(outputs: Iterable[LogRecord | OutputLine], clock: ClockKind) -> list[Text]:
     """Return the output of each instant as one text: three lines per message count as one."""
     joined: list[tuple[int, list[str]]] = []
@@ -193,7 +184,7 @@ def blocks(outputs: Iterable[LogRecord | OutputLine], clock: ClockKind) -> list[
 
 def grouped(texts: Iterable[Text], *, decimal_comma: bool = False) -> list[Group]:
     """Return texts that hold a number, grouped by template in order of appearance."""
-    layouts: dict[str, Layout] = {}
+    pairs: dict[str, tuple[Pair, ...]] = {}
     members: dict[str, list[Entry]] = {}
     for text in texts:
         body = (with_decimal_points(text.text) or text.text) if decimal_comma else text.text
@@ -201,10 +192,10 @@ def grouped(texts: Iterable[Text], *, decimal_comma: bool = False) -> list[Group
         if not numbers:
             continue
         template = template_of(body, numbers)
-        if template not in layouts:
-            layouts[template] = Layout(template, numbers, candidate_pairs(body, numbers))
+        if template not in pairs:
+            pairs[template] = candidate_pairs(body, numbers)
         members.setdefault(template, []).append(Entry(text.t_ns, text.text, numbers))
-    return [Group(template, layouts[template].pairs, tuple(entries)) for template, entries in members.items()]
+    return [Group(template, pairs[template], tuple(entries)) for template, entries in members.items()]
 
 
 def matched(group: Group, track: Track, wanted: Wanted = position) -> Group:
@@ -287,10 +278,10 @@ class Analysis:
         return not self.wrong and len({e.t_ns for e in self.right}) >= self.needed
 
 
+@per_trace
 def logged_positions(trace: Trace, process: str, track: Track) -> Analysis:
     """Return the positions that a process wrote through its logger."""
-    key = (logged_positions, process, Same(track))
-    return trace.once(key, lambda: _analysed(student_records(trace, process), track, trace.clock))
+    return _analysed(student_records(trace, process), track, trace.clock)
 
 
 def printed_positions(trace: Trace, process: str, track: Track) -> Analysis:
@@ -302,7 +293,7 @@ def _analysed(outputs: Sequence[LogRecord | OutputLine], track: Track, clock: Cl
     """Return the best interpretation: text by text or block by block, with decimal points or decimal commas."""
     during = [o for o in outputs if o.t_ns >= track.times_ns[0]]
     best = Analysis(needed=_needed(track))
-    singly, together = single_texts(during), blocks(during, clock)
+    singly, together = [Text(o.t_ns, clean(o.text)) for o in during], blocks(during, clock)
     for texts in (singly, together) if len(together) < len(singly) else (singly,):
         for decimal_comma in (False, True):
             found = _judged(texts, track, decimal_comma=decimal_comma)

@@ -56,12 +56,7 @@ class FormulaError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A formula that can be evaluated.
-
-    Attributes:
-        text: As written in the rubric.
-        tree: Its whitelisted syntax tree.
-    """
+    """A formula as written in the rubric, and its whitelisted syntax tree."""
 
     text: str
     tree: ast.expr
@@ -85,11 +80,7 @@ class Curve:
 
 @lru_cache(maxsize=64)
 def curve(text: str) -> Curve:
-    """Return the formula in a text.
-
-    Raises:
-        FormulaError: The text is not a formula.
-    """
+    """Return the formula in a text; raises FormulaError if it is none."""
     if len(text) > _MOST_CHARACTERS:
         raise FormulaError(f"at most {_MOST_CHARACTERS} characters")
     try:
@@ -160,13 +151,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """What the values follow, as a clause, and what to do; both may be empty.
-
-    Attributes:
-        said: The clause.
-        hint: One thing to do.
-        start: First number of the count, if only that differs.
-    """
+    """What the values follow, as a clause, and a hint; both may be empty. `start` is set if only that differs."""
 
     said: str = ""
     hint: str = ""
@@ -177,13 +162,7 @@ _Wanted = Callable[[Sample], float]
 
 
 def followed_instead(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Instead:
-    """Find what a series follows instead of a formula, if that is clear.
-
-    Args:
-        wanted: The expected formula.
-        samples: The series, in order.
-        tolerance: Largest difference.
-    """
+    """Find what a series follows instead of a formula, if that is clear."""
     if len(samples) < _FEWEST:
         return Instead()
     if not all(math.isfinite(s.value) for s in samples):
@@ -259,20 +238,12 @@ _FURTHEST_BEHIND = 25
 _SURE_BEHIND = 0.97
 #: Fewer answers than this may fit by chance.
 _FEWEST_ANSWERS = 10
+#: Whether an answer (first) is right for an input (second).
 Right = Callable[[float, float], bool]
 
 
 def lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int | None:
-    """Return by how much the answers lag behind the inputs that they are right for; None if they do not.
-
-    Args:
-        inputs: The numbers in order, each with the time at which it started.
-        answers: The answers in order.
-        right: Whether an answer (first) is right for an input (second).
-
-    Returns:
-        A positive multiple of a tenth of a second, or None if there is no lag or none explains the answers.
-    """
+    """Return by how much the answers lag behind the inputs that they are right for; None if they do not."""
     found: int | None = None
     for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
         fits = _fits(inputs, answers, right, lag)
@@ -295,13 +266,7 @@ def _fits(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right, l
 
 
 def steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int:
-    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none.
-
-    Args:
-        inputs: The numbers in order; they change from one to the next.
-        answers: The answers in order, about one per input.
-        right: Whether an answer (first) is right for an input (second).
-    """
+    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none."""
     times = [r.t_ns for r in inputs]
     newest = [(a.value, bisect_right(times, a.t_ns) - 1) for a in answers]
     for behind in range(_FURTHEST_BEHIND + 1):
@@ -331,9 +296,6 @@ def pattern_of(values: Sequence[float]) -> str | None:
 
     Every generator is accepted: uniform, whole or rounded numbers, a clipped normal distribution, a choice of a few
     values, a random walk. With fewer than `FEW` values, only whether they differ is checked.
-
-    Args:
-        values: Finite numbers in order of publishing.
     """
     if len(values) > 1 and len(set(values)) == 1:
         return "constant"

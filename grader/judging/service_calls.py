@@ -57,11 +57,8 @@ class ReportedParameter:
     """A parameter as a node reported it.
 
     Attributes:
-        t_ns: Time of the response.
-        node: The node's fully qualified name.
         type: `bool`, `integer`, `double`, `string` or one of these with `_array`; empty if the node lacks the
             parameter.
-        value: Its value.
     """
 
     t_ns: int
@@ -76,9 +73,6 @@ class ParameterSetting:
 
     Attributes:
         t_ns: Time of the response, or of the request without one.
-        node: The node's fully qualified name.
-        value: The value to set.
-        answered: Whether there was a response.
         taken: Whether the node accepted the value.
         why: The node's reason if it did not.
     """
@@ -91,8 +85,8 @@ class ParameterSetting:
     why: str
 
 
-def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]:
-    """Return the grader's calls of a parameter service of one node, or of all nodes."""
+def calls_of_node(trace: Trace, node: str | None, service: str) -> list[Call]:
+    """Return the grader's calls of a service that each node has, such as `get_parameters`, of one node or all."""
     asked = (r.service for r in trace.of(Request) if r.sender == "grader" and r.service.endswith(f"/{service}"))
     names = [name for name in dict.fromkeys(asked) if node in (None, name.rpartition("/")[0])]
     return [call for name in names for call in calls_of(trace, name, "grader")]
@@ -100,7 +94,7 @@ def _parameter_calls(trace: Trace, node: str | None, service: str) -> list[Call]
 
 def asked_for(trace: Trace, name: str, node: str | None = None) -> list[Call]:
     """Return the calls that asked for a parameter."""
-    return [c for c in _parameter_calls(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
+    return [c for c in calls_of_node(trace, node, "get_parameters") if name in _list(c.request.value, "names")]
 
 
 def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
@@ -118,7 +112,7 @@ def reported_parameter(call: Call, name: str) -> ReportedParameter | None:
 def settings(trace: Trace, name: str, node: str | None = None) -> list[ParameterSetting]:
     """Return the attempts to set a parameter, in order."""
     found = []
-    for call in _parameter_calls(trace, node, "set_parameters"):
+    for call in calls_of_node(trace, node, "set_parameters"):
         for place, parameter in enumerate(_list(call.request.value, "parameters")):
             if isinstance(parameter, Mapping) and parameter.get("name") == name:
                 found.append(_set(call, place, parameter))
@@ -170,8 +164,6 @@ class ResponseReader:
     Attributes:
         field: Path of the number, or of the text that holds it.
         success: Path of the truth value that tells whether the number counts; empty if there is none.
-        pattern: Finds the number in a text; None for the first number.
-        threshold: Numbers above it are good.
     """
 
     field: str
@@ -185,11 +177,7 @@ class Episode:
     """A call, and the time until the next one.
 
     Attributes:
-        place: Number of the call, from 1.
-        kind: Kind of the response.
-        number: The number in the response, if any.
         text: The text that holds the number; empty if the field is a number.
-        asked_ns: Time of the request.
         start_ns: Time of the response, or of the request without one.
         stop_ns: Time of the next request, or the end of the recording.
         until_ns: `stop_ns` less the clock's jitter.
@@ -260,14 +248,7 @@ def _read(response: Response | None, reading: ResponseReader) -> tuple[CallKind,
 
 
 def shapes_before(trace: Trace, process: str, service: str, *, cautious: bool) -> frozenset[str]:
-    """Return the shapes of the texts that a process wrote before its first response.
-
-    Args:
-        trace: What was observed.
-        process: File name of the client.
-        service: Service name as on the wire.
-        cautious: Whether output at the instant of a response without delay may have come before it.
-    """
+    """Return the shapes of the texts before the first response; `cautious` adds its instant if it came at once."""
     first = next((c for c in calls_of(trace, service, "student") if c.response is not None), None)
     if first is None or first.response is None:
         return frozenset()

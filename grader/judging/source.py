@@ -21,22 +21,18 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 AnyNode = TypeVar("AnyNode", bound=ast.AST)
+
+
+def words(text: str) -> tuple[str, ...]:
+    """Return the words of a text, for long tables of names."""
+    return tuple(text.split())
+
+
 #: Methods that take a callback.
-_TAKE_CALLBACKS = frozenset(
-    {
-        "create_timer",
-        "create_subscription",
-        "create_service",
-        "create_client",
-        "add_done_callback",
-        "add_on_set_parameters_callback",
-        "add_pre_set_parameters_callback",
-        "add_post_set_parameters_callback",
-        "create_guard_condition",
-        "ActionServer",
-        "send_goal_async",
-        "registerCallback",
-    }
+_TAKE_CALLBACKS = words(
+    "create_timer create_subscription create_service create_client add_done_callback "
+    "add_on_set_parameters_callback add_pre_set_parameters_callback add_post_set_parameters_callback "
+    "create_guard_condition ActionServer send_goal_async registerCallback"
 )
 
 
@@ -45,10 +41,7 @@ class Source:
     """One graded file.
 
     Attributes:
-        file: Path inside the submission, as in locations.
-        lines: The lines of the text, without line breaks.
         nodes: All syntax nodes with a line, in the order of the text; empty if the text cannot be parsed.
-        tree: The syntax tree, or None if the text cannot be parsed.
         parents: Node -> enclosing node.
         index: Nodes by class, in the order of the text.
         called: Calls by the last part of the called name, in the order of the text.
@@ -99,20 +92,26 @@ class Source:
         """Return the innermost function or method that covers a line."""
         return next((f for f in reversed(self.functions()) if covers(f, line)), None)
 
-    def around(self, node: ast.AST) -> Iterator[ast.AST]:
-        """Yield the enclosing nodes, the innermost first."""
+    def around(self, node: ast.AST, kind: type[AnyNode]) -> Iterator[AnyNode]:
+        """Yield the enclosing nodes of a kind, the innermost first."""
         inner: ast.AST | None = self.parents.get(node)
         while inner is not None:
-            yield inner
+            if isinstance(inner, kind):
+                yield inner
             inner = self.parents.get(inner)
 
     def function_of(self, node: ast.AST) -> Function | None:
         """Return the function or method that encloses a node."""
-        return next((n for n in self.around(node) if isinstance(n, Function)), None)
+        return next((n for n in self.around(node, ast.AST) if isinstance(n, Function)), None)
+
+    def function_name(self, node: ast.AST) -> str:
+        """Return the name of the function or method that encloses a node; empty outside of functions."""
+        function = self.function_of(node)
+        return "" if function is None else function.name
 
     def class_of(self, node: ast.AST) -> ast.ClassDef | None:
         """Return the class that encloses a node."""
-        return next((n for n in self.around(node) if isinstance(n, ast.ClassDef)), None)
+        return next(self.around(node, ast.ClassDef), None)
 
     def functions(self, name: str | None = None) -> list[Function]:
         """Return the functions and methods with a name, or all."""
@@ -233,9 +232,8 @@ def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str],
     stars: list[str] = []
     for node in index.get(ast.Import, ()):
         for name in node.names:
-            aliases[name.asname or name.name.partition(".")[0]] = (
-                name.name if name.asname else name.name.partition(".")[0]
-            )
+            top = name.name.partition(".")[0]
+            aliases[name.asname or top] = name.name if name.asname else top
     for imported in index.get(ast.ImportFrom, ()):
         for name in imported.names:
             if name.name == "*":

@@ -38,8 +38,6 @@ class Printed:
     Attributes:
         value: The number; not finite for a printed nan or inf.
         step: Value of one unit of its last digit.
-        start: Start index in the text.
-        stop: End index, exclusive.
     """
 
     value: float
@@ -126,43 +124,11 @@ _LABELS = {
     "xyz": "xyz",
 }
 #: Words that may appear inside a list of labels such as `pos_x and pos_y (m)`.
-_FILLERS = frozenset(
-    {
-        "and",
-        "e",
-        "et",
-        "und",
-        "i",
-        "ed",
-        "pos",
-        "position",
-        "coord",
-        "coordinate",
-        "coords",
-        "p",
-        "odom",
-        "robot",
-        "pose",
-    }
-    | {"m", "meter", "meters", "metre", "metres", "msg", "axis", "eje", "axe", "current", "the"}
-)
+_FILLERS = frozenset({"and", "e", "et", "und", "i", "ed", "pos", "position", "coord", "coordinate", "coords", "p"})
+_FILLERS |= {"odom", "robot", "pose", "m", "meter", "meters", "metre", "metres", "msg", "axis", "eje", "axe"}
+_FILLERS |= {"current", "the"}
 Pair = tuple[int, int]
 Assignment = list[str]
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """The numbers in a text and how they are presented.
-
-    Attributes:
-        template: The text with its numbers masked; equal for texts that differ only in their numbers.
-        numbers: The numbers in order.
-        pairs: Index pairs that may be (x, y), the labelled ones first.
-    """
-
-    template: str
-    numbers: tuple[Printed, ...]
-    pairs: tuple[Pair, ...]
 
 
 def template_of(text: str, numbers: Sequence[Printed]) -> str:
@@ -174,7 +140,8 @@ def template_of(text: str, numbers: Sequence[Printed]) -> str:
 def candidate_pairs(text: str, numbers: Sequence[Printed]) -> tuple[Pair, ...]:
     """Return the index pairs that are (x, y) by their labels; without labels, all in order of appearance."""
     parts = _segments(text, numbers)
-    ways = [_by_run(parts), _by_nearest(parts), _by_suffix(parts)]
+    nearest = [(_labels_in(part) or [""])[-1] for part in parts[:-1]]
+    ways = [_by_run(parts), nearest, _by_suffix(parts)]
     complete = [w for w in ways if "x" in w and "y" in w]
     plain = range(min(len(numbers), _MOST_UNLABELLED))
     if not complete:
@@ -234,11 +201,6 @@ def _listed_pairs(parts: list[str]) -> list[Pair]:
         forward = run.index("x") < run.index("y")
         pairs += [(i, j) if forward else (j, i) for i, j in combinations(span, 2)]
     return pairs
-
-
-def _by_nearest(parts: list[str]) -> Assignment:
-    """Assign to each number the last label before it."""
-    return [(_labels_in(part) or [""])[-1] for part in parts[:-1]]
 
 
 def _by_suffix(parts: list[str]) -> Assignment:

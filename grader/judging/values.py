@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from grader.core.quantities import NS_PER_MS, SLACK, Pattern, within
 from grader.core.trace import ClockKind, Delivery, Endpoint, Message, Trace
 from grader.judging.wording import number, quote
 
 T = TypeVar("T")
-Carrier = TypeVar("Carrier", Message, Delivery)
+P = ParamSpec("P")
 #: Largest difference between two numbers that count as equal.
 EXACT = 1e-6
 #: Largest difference between two clock readings of one moment.
@@ -40,17 +40,14 @@ class Held:
     value: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Same(Generic[T]):
-    """A cache key that compares by identity: checks use the same trace again, and comparing traces is slow."""
+def per_trace(find: Callable[Concatenate[Trace, P], T]) -> Callable[Concatenate[Trace, P], T]:
+    """Make a function remember its result for each trace and arguments; these must be hashable."""
 
-    value: T
+    @wraps(find)
+    def found(trace: Trace, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return trace.once((find, args, *kwargs.items()), lambda: find(trace, *args, **kwargs))
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and other.value is self.value
-
-    def __hash__(self) -> int:
-        return id(self.value)
+    return found
 
 
 def as_number(value: object) -> float | None:
@@ -79,28 +76,28 @@ def carries_number(type_: str) -> bool:
     return _NUMERIC_TYPE.fullmatch(type_) is not None
 
 
+@per_trace
 def published(trace: Trace, topic: str) -> tuple[Message, ...]:
     """Return the messages of the student's nodes on a topic during the observation."""
-    return trace.once((published, topic), lambda: _observed(trace, trace.messages(topic)))
+    return tuple(m for m in trace.messages(topic) if m.t_ns < trace.stop_ns)
 
 
-def _observed(trace: Trace, messages: tuple[Carrier, ...]) -> tuple[Carrier, ...]:
-    return tuple(m for m in messages if m.t_ns < trace.stop_ns)
-
-
+@per_trace
 def delivered(trace: Trace, topic: str) -> tuple[Delivery, ...]:
     """Return the grader's messages on a topic during the observation."""
-    return trace.once((delivered, topic), lambda: _observed(trace, trace.deliveries(topic)))
+    return tuple(d for d in trace.deliveries(topic) if d.t_ns < trace.stop_ns)
 
 
+@per_trace
 def published_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
     """Return the numbers that the student's nodes published on a topic during the observation."""
-    return trace.once((published_numbers, topic), lambda: _readings(published(trace, topic)))
+    return _readings(published(trace, topic))
 
 
+@per_trace
 def delivered_numbers(trace: Trace, topic: str) -> tuple[Reading, ...]:
     """Return the numbers that the grader published on a topic during the observation."""
-    return trace.once((delivered_numbers, topic), lambda: _readings(delivered(trace, topic)))
+    return _readings(delivered(trace, topic))
 
 
 def _readings(messages: Iterable[Message | Delivery]) -> tuple[Reading, ...]:
@@ -114,15 +111,12 @@ def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
     return tuple({r.t_ns: r for r in series}.values())
 
 
+@per_trace
 def held(trace: Trace, topic: str, *, heard_from_ns: int = 0) -> tuple[Held, ...]:
     """Return the numbers that the grader published on a topic, merging equal neighbours.
 
     Numbers sent before `heard_from_ns`, without a subscriber, are left out, unless that would leave none.
     """
-    return trace.once((held, topic, heard_from_ns), lambda: _held(trace, topic, heard_from_ns))
-
-
-def _held(trace: Trace, topic: str, heard_from_ns: int) -> tuple[Held, ...]:
     sent = delivered_numbers(trace, topic)
     received = [r for r in sent if r.t_ns >= heard_from_ns] or sent
     starts: list[Reading] = []
@@ -164,11 +158,7 @@ class NoSuchField(KeyError):  # noqa: N818 - says what is missing, and never end
 
 
 def at_path(value: Mapping[str, object], path: str) -> Any:
-    """Return the part of a value at a path; list elements are counted from 0.
-
-    Raises:
-        NoSuchField: The path does not exist.
-    """
+    """Return the part of a value at a path, with list elements counted from 0; raises NoSuchField if there is none."""
     here: object = value
     for name in _names(path):
         if isinstance(here, Mapping) and name in here:
@@ -211,9 +201,6 @@ class FieldRule:
     Attributes:
         equals: Expected text, number or truth value.
         items: Expected list elements, in order.
-        tolerance: Largest difference from an expected number.
-        low: Smallest number allowed.
-        high: Largest number allowed.
         pattern: Regular expression that must match the whole text.
         example: A matching text, shown instead of the pattern.
     """

@@ -27,7 +27,6 @@ class Explanation:
     """An author's note on some mutants or variants.
 
     Attributes:
-        pattern: Pattern for their ids, with `*` for anything.
         because: The explanation; empty if the note names criteria.
         criteria: Criteria that should detect such a mutant; empty if the note has an explanation.
         where: Position in the file, for messages.
@@ -45,17 +44,7 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """All notes of an author.
-
-    Attributes:
-        reference: Folder of the reference solution; None if not given.
-        template: Folder of the template; None if not given.
-        template_score: Expected score of the template; None if not given.
-        survivors: Why some mutants survive.
-        expected: Which criteria should detect other mutants.
-        variants: Why some correct variants lose points.
-        criteria: Criterion id -> why it detects no mutant.
-    """
+    """All notes of an author; `criteria` tells for a criterion's id why it detects no mutant."""
 
     reference: Path | None = None
     template: Path | None = None
@@ -107,11 +96,7 @@ def beside(rubric: Path) -> Path:
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:
-    """Read the notes on the self-test of an exercise; a missing file counts as empty.
-
-    Raises:
-        RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
-    """
+    """Read the notes on the self-test of an exercise, empty without a file; raises RubricError with every mistake."""
     if not path.exists():
         return Explained()
     tree = _tree(path)
@@ -136,7 +121,7 @@ def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
         template=None if read.template is None else path.parent / read.template,
         template_score=None if read.template_score is None else Fraction(str(read.template_score)),
         survivors=tuple(
-            Explanation(one.mutants, because=_line(one.because), where=_where(path, tree, ("survivors", n)))
+            Explanation(one.mutants, _line(one.because), where=_where(path, tree, ("survivors", n)))
             for n, one in enumerate(read.survivors)
         ),
         expected=tuple(

@@ -28,8 +28,6 @@ class TrialResult:
     """The result of grading a program by a rubric.
 
     Attributes:
-        score: Points earned.
-        max_score: Maximum points.
         outcomes: Criterion id -> outcome, in rubric order.
         reasons: Criterion id -> reason, of criteria that are not fully met.
     """
@@ -78,10 +76,6 @@ class Trial:
 
     Attributes:
         id: Stable, readable id: `FILE:LINE:operator:detail`, or `FILE:variant` for a variant.
-        file: Name of the changed file.
-        operator: The operator that changed it.
-        change: The change in one line.
-        result: The result of grading it.
         expected: Criteria one of which should detect it, according to the notes; empty if not given.
         because: The explanation in the notes of why a mutant survives or a variant loses points.
     """
@@ -110,19 +104,9 @@ class SelftestResult:
     """The result of testing one rubric.
 
     Attributes:
-        rubric: Path of its file, as given.
-        exercise: Exercise id.
-        criteria: Criterion ids, in rubric order.
-        reference: Result of the reference solution.
-        template: Result of the template; None if there is none.
-        baseline: Expected score of the template; None if not given.
-        mutants: The mutants, ordered by file, operator and line.
-        variants: The correct variants, in order.
         whole: Whether all mutants were run.
         idle: Unused patterns of the notes, with their positions.
         unturned: Criterion id -> why it detects no mutant, according to the notes.
-        recordings: Number of recorded scenarios.
-        duration_s: Real time.
     """
 
     rubric: str
@@ -157,10 +141,8 @@ class SelftestResult:
     @property
     def never_turned(self) -> tuple[str, ...]:
         """Criteria that detected no mutant, without an explanation; empty if only some mutants were run."""
-        turned = {id_ for trial in self.mutants for id_ in trial.result.turned}
-        return (
-            tuple(id_ for id_ in self.criteria if id_ not in turned and id_ not in self.unturned) if self.whole else ()
-        )
+        known = {*self.unturned, *(id_ for trial in self.mutants for id_ in trial.result.turned)}
+        return tuple(id_ for id_ in self.criteria if id_ not in known) if self.whole else ()
 
     @property
     def template_fits(self) -> bool:

@@ -27,7 +27,7 @@ from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
 from grader.mutation.explained import Explained, Explanation, beside, idle, read_explained
 from grader.mutation.operators.mutants import mutants_of
-from grader.mutation.operators.program import Program
+from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
 from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of
 from grader.submissions.sources import read_sources
@@ -35,16 +35,6 @@ from grader.submissions.submission import stage_submission
 
 #: Programs per worker that are recorded before they are judged; limited because traces are large.
 _AT_ONCE = 6
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A changed file to run."""
-
-    id: str
-    file: str
-    operator: str
-    source: str
 
 
 @dataclass(slots=True)
@@ -131,8 +121,6 @@ class SelftestOptions:
         only: Pattern for the ids to run, with `*` for anything; empty for all.
         sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
         seed: Seed of the sample and of all drawn values; None derives the values from the reference solution.
-        clock: `virtual`, `wall` or `auto`.
-        isolation: `auto`, `none` or the name of a tier.
     """
 
     reference: Path | None = None
@@ -146,16 +134,7 @@ class SelftestOptions:
 
 
 def selftest(rubrics: Sequence[Path], options: SelftestOptions, progress: Progress) -> Iterator[SelftestResult]:
-    """Test rubrics, and yield the result of each as it is ready.
-
-    Args:
-        rubrics: Rubric files.
-        options: How to test them.
-        progress: Called at the start of each step.
-
-    Raises:
-        GraderError: Something that the test needs cannot be used; the class of the error tells who must act.
-    """
+    """Test rubrics, and yield the result of each as it is ready; raises GraderError if something cannot be used."""
     prepared = [_prepared(path, options) for path in rubrics]
     workers = options.jobs or len(os.sched_getaffinity(0))
     with open_session(options.isolation, workers) as session:
@@ -252,12 +231,8 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
 
 def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
     """Run the selected mutants."""
-    found = [mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name)]
-    wanted = [Candidate(m.id, m.file, m.operator, m.source) for m in found if _wanted(m.id, options)]
-    for candidate, result in bench.grade_changed(
-        _sampled(wanted, options.sample, options.seed or 0), f"{bench.exercise.id}: mutant"
-    ):
-        trial = _trial(candidate, result, bench)
+    made = (mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name))
+    for trial in _trials(bench, made, "mutant", options, options.sample):
         because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
         expected = _first(explained.expected, trial.id)
         yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
@@ -265,23 +240,22 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
 
 def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
     """Run the selected correct variants."""
-    found = [variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name)]
-    wanted = [Candidate(v.id, v.file, v.name, v.source) for v in found if _wanted(v.id, options)]
+    made = (variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name))
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
-    chosen = _sampled(wanted, most, options.seed or 0)
-    for candidate, result in bench.grade_changed(chosen, f"{bench.exercise.id}: variant"):
-        trial = _trial(candidate, result, bench)
+    for trial in _trials(bench, made, "variant", options, most):
         because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
         yield replace(trial, because=because.because if because else "")
 
 
-def _trial(candidate: Candidate, result: TrialResult, bench: TrialRunner) -> Trial:
-    change = one_line_change(bench.sources[candidate.file], candidate.source)
-    return Trial(candidate.id, candidate.file, candidate.operator, change, result)
-
-
-def _wanted(id_: str, options: SelftestOptions) -> bool:
-    return not options.only or fnmatchcase(id_, options.only)
+def _trials(
+    bench: TrialRunner, made: Iterable[Candidate], word: str, options: SelftestOptions, most: int | None
+) -> Iterator[Trial]:
+    """Run the candidates that the options select, at most so many."""
+    wanted = [c for c in made if not options.only or fnmatchcase(c.id, options.only)]
+    chosen = _sampled(wanted, most, options.seed or 0)
+    for candidate, result in bench.grade_changed(chosen, f"{bench.exercise.id}: {word}"):
+        change = one_line_change(bench.sources[candidate.file], candidate.source)
+        yield Trial(candidate.id, candidate.file, candidate.operator, change, result)
 
 
 def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> list[Candidate]:

@@ -23,13 +23,7 @@ _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
 def render_results(results: Sequence[SelftestResult], *, width: int, colour: bool) -> str:
-    """Render the results of rubrics as text.
-
-    Args:
-        results: The results, one for each rubric.
-        width: Width of the page in columns; at least 80 are used.
-        colour: Whether to add ANSI colours; the text is the same without them.
-    """
+    """Render the results as text, at least 80 columns wide; the words are the same without ANSI colours."""
     out = StringIO()
     console = Console(
         file=out,

@@ -177,14 +177,21 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
     """Return the visible part of a verdict; a hidden criterion has no name either."""
     if shown[verdict.id] is Shows.OUTCOME:
         return replace(
-            verdict, reason=_OUTCOME_ONLY, hint="", location=None, evidence={}, blocked_by="", same_cause_as=""
+            verdict,
+            reason=_OUTCOME_ONLY,
+            hint="",
+            location=None,
+            evidence={},
+            blocked_by="",
+            same_cause_as="",
+            problem=None,
         )
     verdict = _without_hidden(verdict, shown)
     if shown[verdict.id] is Shows.ALL:
         return verdict
     # The text of a verdict that was not judged has no numbers of its own, and the ids in it must not change.
     said = verdict.reason if verdict.outcome is Outcome.BLOCKED else without_numbers(verdict.reason)
-    return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={})
+    return replace(verdict, reason=said, hint=_hint(verdict.hint), evidence={}, problem=None)
 
 
 def _without_hidden(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:

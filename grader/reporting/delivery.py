@@ -22,11 +22,7 @@ from grader.reporting.formats import FORMATS, PageLayout, check_surroundings, re
 
 
 def check_writable(path: Path) -> None:
-    """Check that a report can be written to a path, without changing what is there.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Raise OSError if a report cannot be written to a path; what is there is not changed."""
     target = _target(path)
     if _is_special(target):
         return
@@ -40,13 +36,10 @@ def check_writable(path: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file atomically: a reader finds the old content or all of the new.
+    """Write a file atomically: a reader finds the old content or all of the new; no temporary file is left behind.
 
     A symbolic link stays a link, and an existing file keeps its mode. Special files, such as /dev/null or a pipe, are
     written to directly.
-
-    Raises:
-        OSError: It could not be written; no temporary file is left behind.
     """
     target = _target(path)
     if _is_special(target):
@@ -97,11 +90,8 @@ class Output:
 def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
     """Return all reports to deliver, files first, after checking that each can be written.
 
-    If nothing goes to standard output, the text report is added.
-
-    Raises:
-        GraderError: A file cannot be written, two reports have the same destination, or the environment lacks a value
-            that a format needs.
+    If nothing goes to standard output, the text report is added. Raises GraderError if a file cannot be written, two
+    reports have the same destination, or the environment lacks a value that a format needs.
     """
     for output in outputs:
         check_surroundings(output.format)
@@ -116,16 +106,7 @@ def prepared(outputs: Sequence[Output]) -> tuple[Output, ...]:
 
 
 def deliver(report: Report, outputs: Sequence[Output], readers: Readers = ANYBODY) -> None:
-    """Deliver every report, also after one of them failed.
-
-    Args:
-        report: The whole report.
-        outputs: Formats and destinations.
-        readers: Who reads the reports, and when.
-
-    Raises:
-        GraderError: A report could not be written.
-    """
+    """Deliver every report, also after one of them failed; then raise the first GraderError."""
     problems = [problem for output in outputs if (problem := _delivered(report, output, readers))]
     if problems:
         raise problems[0]
@@ -146,14 +127,9 @@ def early_delivery(outputs: Sequence[Output], readers: Readers = ANYBODY) -> Cal
 
 
 def show(render: Callable[[PageLayout], str], *, for_people: bool) -> None:
-    """Print text on standard output.
+    """Print text on standard output, rendered for its width and colour; a closed pipe is not an error.
 
-    Args:
-        render: Renders the text for a given width and colour setting.
-        for_people: Whether to replace characters that the terminal's encoding lacks; programs read UTF-8.
-
-    Raises:
-        OSError: It cannot be written; a closed pipe is not an error.
+    For people, characters that the terminal's encoding lacks are replaced; programs read UTF-8.
     """
     if sys.stdout is not None:
         layout = PageLayout(min(shutil.get_terminal_size().columns, _WIDEST), _coloured(sys.stdout))
@@ -177,7 +153,7 @@ def _check(output: Output) -> None:
 
 def _delivered(report: Report, output: Output, readers: Readers) -> GraderError | None:
     try:
-        _write(report, output, readers)
+        write_report(report, output, readers)
     except OSError as error:
         return _unwritable(output, error)
     return None
@@ -188,7 +164,8 @@ def _unwritable(output: Output, error: OSError) -> GraderError:
     return GraderError(f"{where}: the {output.format} report cannot be written: {error.strerror or error}")
 
 
-def _write(report: Report, output: Output, readers: Readers) -> None:
+def write_report(report: Report, output: Output, readers: Readers) -> None:
+    """Write a report to its destination; raises OSError if that fails."""
     if output.path is not None:
         text = rendered(output.format, report, PageLayout(_FILE_WIDTH, colour=False), readers)
         write_whole(output.path, text.encode("utf-8"))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
 
 from rich.text import Text
 
-from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, Property, TierReport, missing
+from grader.core.checkup import NO_SANDBOX, PROPERTIES, REQUIRED, Checkup, Exchange, Fact, TierReport, missing
 from grader.core.json_values import JsonObject
 from grader.core.limits import Limits
 from grader.core.quantities import duration, size
@@ -25,13 +25,7 @@ _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
 def render_checkup(checkup: Checkup, *, width: int, colour: bool) -> str:
-    """Return a checkup as text.
-
-    Args:
-        checkup: The checkup.
-        width: Columns of the page; at least 60 are used.
-        colour: Whether to colour with ANSI sequences; the text is the same without.
-    """
+    """Return a checkup as text of at least 60 columns; colours are ANSI sequences, the text is the same without."""
     page = Page(width=max(width, _NARROWEST), colour=colour)
     _head(page, checkup)
     _title(page, "This machine")
@@ -122,8 +116,9 @@ def _matrix(page: Page, checkup: Checkup) -> None:
         page.put(Text(meaning).append(f" ({shown(by)})" if by else "", style=_QUIET), prefix=row, indent=6)
     for tier in tried:
         if tier.name != NO_SANDBOX:
-            for found in _open(tier):
-                page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
+            for found in tier.properties:
+                if found.found and not found.holds:
+                    page.put(shown(found.found), prefix=f"  {tier.tier}, {found.name}: ", indent=6)
 
 
 def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
@@ -135,10 +130,6 @@ def _mechanism(tiers: Sequence[TierReport], used: str, name: str) -> str:
 def _mark(tier: TierReport, name: str) -> Text:
     holds = any(found.name == name and found.holds for found in tier.properties)
     return Text(f"{'yes' if holds else 'NO':{_MARK_WIDTH}}", style=_GOOD if holds else _BAD)
-
-
-def _open(tier: TierReport) -> Iterator[Property]:
-    return (found for found in tier.properties if not found.holds and found.found)
 
 
 def _limits(limits: Limits) -> Iterator[tuple[str, str]]:
@@ -164,13 +155,13 @@ def checkup_to_json(checkup: Checkup) -> str:
         "facts": _facts(checkup.facts),
         "exchange": None if checkup.exchange is None else _exchange_json(checkup.exchange),
         "tiers": [_tier_json(tier) for tier in checkup.tiers],
-        "limits": {field.name: getattr(checkup.limits, field.name) for field in fields(checkup.limits)},
+        "limits": asdict(checkup.limits),
     }
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
-def _facts(facts: Sequence[Fact]) -> list[JsonObject]:
-    return [{"name": f.name, "value": f.value, "fits": f.fits, "remedy": f.remedy or None} for f in facts]
+def _facts(facts: Sequence[Fact]) -> list[Mapping[str, object]]:
+    return [{**asdict(fact), "remedy": fact.remedy or None} for fact in facts]
 
 
 def _exchange_json(exchange: Exchange) -> JsonObject:
@@ -191,8 +182,5 @@ def _tier_json(tier: TierReport) -> JsonObject:
         "usable": tier.usable,
         "why": tier.why or None,
         "remedy": tier.remedy or None,
-        "properties": [
-            {"name": p.name, "holds": p.holds, "mechanism": p.mechanism, "found": p.found or None}
-            for p in tier.properties
-        ],
+        "properties": [{**asdict(found), "found": found.found or None} for found in tier.properties],
     }

@@ -1,13 +1,7 @@
-"""Makes text that a student controls harmless in each output: one small function per output.
-
-Terminal: `shown`, `shown_lines`. GitHub: `workflow_message`, `workflow_property`, `log_lines`,
-`without_workflow_commands`. Markdown: `markdown`, `markdown_code`, `markdown_block`, `mermaid_label`. HTML:
-`html_text`, `script_json`. XML: `xml_text`. CSV: `csv_cell`. JSON: `json_value`. Shells: `quoted`, `command_line`.
-"""
+"""Makes text that a student controls harmless in each output: one small function per output."""
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import re
@@ -57,12 +51,9 @@ _MOST_BITS = 64
 def shown(text: str, *, limit: int = LIMIT) -> str:
     r"""Return foreign text as one line that is safe on a terminal.
 
-    Line breaks, escape sequences, direction overrides and other unprintable characters appear as `\n`, `\x1b`
-    or `\u202e`; every kind of space becomes a plain one.
-
-    Args:
-        text: Any text, lone surrogates included.
-        limit: Maximum number of characters returned, at least 1; a longer text ends in an ellipsis.
+    Line breaks, escape sequences, direction overrides and other unprintable characters appear as `\n`, `\x1b` or
+    `\u202e`; every kind of space becomes a plain one. Lone surrogates are allowed. At most `limit` characters are
+    returned, at least 1; a longer text ends in an ellipsis.
     """
     if len(text) <= limit and text.isascii() and text.isprintable():
         return text  # the common case; looking at each character takes a hundred times as long
@@ -81,9 +72,7 @@ def shown(text: str, *, limit: int = LIMIT) -> str:
 def shown_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
     """Return foreign text of several lines that is safe on a terminal: as `shown`, but its line breaks stay.
 
-    Args:
-        text: Any text; tabs become spaces up to the next column of four.
-        limit: Maximum number of characters returned, at least 1; a longer text ends in an ellipsis.
+    Tabs become spaces up to the next column of four.
     """
     lines: list[str] = []
     left = limit
@@ -122,9 +111,7 @@ def workflow_property(text: str, *, limit: int = LIMIT) -> str:
 def log_lines(text: str, *, limit: int = LINES_LIMIT) -> str:
     """Return foreign text for the log of a GitHub job: as `shown_lines`, but no line is a workflow command.
 
-    Args:
-        text: Whole lines, including everything that is printed before foreign text in them.
-        limit: Maximum number of characters shown.
+    The text is whole lines, including everything that is printed before foreign text in them.
     """
     return without_workflow_commands(shown_lines(text, limit=limit))
 
@@ -135,14 +122,10 @@ def without_workflow_commands(text: str) -> str:
 
 
 def markdown(text: str, *, limit: int = LIMIT) -> str:
-    """Return foreign text as Markdown that shows exactly this text.
+    """Return foreign text as one line of Markdown that shows exactly this text, at most `limit` visible characters.
 
     The result fits into a paragraph, heading, list or table cell, also at its start: it cannot become markup, HTML, a
     link, picture, formula, mention or reference. An invisible space breaks what GitHub links without any markup.
-
-    Args:
-        text: Any text; it becomes one line.
-        limit: Maximum number of visible characters.
     """
     line = shown(text, limit=limit).strip(" ")
     line = _LINKED.sub(r"\g<before>\0\g<sign>", line)
@@ -152,14 +135,9 @@ def markdown(text: str, *, limit: int = LIMIT) -> str:
 
 
 def markdown_code(text: str, *, in_cell: bool = False, limit: int = LIMIT) -> str:
-    """Return foreign text as a Markdown code span, or nothing if it is empty.
+    """Return foreign text as a Markdown code span of one line, or nothing if it is empty.
 
-    GitHub links nothing in a code span, so this suits names and values best.
-
-    Args:
-        text: Any text; it becomes one line.
-        in_cell: Whether the span is in a table cell, where `|` needs another escape.
-        limit: Maximum number of characters shown.
+    GitHub links nothing in a code span, so this suits names and values best. In a table cell `|` needs another escape.
     """
     line = shown(text, limit=limit)
     if not line.strip(" "):
@@ -182,11 +160,6 @@ def mermaid_label(text: str, *, limit: int = LIMIT) -> str:
     """Return foreign text for a double-quoted label in a Mermaid diagram."""
     signs = frozenset(string.punctuation) - frozenset("/_.,-")
     return "".join(f"#{ord(sign)};" if sign in signs else sign for sign in shown(text, limit=limit))
-
-
-def html_text(text: str, *, limit: int = LINES_LIMIT) -> str:
-    """Return foreign text for an HTML element or a quoted attribute; line breaks stay."""
-    return html.escape(shown_lines(text, limit=limit), quote=True)
 
 
 def script_json(value: object) -> str:
@@ -291,8 +264,5 @@ def _in_bash_quotes(character: str) -> str:
     if character.isprintable():
         return character
     # Bytes that are not UTF-8 arrive as lone surrogates; other surrogates are written as they are.
-    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", _surrogates(character)))
-
-
-def _surrogates(character: str) -> str:
-    return "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"
+    surrogates = "surrogateescape" if "\udc80" <= character <= "\udcff" else "surrogatepass"
+    return "".join(f"\\x{byte:02x}" for byte in character.encode("utf-8", surrogates))

@@ -97,7 +97,9 @@ def render_sheet(exercise: Exercise) -> str:
     variant = exercise.variant
     if variant is None:
         return f"{title}\nThis exercise is the same for everybody.\n"
-    rows = [f"| {markdown(_spaced(name))} | {markdown_code(written(value))} |" for name, value in variant.values]
+    rows = [
+        f"| {markdown(name.replace('_', ' '))} | {markdown_code(written(value))} |" for name, value in variant.values
+    ]
     whose = f"\nThe values of {markdown(variant.student)}:\n"
     return "\n".join([title + whose, "| | |", "|:--|:--|", *rows]) + "\n"
 
@@ -113,7 +115,3 @@ def sheet_to_json(exercise: Exercise) -> str:
         "rubric": exercise.digest,
     }
     return json.dumps(data, indent=2, allow_nan=False) + "\n"
-
-
-def _spaced(name: str) -> str:
-    return name.replace("_", " ")

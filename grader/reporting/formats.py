@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
-from grader.core.exercise import Audience
-from grader.core.report import Report
-from grader.reporting.audience import ANYBODY, Readers
+if TYPE_CHECKING:
+    from grader.core.report import Report
+    from grader.reporting.audience import Readers
+    from grader.reporting.platforms.classroom50 import HandedIn
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,105 +23,92 @@ class PageLayout:
     colour: bool
 
 
-def _nothing(report: Report, layout: PageLayout) -> Mapping[str, object]:
-    del report, layout
-    return {}
-
-
-def _layout(report: Report, layout: PageLayout) -> Mapping[str, object]:
-    del report
-    return {"width": layout.width, "colour": layout.colour}
-
-
-def _folder(report: Report, layout: PageLayout) -> Mapping[str, object]:
-    from grader.reporting.surroundings import repository_folder  # noqa: PLC0415  only after a run, not for --help
-
-    del layout
-    return {"folder": repository_folder(report.path, os.environ)}
-
-
-def _handed_in(report: Report, layout: PageLayout) -> Mapping[str, object]:
-    from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
-
-    del report, layout
-    return {"handed_in": handed_in(os.environ)}
-
-
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format of reports.
+    """A format of reports."""
 
-    Attributes:
-        renderer: The rendering function: `module:function` in `grader.reporting`.
-        suffix: File name suffix of this format.
-        usual: Who reads it unless an option says otherwise: students, if a platform shows it to them.
-        arguments: Computes the renderer's further arguments.
-        withholds: Whether the renderer itself hides what students must not see yet, because its platform shows it
-            later.
-        illustrated: Whether it shows figures, which take about as long to draw as judging takes.
-        written_early: Whether its platform ends a run that takes too long, and then uses the file that exists.
-    """
-
-    renderer: str
-    suffix: str
-    usual: Audience
-    arguments: Callable[[Report, PageLayout], Mapping[str, object]] = _nothing
+    renderer: str  # the rendering function: `module:function` in `grader.reporting`
+    suffix: str  # file name suffix of this format
+    for_students: bool = False  # whether students read it unless an option says otherwise: a platform shows it to them
+    needs: str = ""  # what its renderer is given besides the report: `layout`, `folder` or `handed_in`
+    # Whether the renderer itself hides what students must not see yet, because its platform shows it later
     withholds: bool = False
-    illustrated: bool = False
+    illustrated: bool = False  # whether it shows figures, which take about as long to draw as judging takes
+    # Whether its platform ends a run that takes too long, and then uses the file that exists
     written_early: bool = False
 
     def __call__(self, report: Report, layout: PageLayout, **arguments: object) -> str:
         """Return the text of a report."""
         module, _, function = self.renderer.partition(":")
         text: str = getattr(import_module(f"grader.reporting.{module}"), function)(
-            report, **self.arguments(report, layout), **arguments
+            report, **_arguments(self.needs, report, layout), **arguments
         )
         return text
 
 
+def _arguments(needs: str, report: Report, layout: PageLayout) -> Mapping[str, object]:
+    if needs == "layout":
+        return {"width": layout.width, "colour": layout.colour}
+    if needs == "folder":
+        return {"folder": repository_folder(report.path, os.environ)}
+    return {"handed_in": _handed_in()} if needs else {}
+
+
+def _handed_in() -> HandedIn:
+    from grader.reporting.platforms.classroom50 import handed_in  # noqa: PLC0415  only for this format
+
+    return handed_in(os.environ)
+
+
 #: Every format of reports, by name.
 FORMATS: dict[str, Format] = {
-    "json": Format("json_report:dumps", ".json", Audience.INSTRUCTOR),
-    "text": Format("text:render_text", ".txt", Audience.INSTRUCTOR, _layout),
-    "html": Format("html.render:render_html", ".html", Audience.INSTRUCTOR, illustrated=True),
-    "markdown": Format("markdown:render_markdown", ".md", Audience.INSTRUCTOR),
-    "junit": Format("junit:render_junit", ".xml", Audience.INSTRUCTOR, _folder),
-    "github": Format("platforms.github:render_github", ".txt", Audience.STUDENT, _folder),
+    "json": Format("json_report:dumps", ".json"),
+    "text": Format("text:render_text", ".txt", needs="layout"),
+    "html": Format("html.render:render_html", ".html", illustrated=True),
+    "markdown": Format("markdown:render_markdown", ".md"),
+    "junit": Format("junit:render_junit", ".xml", needs="folder"),
+    "github": Format("platforms.github:render_github", ".txt", for_students=True, needs="folder"),
     "gradescope": Format(
-        "platforms.gradescope:render_gradescope", ".json", Audience.STUDENT, withholds=True, written_early=True
+        "platforms.gradescope:render_gradescope", ".json", for_students=True, withholds=True, written_early=True
     ),
-    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", Audience.STUDENT),
-    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", Audience.STUDENT, _handed_in),
-    "classroom": Format("platforms.classroom:render_classroom", ".json", Audience.STUDENT),
+    "prairielearn": Format("platforms.prairielearn:render_prairielearn", ".json", for_students=True),
+    "classroom50": Format("platforms.classroom50:render_classroom50", ".json", for_students=True, needs="handed_in"),
+    "classroom": Format("platforms.classroom:render_classroom", ".json", for_students=True),
 }
 
 
 def check_surroundings(name: str) -> None:
-    """Check that the environment has the values that a format needs.
-
-    Raises:
-        GraderError: A value is missing.
-    """
-    if FORMATS[name].arguments is _handed_in:
-        from grader.reporting.surroundings import handed_in  # noqa: PLC0415  as above
-
-        handed_in(os.environ)
+    """Raise GraderError if the environment lacks a value that a format needs."""
+    if FORMATS[name].needs == "handed_in":
+        _handed_in()
 
 
-def rendered(name: str, report: Report, layout: PageLayout, readers: Readers = ANYBODY) -> str:
-    """Return a report in a format, limited to what its reader may see.
+def rendered(name: str, report: Report, layout: PageLayout, readers: Readers) -> str:
+    """Return a report in one of `FORMATS`, limited to what its reader may see."""
+    from grader.core.exercise import Audience  # noqa: PLC0415  only after a run, not for --help
+    from grader.reporting.audience import for_student  # noqa: PLC0415  only after a run, not for --help
 
-    Args:
-        name: One of `FORMATS`.
-        report: The whole report.
-        layout: Width and colour of text.
-        readers: Who reads it, and when.
-    """
     format_ = FORMATS[name]
-    if readers.of(format_.usual) is Audience.INSTRUCTOR:
+    if readers.of(Audience.STUDENT if format_.for_students else Audience.INSTRUCTOR) is Audience.INSTRUCTOR:
         return format_(report, layout)
     if format_.withholds:
         return format_(report, layout, day=readers.day)
-    from grader.reporting.audience import for_student  # noqa: PLC0415  as above
-
     return format_(for_student(report, readers.day), layout)
+
+
+def repository_folder(path: str, environment: Mapping[str, str]) -> str | None:
+    """Return a submission's folder in its repository, POSIX form, empty for the root; None outside of one.
+
+    The repository is the workspace of a GitHub job, else the nearest parent folder with a `.git`, else this folder.
+    """
+    source = Path(os.path.realpath(path))
+    folder = source if source.is_dir() else source.parent
+    if not source.is_dir() and source.suffix != ".py":
+        return None  # files inside an archive are not in the repository
+    workspace = environment.get("GITHUB_WORKSPACE")
+    checkouts = (parent for parent in (folder, *folder.parents) if (parent / ".git").exists())
+    root = Path(os.path.realpath(workspace)) if workspace else next(checkouts, Path(os.path.realpath(".")))
+    if not folder.is_relative_to(root):
+        return None
+    relative = PurePosixPath(folder.relative_to(root)).as_posix()
+    return "" if relative == "." else relative

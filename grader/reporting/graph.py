@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.cells import cell_len
 
-from grader.core.trace import Endpoint, GraphSnapshot
+from grader.core.trace import GraphSnapshot
 from grader.reporting.escape import mermaid_label, shown
 
 #: Topics that every node has.
@@ -77,7 +77,8 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
     for publisher in publishers:
         takers = [s for s in subscriptions if s.topic == publisher.topic]
         for taker in takers:
-            yield publisher.node, publisher.topic, taker.node, _type_conflict(publisher, taker)
+            quarrel = "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
+            yield publisher.node, publisher.topic, taker.node, quarrel
         if not takers:
             yield publisher.node, publisher.topic, NOBODY, ""
     served = {p.topic for p in publishers}
@@ -88,10 +89,6 @@ def _edges(graph: GraphSnapshot) -> Iterator[Edge]:
 
 def _hidden(topic: str) -> bool:
     return topic in _EVERYWHERE or "/_" in topic
-
-
-def _type_conflict(publisher: Endpoint, taker: Endpoint) -> str:
-    return "" if publisher.type == taker.type else f"types differ: {publisher.type}, {taker.type}"
 
 
 def _drawn(edge: Edge, width: int) -> list[str]:

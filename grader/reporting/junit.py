@@ -25,10 +25,8 @@ _ELEMENTS = {
 def render_junit(report: Report, *, folder: str | None) -> str:
     """Return a report as JUnit XML.
 
-    Args:
-        report: The report.
-        folder: The submission's folder in the repository, POSIX form. None if it is elsewhere: then files have the
-            names they have in the submission.
+    The folder is that of the submission in the repository, POSIX form. None if it is elsewhere: then files have the
+    names they have in the submission.
     """
     root = ET.Element("testsuites", {"name": xml_text(wording.headline(report)), "time": f"{report.duration_s:.3f}"})
     _count(root, [verdict for exercise in report.exercises for verdict in exercise.verdicts])

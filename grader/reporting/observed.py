@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
 
 from grader.core.json_values import JsonObject
 from grader.core.quantities import seconds
-from grader.core.report import Summary, TopicSummary
-from grader.core.trace import Endpoint, Fault, LogRecord, OutputLine
+from grader.core.report import Pace, Summary, TopicSummary
+from grader.core.trace import Endpoint, Fault, LogRecord, Offer, OutputLine
 from grader.reporting.escape import json_value, shown
 from grader.reporting.graph import draw_graph
+from grader.reporting.json_report import start_values
 
 SCHEMA = "grader/observation/v1"
 #: Lines of one kind that the text shows; the rest are counted.
@@ -36,7 +38,9 @@ def _lines(summary: Summary) -> Iterator[str]:
     if summary.graph is not None and len(summary.graph.nodes) > 1:
         yield from _section("Graph", draw_graph(summary.graph, width=WIDTH))
     yield from _section("Log records", _cut(_record(r) for r in summary.records))
-    yield from _section("Other output", _cut(_line(o) for o in summary.lines))
+    yield from _section(
+        "Other output", _cut(f"t = {seconds(o.t_ns):.3f} s {o.stream}: {shown(o.text)}" for o in summary.lines)
+    )
     yield from _section("Faults", (line for fault in summary.faults for line in _fault(fault)))
     yield f"isolation {shown(summary.isolation)}"
 
@@ -96,10 +100,6 @@ def _record(record: LogRecord) -> str:
     return f"t = {seconds(record.t_ns):.3f} s [{shown(record.severity)}] [{shown(record.logger)}]: {shown(record.text)}"
 
 
-def _line(line: OutputLine) -> str:
-    return f"t = {seconds(line.t_ns):.3f} s {line.stream}: {shown(line.text)}"
-
-
 def _fault(fault: Fault) -> Iterator[str]:
     place = f" ({shown(fault.file)}:{fault.line})" if fault.file else ""
     yield f"t = {seconds(fault.t_ns):.3f} s {shown(fault.process)}: {shown(fault.text)}{place}"
@@ -108,72 +108,45 @@ def _fault(fault: Fault) -> Iterator[str]:
 
 def summary_to_json(summary: Summary) -> str:
     """Return a summary as JSON text; times are in seconds."""
-    data: JsonObject = {
+    data: Mapping[str, object] = {
         "schema": SCHEMA,
-        "processes": list(summary.processes),
-        "starts": [
-            {
-                "process": s.process,
-                "file": s.file,
-                "way": s.way.value,
-                "target": s.target or None,
-                "hidden": list(s.hidden),
-            }
-            for s in summary.starts
-        ],
-        "clock": summary.clock.value,
+        "processes": summary.processes,
+        "starts": [start_values(start) for start in summary.starts],
+        "clock": summary.clock,
         "clock_reason": summary.clock_reason or None,
         "duration_s": summary.duration_s,
         "isolation": summary.isolation,
-        "nodes": list(summary.nodes),
+        "nodes": summary.nodes,
         "topics": [_topic_json(topic) for topic in summary.topics],
-        "offers": [{"process": o.process, "kind": o.kind, "name": o.name, "detail": o.detail} for o in summary.offers],
-        "records": [
-            {
-                "t_s": seconds(r.t_ns),
-                "process": r.process,
-                "severity": r.severity,
-                "logger": r.logger,
-                "text": r.text,
-                "file": r.file,
-                "line": r.line,
-            }
-            for r in summary.records
-        ],
-        "lines": [
-            {"t_s": seconds(o.t_ns), "process": o.process, "stream": o.stream, "text": o.text} for o in summary.lines
-        ],
-        "faults": [
-            {
-                "t_s": seconds(f.t_ns),
-                "process": f.process,
-                "kind": f.kind.value,
-                "text": f.text,
-                "file": f.file,
-                "line": f.line,
-                "frames": list(f.frames),
-            }
-            for f in summary.faults
-        ],
-        "notes": list(summary.notes),
+        "offers": [_fields(offer) for offer in summary.offers],
+        "records": [_timed(record) for record in summary.records],
+        "lines": [_timed(line) for line in summary.lines],
+        "faults": [_timed(fault, "exit_code", "signal", "python") for fault in summary.faults],
+        "notes": summary.notes,
     }
     return json.dumps(json_value(data), indent=2, allow_nan=False) + "\n"
 
 
-def _topic_json(topic: TopicSummary) -> JsonObject:
-    pace = topic.pace
+def _timed(observation: LogRecord | OutputLine | Fault, *left_out: str) -> Mapping[str, object]:
+    return {"t_s": seconds(observation.t_ns), **_fields(observation, *left_out)}
+
+
+def _fields(observation: LogRecord | OutputLine | Fault | Offer, *left_out: str) -> Mapping[str, object]:
+    """Return the fields of an observation without its time."""
+    return {name: value for name, value in asdict(observation).items() if name not in ("t_ns", *left_out)}
+
+
+def _topic_json(topic: TopicSummary) -> Mapping[str, object]:
+    pace = asdict(topic.pace) if topic.pace else dict.fromkeys(field.name for field in fields(Pace))
     return {
         "name": topic.name,
-        "types": list(topic.types),
+        "types": topic.types,
         "publishers": [_end_json(e) for e in topic.publishers],
         "subscriptions": [_end_json(e) for e in topic.subscriptions],
         "messages": topic.messages,
         "first_s": topic.first_s,
-        "rate_hz": pace.rate_hz if pace else None,
-        "min_s": pace.min_s if pace else None,
-        "max_s": pace.max_s if pace else None,
-        "std_dev_s": pace.std_dev_s if pace else None,
-        "ranges": {name: list(limits) for name, limits in topic.ranges.items()},
+        **pace,
+        "ranges": topic.ranges,
     }
 
 

@@ -46,13 +46,9 @@ class Page:
             self._out.write("\n")
 
     def put(self, body: Text | str, *, prefix: Text | str = "", style: str = "", indent: int = 4) -> None:
-        """Write a paragraph.
+        """Write a paragraph that is already safe to show.
 
-        Args:
-            body: Text that is already safe to show.
-            prefix: Text before the first line; further lines are indented to its end.
-            style: Style of the body.
-            indent: Indentation of the body when it does not fit beside its prefix.
+        Further lines are indented to the end of the prefix; where the body does not fit beside it, to `indent`.
         """
         head, text = _text(prefix), _text(body, style)
         if head.plain.strip() and self._crowded(text, head.cell_len, indent):

@@ -37,23 +37,14 @@ class CriterionChange:
 
 @dataclass(frozen=True, slots=True)
 class ReportChange:
-    """What changed for one submission.
+    """What changed for one submission."""
 
-    Attributes:
-        name: Display name of the submission.
-        before: Points in the first report, for the exercises compared.
-        before_max: Maximum points in the first report.
-        after: Points in the new report.
-        after_max: Maximum points in the new report.
-        criteria: Changed criteria in the order of the new report, removed ones last.
-    """
-
-    name: str
-    before: float
-    before_max: float
-    after: float
-    after_max: float
-    criteria: tuple[CriterionChange, ...]
+    name: str  # display name of the submission
+    before: float  # points in the first report, for the exercises compared
+    before_max: float  # maximum points in the first report
+    after: float  # points in the new report
+    after_max: float  # maximum points in the new report
+    criteria: tuple[CriterionChange, ...]  # changed criteria in the order of the new report, removed ones last
 
     @property
     def gain(self) -> float:
@@ -69,8 +60,7 @@ class ReportChange:
 def change(name: str, before: ReportData, after: ReportData) -> ReportChange:
     """Compare two JSON reports, for the exercises in the second one.
 
-    Raises:
-        KeyError, TypeError, ValueError: `before` is not a report.
+    Raises KeyError, TypeError or ValueError if `before` is not a report.
     """
     exercises = [e["id"] for e in after["exercises"]]
     old = {key: row for key, row in _standings(before) if key[0] in exercises}
@@ -115,25 +105,16 @@ _OUTCOMES = {"not_met": "not met"}
 
 @dataclass(frozen=True, slots=True)
 class RejudgedResult:
-    """One submission that was judged again, or could not be.
+    """One submission that was judged again, or could not be."""
 
-    Attributes:
-        name: Display name of the submission.
-        problem: Why its evidence cannot be used, on one line; empty if it can.
-        score: Points earned.
-        max_score: Maximum points.
-        code: Exit code for this submission alone.
-        change: Changes since the first report; None if not requested, or without a report to compare with.
-        report: The new report as JSON text; empty if not requested.
-    """
-
-    name: str
-    problem: str = ""
+    name: str  # display name of the submission
+    problem: str = ""  # why its evidence cannot be used, on one line; empty if it can
     score: float = 0.0
     max_score: float = 0.0
-    code: int = 0
+    code: int = 0  # exit code for this submission alone
+    # Changes since the first report; None if not requested, or without a report to compare with
     change: ReportChange | None = None
-    report: str = ""
+    report: str = ""  # the new report as JSON text; empty if not requested
 
 
 def render_results(results: Sequence[RejudgedResult]) -> str:

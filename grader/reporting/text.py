@@ -30,12 +30,9 @@ _GOES_ON = " \\"
 
 
 def render_text(report: Report, *, width: int, colour: bool) -> str:
-    """Return a report as text.
+    """Return a report, all of whose text is treated as hostile, as text of at least 20 columns.
 
-    Args:
-        report: The report; all its text is treated as hostile.
-        width: Columns of the page; at least 20 are used.
-        colour: Whether to colour with ANSI sequences; the text is the same without.
+    Colours are ANSI sequences; the text is the same without.
     """
     page = Page(width=width, colour=colour)
     _head(page, report)

@@ -106,8 +106,13 @@ def opening(report: Report) -> list[str]:
         *warnings(report),
         summary(report),
         *(["Blocked criteria are judged once what they need is met."] if blocked else []),
-        *_capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes"),
+        *notes(report),
     ]
+
+
+def notes(report: Report) -> list[str]:
+    """Return the notes on the whole run; each safe to show as a line of text."""
+    return _capped([f"note: {shown(note)}" for note in report.notes], MOST_NOTES, "notes")
 
 
 def remarks(exercise: ExerciseReport) -> list[str]:
@@ -269,15 +274,10 @@ def whole_points(scores: Sequence[Fraction], max_scores: Sequence[Fraction]) -> 
 
 
 def largest_remainder(shares: Sequence[Fraction], total: int, most: Sequence[int]) -> list[int]:
-    """Return whole numbers close to `shares` that add up to `total`.
+    """Return whole numbers close to `shares`, at least 0 and at most `most`, that add up to `total`.
 
     Each share is rounded down, and the missing points go to the largest remainders, the first of equal ones first. If
-    the rounded shares exceed the total, the smallest remainders lose points.
-
-    Args:
-        shares: Exact values, at least 0.
-        total: At most the sum of `most`.
-        most: Maximum of each row.
+    the rounded shares exceed the total, which is at most the sum of `most`, the smallest remainders lose points.
     """
     found = [min(floor(share), top) for share, top in zip(shares, most, strict=True)]
     by_remainder = sorted(range(len(found)), key=lambda row: (found[row] - shares[row], row))

@@ -22,19 +22,9 @@ def shipped(name: str) -> Path:
     return inside if inside.is_dir() else package.parent / name
 
 
-def shipped_folder() -> Path:
-    """Return the folder of the built-in rubrics and of the /odom recording."""
-    return shipped("rubrics")
-
-
-def shipped_templates() -> Path:
-    """Return the folder of the templates for students."""
-    return shipped("student_template")
-
-
 def builtin_odometry() -> Path:
     """Return the project's own /odom recording."""
-    return shipped_folder() / "odometry"
+    return shipped("rubrics") / "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,21 +38,13 @@ class Header:
 
 
 def builtin_rubrics() -> Mapping[str, Path]:
-    """Return the built-in rubrics: exercise id -> YAML file, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
+    """Return the built-in rubrics as exercise id -> YAML file, ordered by number; raises RubricError without any."""
     return {header.id: header.path for header in builtin_headers()}
 
 
 def builtin_headers() -> tuple[Header, ...]:
-    """Return the headers of the built-in rubrics, in the order of exercise numbers.
-
-    Raises:
-        RubricError: The rubrics are missing from this installation.
-    """
-    folder = shipped_folder()
+    """Return the headers of the built-in rubrics, ordered by exercise number; raises RubricError without any."""
+    folder = shipped("rubrics")
     paths = [path for path in sorted(folder.glob("*.yaml")) if not path.name.endswith(NOTES)]
     if not paths:
         raise RubricError(f"{shown(str(folder), 500)}: expected the built-in rubrics, found none", "install again")

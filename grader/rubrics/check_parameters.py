@@ -15,14 +15,16 @@ from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
 from grader.core.quantities import DurationNs, Hertz, Kind, Least, Unit
-from grader.rubrics.drawing import Fields, SomeLongTime, SomeTime
-from grader.rubrics.stimuli import (
+from grader.rubrics.drawing import (
     Calls,
     CallsOrNever,
     Clients,
+    Fields,
     MessageCases,
     MessageCasesOrNone,
     NumberCases,
+    SomeLongTime,
+    SomeTime,
     TimeOrNever,
 )
 from grader.rubrics.types import (
@@ -90,8 +92,6 @@ _BY_KIND: Mapping[str, object] = {
     "fields": Fields,
 }
 
-_ALIKE: Mapping[str, str] = {}
-
 _PARAMETER = re.compile(r"^ {4}(?P<name>\w+): (?P<meaning>.*)$")
 _HEADING = "Attributes:"
 
@@ -102,11 +102,7 @@ class _Parameters(Shape):
     made: ClassVar[type]
 
     def built(self) -> object:
-        """Return the dataclass that the mapping describes; omitted fields keep their defaults.
-
-        Raises:
-            ValueError: The dataclass itself rejects the values.
-        """
+        """Return the dataclass, with defaults for what is left out; raises ValueError if it rejects the values."""
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
         return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
 
@@ -133,7 +129,7 @@ def _parameters(cls: type) -> type[Shape]:
     return _model(cls, cls.__name__, fields)
 
 
-def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usual: Any) -> type[Shape]:
+def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:
     """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
     Args:
@@ -146,7 +142,7 @@ def part_model(cls: type, name: str, aliases: Mapping[str, str] = _ALIKE, **usua
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
-        key = aliases.get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
+        key = (aliases or {}).get(field.name) or field.name.removesuffix("_ns").removesuffix("_bytes")
         default = usual.get(key, ... if _is_required(field) else field.default)
         words, least = _mark(hints[field.name], str), _mark(hints[field.name], Least)
         minimum: JsonDict | None = {"minimum": least.value} if least and not _mark(hints[field.name], Unit) else None
@@ -211,13 +207,7 @@ def _at_least(least: int, unit: Unit | None, value: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Manual:
-    """The parts of a docstring.
-
-    Attributes:
-        summary: The first paragraph, on one line.
-        details: The other paragraphs before the attributes, one per line.
-        parameters: Attribute -> its meaning, on one line.
-    """
+    """The first paragraph of a docstring, the others, one per line, and the meaning of each attribute."""
 
     summary: str
     details: str

@@ -1,39 +1,57 @@
-"""The parts of a rubric that are drawn from the seed: fields, times, counts, and the order of cases."""
+"""Shapes of stimuli in a rubric file: fields, times and cases, which may be drawn from the seed."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
 from types import GenericAlias
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import Self, TypeAliasType
 
-from grader.core.scenario import AnyOrder, Between, Choose, CountBetween, InOrder, SomeOf, TimeBetween, Written
-from grader.rubrics.types import Duration, LongDuration, MatchingText, Real, Shape, Text, Whole, YesNo, build, wrong
+from grader.core.scenario import (
+    AnyOrder,
+    Between,
+    Choose,
+    CountBetween,
+    FieldSpec,
+    InOrder,
+    JustAbove,
+    JustBelow,
+    ServiceCalls,
+    SomeOf,
+    TimeBetween,
+    Written,
+)
+from grader.rubrics.types import (
+    Choice,
+    Duration,
+    LongDuration,
+    MatchingText,
+    Real,
+    Shape,
+    Text,
+    Topic,
+    Whole,
+    YesNo,
+    build,
+    must,
+    wrong,
+)
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9
 
 
-def rising(low_high: tuple[float, float]) -> tuple[float, float]:
-    """Reject a range that leaves nothing to draw."""
-    if not low_high[0] < low_high[1]:
-        raise wrong("two numbers, the lower one first")
-    return low_high
-
-
-def _decimals(count: int) -> int:
-    if not 0 <= count <= DECIMALS:
-        raise wrong(f"a number of decimals from 0 to {DECIMALS}")
-    return count
+def _rising(low_high: tuple[float, float]) -> bool:
+    return low_high[0] < low_high[1]
 
 
 #: Unlike the numbers of checks, a field may be `.nan` or `.inf`: sensors send them.
 FieldNumber = Annotated[float, Strict()]
 FieldName = Annotated[str, MatchingText("[a-z][A-Za-z0-9_]*", "the name of a field such as data", "data")]
-LowHigh = Annotated[tuple[Real, Real], AfterValidator(rising)]
+LowHigh = Annotated[tuple[Real, Real], must(_rising, "two numbers, the lower one first")]
 Option = Annotated[str, Strict()] | YesNo | Whole | FieldNumber
 
 
@@ -43,7 +61,7 @@ class DrawnFieldShape(Shape):
     between: LowHigh | None = None
     choose: tuple[Option, ...] | None = Field(default=None, min_length=1)
     text: Text | None = None
-    decimals: Annotated[Whole, AfterValidator(_decimals)] = 1
+    decimals: Annotated[Whole, must(lambda n: 0 <= n <= DECIMALS, f"a number of decimals from 0 to {DECIMALS}")] = 1
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -98,28 +116,14 @@ Fields = dict[FieldName, FieldValue]
 CASES = 1_000
 
 
-def _rising(low_high: tuple[int, int]) -> tuple[int, int]:
-    if not low_high[0] < low_high[1]:
-        raise wrong("two of them, the lower one first")
-    return low_high
-
-
-def _some(low_high: tuple[int, int]) -> tuple[int, int]:
-    if not 0 <= low_high[0] < low_high[1] <= CASES:
-        raise wrong(f"two whole numbers from 0 to {CASES:,}, the lower one first")
-    return low_high
-
-
-def _no_fewer_than_0(count: int) -> int:
-    if not 0 <= count <= CASES:
-        raise wrong(f"a whole number from 0 to {CASES:,}")
-    return count
+_TWO = "two of them, the lower one first"
+_TWO_COUNTS = f"two whole numbers from 0 to {CASES:,}, the lower one first"
 
 
 class DrawnTimeShape(Shape):
     """A time that is drawn from the seed."""
 
-    between: Annotated[tuple[Duration, Duration], AfterValidator(_rising)]
+    between: Annotated[tuple[Duration, Duration], must(_rising, _TWO)]
 
     def built(self) -> TimeBetween:
         """Return the time as a scenario holds it."""
@@ -129,13 +133,13 @@ class DrawnTimeShape(Shape):
 class DrawnLongTimeShape(DrawnTimeShape):
     """A time above 0 that is drawn from the seed."""
 
-    between: Annotated[tuple[LongDuration, LongDuration], AfterValidator(_rising)]
+    between: Annotated[tuple[LongDuration, LongDuration], must(_rising, _TWO)]
 
 
 class DrawnCountShape(Shape):
     """A count that is drawn from the seed."""
 
-    between: Annotated[tuple[Whole, Whole], AfterValidator(_some)]
+    between: Annotated[tuple[Whole, Whole], must(lambda pair: 0 <= pair[0] < pair[1] <= CASES, _TWO_COUNTS)]
 
     def built(self) -> CountBetween:
         """Return the count as a scenario holds it."""
@@ -147,6 +151,7 @@ def drawn_or_not(value: object) -> str:
     return "<drawn>" if isinstance(value, Mapping) else "<fixed>"
 
 
+_Count = Annotated[Whole, must(lambda n: 0 <= n <= CASES, f"a whole number from 0 to {CASES:,}")]
 SomeTime = Annotated[
     Annotated[Duration, Tag("<fixed>")] | Annotated[DrawnTimeShape, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
@@ -155,40 +160,40 @@ SomeLongTime = Annotated[
     Discriminator(drawn_or_not),
 ]
 SomeCount = Annotated[
-    Annotated[Whole, AfterValidator(_no_fewer_than_0), Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")],
-    Discriminator(drawn_or_not),
+    Annotated[_Count, Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
 
 
-class InOrderShape(Shape):
+class _CasesShape(Shape):
+    """Cases with an order keyword, whose values are those of a class of the core, in order."""
+
+    made: ClassVar[type]
+
+    def built(self) -> object:
+        """Return the cases as a scenario holds them."""
+        return self.made(*(build(getattr(self, name)) for name in type(self).model_fields))
+
+
+class InOrderShape(_CasesShape):
     """Cases that follow each other as written, wherever among others they come."""
 
+    made = InOrder
     in_order: object
 
-    def built(self) -> InOrder:
-        """Return the cases as a scenario holds them."""
-        return InOrder(build(self.in_order))
 
-
-class SomeOfShape(Shape):
+class SomeOfShape(_CasesShape):
     """A number of cases, each one of those listed, drawn from the seed."""
 
+    made = SomeOf
     some_of: object
     count: SomeCount
 
-    def built(self) -> SomeOf:
-        """Return the cases as a scenario holds them."""
-        return SomeOf(build(self.some_of), build(self.count))
 
-
-class AnyOrderShape(Shape):
+class AnyOrderShape(_CasesShape):
     """Cases that all come, in an order drawn from the seed."""
 
+    made = AnyOrder
     any_order: object
-
-    def built(self) -> AnyOrder:
-        """Return the cases as a scenario holds them."""
-        return AnyOrder(build(self.any_order))
 
 
 _LISTS = ("any_order", "in_order", "some_of")
@@ -210,12 +215,7 @@ def _spelt(value: object) -> object:
 
 
 def cases_model(case: object, name: str) -> object:
-    """Return the model of an entry in a list of cases: one case, or several with an order keyword.
-
-    Args:
-        case: Model of one case.
-        name: Name of the shapes in the JSON Schema.
-    """
+    """Return the model of an entry in a list of cases: one case, or several with an order keyword."""
     listed = (list_of(case), Field(min_length=1))
     in_order = create_model(f"{name}InOrder", __base__=InOrderShape, __doc__=InOrderShape.__doc__, in_order=listed)
     some_of = create_model(f"Some{name}", __base__=SomeOfShape, __doc__=SomeOfShape.__doc__, some_of=listed)
@@ -235,3 +235,117 @@ def _one_of(kinds: Mapping[str, object]) -> object:
 def list_of(case: object) -> Any:
     """Return the type of a list of cases."""
     return GenericAlias(tuple, (case, ...))
+
+
+#: Default of keys that were not chosen in a choice; not a value that a rubric can contain.
+ABSENT: Any = None
+#: Maximum number of concurrent clients, and of calls of each.
+CLIENTS, CALLS = 20, 1_000
+
+
+class DrawnShape(Choice):
+    """A number that depends on the seed or on the student's message type."""
+
+    between: LowHigh = ABSENT
+    just_above: Real = ABSENT
+    just_below: Real = ABSENT
+
+    def built(self) -> Between | JustAbove | JustBelow:
+        """Return the draw as a scenario holds it."""
+        kind, value = self.chosen
+        if kind == "between":
+            return Between(*value)
+        return JustAbove(value) if kind == "just_above" else JustBelow(value)
+
+
+NumberShape = Annotated[
+    Annotated[Real, Tag("<fixed>")] | Annotated[DrawnShape, Tag("<drawn>")], Discriminator(drawn_or_not)
+]
+
+
+def _count_to(most: int) -> AfterValidator:
+    return must(lambda count: 1 <= count <= most, f"a whole number from 1 to {most:,}")
+
+
+_DRAWN_CALLS = must(
+    lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= CALLS,
+    f"two whole numbers from 1 to {CALLS:,}, the lower one first",
+)
+Calls = Annotated[
+    Annotated[Whole, _count_to(CALLS), Tag("<fixed>")] | Annotated[DrawnCountShape, _DRAWN_CALLS, Tag("<drawn>")],
+    Discriminator(drawn_or_not),
+]
+Clients = Annotated[Whole, _count_to(CLIENTS)]
+_NEVER = AfterValidator(lambda value: value or 0)
+TimeOrNever = Annotated[LongDuration | None, _NEVER]
+CallsOrNever = Annotated[Calls | None, _NEVER]
+NumberCases: Any = Annotated[list_of(cases_model(NumberShape, "Numbers")), Field(min_length=1)]
+MessageCasesOrNone: Any = list_of(cases_model(Fields, "Messages"))
+MessageCases: Any = Annotated[MessageCasesOrNone, Field(min_length=1)]
+
+
+class ParameterShape(Shape):
+    """A stimulus: sets or reads a parameter of the student's node; without `node`, of the only one."""
+
+    node: Topic | None = None
+    name: Text
+    set: FieldValue | None = None
+    start: SomeTime = 0
+
+    def built(self) -> ServiceCalls:
+        """Return the equivalent service call."""
+        if self.set is None:
+            return _call(self, "get_parameters", "rcl_interfaces/srv/GetParameters", {"names": (self.name,)})
+        wanted: Mapping[str, FieldSpec] = {"name": self.name, "value": _parameter_value(build(self.set))}
+        return _call(self, "set_parameters", "rcl_interfaces/srv/SetParameters", {"parameters": (wanted,)})
+
+
+class TransitionShape(Shape):
+    """A stimulus: requests a transition of the student's lifecycle node; without `node`, of the only one."""
+
+    node: Topic | None = None
+    to: Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
+    start: SomeTime = 0
+
+    def built(self) -> ServiceCalls:
+        """Return the equivalent service call."""
+        # without a number the label counts; the numbers of shutdown differ from state to state
+        asked: Mapping[str, FieldSpec] = {"transition": {"id": 0, "label": self.to}}
+        return _call(self, "change_state", "lifecycle_msgs/srv/ChangeState", asked)
+
+
+class StateShape(Shape):
+    """A stimulus: asks the student's lifecycle node for its state; without `node`, the only one."""
+
+    node: Topic | None = None
+    start: SomeTime = 0
+
+    def built(self) -> ServiceCalls:
+        """Return the equivalent service call."""
+        return _call(self, "get_state", "lifecycle_msgs/srv/GetState", {})
+
+
+def _call(
+    shape: ParameterShape | TransitionShape | StateShape, service: str, kind: str, request: Mapping[str, FieldSpec]
+) -> ServiceCalls:
+    return ServiceCalls(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=build(shape.start))
+
+
+#: Name and number of each type in rcl_interfaces/msg/ParameterValue; the first element decides that of a list.
+_PARAMETER_FIELDS: tuple[tuple[type, str, int, int], ...] = (
+    (bool, "bool", 1, 6),
+    (int, "integer", 2, 7),
+    (float, "double", 3, 8),
+    (str, "string", 4, 9),
+)
+
+
+def _parameter_value(value: FieldSpec) -> Mapping[str, FieldSpec]:
+    several = isinstance(value, tuple)
+    first = value[0] if isinstance(value, tuple) and value else value
+    for kind, name, number, list_number in _PARAMETER_FIELDS:
+        if isinstance(first, kind):
+            field = f"{name}_array_value" if several else f"{name}_value"
+            return {"type": list_number if several else number, field: value}
+    drawn_text = not isinstance(first, Between)
+    return {"type": 4 if drawn_text else 3, "string_value" if drawn_text else "double_value": value}

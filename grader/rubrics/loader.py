@@ -36,24 +36,19 @@ from grader.rubrics.variants import (
     Draw,
     First,
     VariantOptions,
+    Variants,
     has_variants,
     options_of,
     tried,
-    variants_model,
     varied_digest,
     with_values,
 )
-from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
+from grader.rubrics.yaml_tree import TOP, Mistake, Position, TreePath, YamlSyntaxError, YamlTree, end_of, read_yaml
 from grader.submissions.collected import listed, shown
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
-    """Return the mistakes between the parts of a rubric, each of which is well formed by itself.
-
-    Args:
-        rubric: The rubric.
-        tree: The document it was read from, for places.
-    """
+    """Return the mistakes between the parts of a rubric, each of which is well formed by itself."""
     scenario_ids = [scenario.id for scenario in rubric.scenarios]
     criterion_ids = [criterion.id for criterion in rubric.criteria]
     return [
@@ -73,35 +68,32 @@ def _repeated(names: Sequence[str], path: TreePath, tree: YamlTree, key: str = "
             yield where.mistake(f"expected {what}, found `{shown(name)}` again")
 
 
-def _unknown(name: str, known: Iterable[str], what: str, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+def _unknown(
+    name: str, known: Iterable[str], what: str, path: TreePath, places: Mapping[TreePath, Position]
+) -> Iterator[Mistake]:
     known = list(dict.fromkeys(known))
     if name not in known:
         text = f"expected {what} ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
-        yield tree.values.get(path, TOP).mistake(text, nearest(name, known))
+        yield places.get(path, TOP).mistake(text, nearest(name, known))
 
 
 def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("scenarios", index)
     yield from _repeated(scenario.processes, (*path, "processes"), tree)
     for number, process in enumerate(scenario.processes):
-        yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree)
+        yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree.values)
     yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
+    known, what = scenario.processes, "one of `processes`"
     for number, process in enumerate(scenario.may_exit):
-        yield from _unknown(process, scenario.processes, "one of `processes`", (*path, "may_exit", number), tree)
+        yield from _unknown(process, known, what, (*path, "may_exit", number), tree.values)
     observed: Span = build(scenario.observe)
     for process, start in scenario.start.items():
-        yield from _key_unknown(process, scenario.processes, (*path, "start", process), tree)
+        yield from _unknown(process, known, what, (*path, "start", process), tree.keys)
         yield from _too_late(build(start), observed, (*path, "start", process), tree)
     for number, shape in enumerate(scenario.stimuli):
         stimulus = build(shape)
         yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
         yield from _cut_off(stimulus, observed, (*path, "observe", "duration"), tree)
-
-
-def _key_unknown(name: str, known: Sequence[str], path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    if name not in known:
-        text = f"expected one of `processes` ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
-        yield tree.keys.get(path, TOP).mistake(text, nearest(name, known))
 
 
 def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -130,14 +122,14 @@ def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree)
 def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("criteria", index)
     scenarios = {scenario.id: scenario for scenario in rubric.scenarios}
-    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", (*path, "scenario"), tree)
+    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", (*path, "scenario"), tree.values)
     yield from _needs(criterion, index, rubric, tree)
     name, parameters = criterion.check.chosen
     process = parameters.model_dump(by_alias=True).get("process")
     if isinstance(process, str) and criterion.scenario in scenarios:
         known = scenarios[criterion.scenario].processes
         what = f"a process of the scenario {criterion.scenario}"
-        yield from _unknown(process, known, what, (*path, "check", name, "process"), tree)
+        yield from _unknown(process, known, what, (*path, "check", name, "process"), tree.values)
 
 
 def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
@@ -154,7 +146,7 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
         elif not earlier:
             yield where.mistake(f"expected no needs in the first criterion, found `{need}`")
         else:
-            yield from _unknown(need, earlier, "the id of an earlier criterion", (*path, number), tree)
+            yield from _unknown(need, earlier, "the id of an earlier criterion", (*path, number), tree.values)
 
 
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -170,12 +162,7 @@ MAX_MISTAKES = 10
 
 
 class RubricMistakes(RubricError):  # noqa: N818  named after what it holds
-    """A rubric has mistakes.
-
-    Args:
-        where: The file's name in messages.
-        mistakes: All mistakes; the message lists the first ones.
-    """
+    """A rubric has mistakes; the message lists the first ones."""
 
     def __init__(self, where: str, mistakes: Iterable[Mistake]) -> None:
         self.where = where
@@ -216,7 +203,7 @@ def read_rubric(
     digest = digest_of(content, files)
     if not has_variants(tree):
         return _exercise(path, tree, checks, digest)
-    options = options_of(_validated(path, tree, variants_model()))
+    options = options_of(_validated(path, tree, Variants))
     known = {option.name: option.value(0) for option in options}
     nobodys = _exercise(path, with_values(tree, known), checks, digest)
     for values in tried(options, known) if draw is None or isinstance(draw, First) else ():
@@ -313,10 +300,8 @@ def _content(path: Path) -> bytes:
 
 
 def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
-    before = content[: error.start].decode("utf-8", "replace")
-    column = len(before) - (before.rfind("\n") + 1) + 1
     text = f"expected UTF-8 text, found the byte 0x{content[error.start]:02x}"
-    return Mistake(before.count("\n") + 1, column, text, "save the file as UTF-8")
+    return end_of(content[: error.start].decode("utf-8", "replace")).mistake(text, "save the file as UTF-8")
 
 
 def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:

@@ -52,13 +52,7 @@ def found(value: object) -> str:
 
 
 def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) -> list[Mistake]:
-    """Return every validation error as a mistake with its place.
-
-    Args:
-        error: The error of pydantic.
-        tree: The validated document.
-        model: The model that it was validated with.
-    """
+    """Return every validation error as a mistake with its place."""
     errors = error.errors(include_url=False)
     return [_mistake(one, tree, model) for one in errors if not _follows_from_another(one, errors)]
 

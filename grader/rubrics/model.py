@@ -23,9 +23,8 @@ from grader.core.scenario import (
     Span,
 )
 from grader.rubrics.check_parameters import choice_model, part_model
-from grader.rubrics.drawing import SomeLongTime, list_of
+from grader.rubrics.drawing import ParameterShape, SomeLongTime, StateShape, TransitionShape, list_of
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.stimuli import ParameterShape, StateShape, TransitionShape
 from grader.rubrics.types import (
     CheckFile,
     Choice,
@@ -197,11 +196,7 @@ class RubricShape(Shape):
 
 @lru_cache(maxsize=8)
 def rubric_model(checks: tuple[tuple[str, type], ...]) -> type[RubricShape]:
-    """Return the model of a rubric file whose criteria use these checks.
-
-    Args:
-        checks: Pairs of a check's name and its frozen dataclass, in the order that messages list them.
-    """
+    """Return the model of a rubric file with these checks, in the order in which messages list them."""
     check = choice_model("Check", "The question asked of the trace, by the check's name.", dict(checks))
     criterion = create_model("Criterion", __base__=CriterionShape, __doc__="One row of a rubric.", check=(check, ...))
     criteria = (list_of(criterion), Field(min_length=1))

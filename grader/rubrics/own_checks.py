@@ -30,13 +30,7 @@ _ALONE = "a file of checks may import the standard library, grader and what is i
 
 @dataclass(frozen=True, slots=True)
 class OwnFile:
-    """A check file that a rubric names.
-
-    Attributes:
-        name: As written in the rubric: relative to the rubric, with `/`.
-        path: Its path.
-        content: Its bytes.
-    """
+    """A check file, with its name as written in the rubric: relative to it, with `/`."""
 
     name: str
     path: Path
@@ -64,15 +58,7 @@ def named_files(data: object) -> tuple[str, ...]:
 
 
 def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]:
-    """Run check files, and return their checks by name.
-
-    Args:
-        files: The check files of a rubric.
-        known: Checks whose names are already used.
-
-    Raises:
-        RubricError: A file cannot be imported, or its table holds something that is not a check; one line for each.
-    """
+    """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
         table = _table(file)

@@ -32,11 +32,7 @@ _FREE = {"Criterion": ("title", "hint"), "ScenarioShape": ("shutdown",)}
 
 
 def rubric_schema(checks: Mapping[str, type] = CHECKS) -> JsonSchemaValue:
-    """Return the JSON Schema (2020-12) of rubric files.
-
-    Args:
-        checks: Checks that rubrics may use.
-    """
+    """Return the JSON Schema (2020-12) of rubric files."""
     schema = rubric_model(tuple(checks.items())).model_json_schema(by_alias=True)
     tidy = _tidy(schema)
     tidy["$defs"] = {name: _varying(name, node) for name, node in tidy["$defs"].items()} | {_VARIANT: _REFERENCE}
@@ -90,12 +86,7 @@ def _is_scalar(node: JsonSchemaValue) -> bool:
 
 
 def _tidy(node: object, *, names: bool = False) -> Any:
-    """Remove details of Python: generated titles, and defaults that a rubric could not write.
-
-    Args:
-        node: Part of a schema.
-        names: Whether the keys of `node` are names that a rubric uses, such as `title`, and not schema keywords.
-    """
+    """Remove titles and defaults that describe Python; `names` tells that the keys are names, not schema keywords."""
     if isinstance(node, list):
         return [_tidy(item) for item in node]
     if not isinstance(node, dict):

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
 
 from pydantic import (
+    AfterValidator,
     AllowInfNan,
     BaseModel,
     BeforeValidator,
     ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    PlainValidator,
     Strict,
+    WithJsonSchema,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -30,6 +34,17 @@ from grader.submissions.collected import listed
 def wrong(expected: str, hint: str = "") -> PydanticCustomError:
     """Return an error that states what was expected at a place in a rubric."""
     return PydanticCustomError("rubric", "{expected}", {"expected": expected, "hint": hint})
+
+
+def must(holds: Callable[[Any], bool], expected: str) -> AfterValidator:
+    """Return a validator that rejects the values for which `holds` is false."""
+
+    def check(value: Any) -> Any:
+        if not holds(value):
+            raise wrong(expected)
+        return value
+
+    return AfterValidator(check)
 
 
 class Shape(BaseModel):
@@ -76,13 +91,7 @@ def build(value: object) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class MatchingText:
-    """Marks a text that must match a pattern as a whole.
-
-    Attributes:
-        pattern: Regular expression with the same meaning in Python and JavaScript.
-        expected: What was expected, for messages.
-        example: A matching text.
-    """
+    """Marks a text that must match a pattern, which means the same in Python and in JavaScript, as a whole."""
 
     pattern: str
     expected: str
@@ -132,27 +141,23 @@ class Quantity:
 _POINTS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?|[0-9]{1,9}/[1-9][0-9]{0,8}")
 
 
-class PointsRule:
-    """Marks points: a whole, decimal or common fraction above 0, kept exactly."""
+def _points(value: object) -> Fraction:
+    is_number = isinstance(value, (int, float, str)) and not isinstance(value, bool)
+    text = str(value).replace(" ", "") if is_number else ""
+    if text.startswith("-") or (_POINTS.fullmatch(text) and Fraction(text) == 0):
+        raise wrong("points above 0")
+    if not _POINTS.fullmatch(text):
+        raise wrong("points such as 6, 2.5 or 1/3")
+    return Fraction(text)
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Parse the fraction instead of pydantic's own validation."""
-        return core_schema.no_info_plain_validator_function(self._read)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe points to editors."""
-        fraction = {"type": "string", "pattern": r"^[0-9]+( */ *[1-9][0-9]*|\.[0-9]+)?$", "examples": ["1/3"]}
-        return {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, fraction]}
-
-    @staticmethod
-    def _read(value: object) -> Fraction:
-        is_number = isinstance(value, (int, float, str)) and not isinstance(value, bool)
-        text = str(value).replace(" ", "") if is_number else ""
-        if text.startswith("-") or (_POINTS.fullmatch(text) and Fraction(text) == 0):
-            raise wrong("points above 0")
-        if not _POINTS.fullmatch(text):
-            raise wrong("points such as 6, 2.5 or 1/3")
-        return Fraction(text)
+_FRACTION = {"type": "string", "pattern": r"^[0-9]+( */ *[1-9][0-9]*|\.[0-9]+)?$", "examples": ["1/3"]}
+#: A whole, decimal or common fraction above 0, kept exactly.
+Points = Annotated[
+    Fraction,
+    PlainValidator(_points),
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _FRACTION]}),
+]
 
 
 def _as_text(value: object) -> object:
@@ -196,9 +201,6 @@ YesNo = Annotated[bool, Strict()]
 Duration = Annotated[int, Quantity(Unit("s"))]
 LongDuration = Annotated[int, Quantity(Unit("s"), above_zero=True)]
 Frequency = Annotated[float, Quantity(Unit("Hz"))]
-Size = Annotated[int, Quantity(Unit("B"), above_zero=True)]
-Points = Annotated[Fraction, PointsRule()]
-
 
 _LONGEST_PATTERN = 400
 
@@ -221,23 +223,12 @@ def _pattern(text: str) -> str:
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class _Readable:
-    """Marks a text for readers."""
-
-    example: str
-    is_formula: bool
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check the text after its type."""
-        read = _formula if self.is_formula else _pattern
-        return core_schema.no_info_after_validator_function(read, core_schema.str_schema(strict=True))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the text to editors."""
-        described: JsonSchemaValue = {"type": "string", "examples": [self.example]}
-        return described if self.is_formula else {**described, "format": "regex"}
-
-
-FormulaText = Annotated[str, _Readable("sin(0.1 * n)", is_formula=True)]
-PatternText = Annotated[str, _Readable("[0-9]+", is_formula=False)]
+_StrictText = Annotated[str, Strict()]
+FormulaText = Annotated[
+    _StrictText, AfterValidator(_formula), WithJsonSchema({"type": "string", "examples": ["sin(0.1 * n)"]})
+]
+PatternText = Annotated[
+    _StrictText,
+    AfterValidator(_pattern),
+    WithJsonSchema({"type": "string", "examples": ["[0-9]+"], "format": "regex"}),
+]

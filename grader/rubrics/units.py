@@ -11,12 +11,7 @@ from grader.submissions.collected import listed, shown
 
 
 class QuantityError(ValueError):
-    """A quantity cannot be read.
-
-    Args:
-        expected: What was expected, e.g. ``a duration with its unit, such as `10 s```.
-        hint: One thing to do; empty if nothing is very likely right.
-    """
+    """A quantity cannot be read."""
 
     def __init__(self, expected: str, hint: str = "") -> None:
         super().__init__(expected)
@@ -109,11 +104,12 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         raise QuantityError(f"{kind.noun} of at least 0")
     factor = _factor(found["number"], found["unit"], unit.symbol)
     value = Fraction(found["number"].rstrip(".")) * factor
-    if not kind.whole:
-        return _finite(value, kind)
-    if value.denominator != 1:
+    if kind.whole and value.denominator != 1:
         raise QuantityError(f"a whole number of {kind.whole}")
-    return int(value)
+    try:
+        return int(value) if kind.whole else float(value)
+    except OverflowError:
+        raise QuantityError(f"{kind.noun} that a float can hold") from None
 
 
 def _factor(number: str, written: str, symbol: str) -> Fraction:
@@ -128,13 +124,6 @@ def _factor(number: str, written: str, symbol: str) -> Fraction:
     raise QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
 
 
-def _finite(value: Fraction, kind: _Kind) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        raise QuantityError(f"{kind.noun} that a float can hold") from None
-
-
 def missing_unit(number: str, symbol: str) -> QuantityError:
     """Return the error for a bare number where a quantity in `symbol` is expected."""
     kind = _KINDS[symbol]
@@ -146,12 +135,7 @@ def missing_unit(number: str, symbol: str) -> QuantityError:
 
 
 def format_quantity(value: int | float, unit: Unit) -> str:
-    """Return a quantity in the form that `parse_quantity` reads, without loss.
-
-    Args:
-        value: Nanoseconds for `Unit("s")`, bytes for `Unit("B")`, hertz for `Unit("Hz")`; finite and at least 0.
-        unit: The dimension, named by its base unit.
-    """
+    """Return nanoseconds, bytes or hertz, finite and at least 0, in the form that `parse_quantity` reads."""
     kind = _KINDS[unit.symbol]
     if not kind.whole:
         digits = format(Decimal(repr(float(value))), "f")

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Annotated, Protocol
 
-from pydantic import AfterValidator, ConfigDict, PlainValidator, WithJsonSchema, model_validator
+from pydantic import ConfigDict, PlainValidator, WithJsonSchema, model_validator
 from typing_extensions import Self
 
 from grader.core.exercise import Drawn, Value, Variant
 from grader.rubrics.mistakes import nearest
-from grader.rubrics.types import Id, Shape, wrong
+from grader.rubrics.types import Id, Shape, must, wrong
 from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
 
@@ -65,26 +65,12 @@ _Scalar = Annotated[Value, PlainValidator(_scalar), WithJsonSchema({"type": ["st
 _Amount = Annotated[Value, PlainValidator(_amount), WithJsonSchema({"type": ["string", "number"]})]
 
 
-def _several(values: tuple[Value, ...]) -> tuple[Value, ...]:
-    if len({(type(value), value) for value in values}) < max(2, len(values)):
-        raise wrong("two or more different values")
-    return values
+def _are_several(values: tuple[Value, ...]) -> bool:
+    return len({(type(value), value) for value in values}) >= max(2, len(values))
 
 
-def _two(values: tuple[Value, ...]) -> tuple[Value, ...]:
-    if len(values) != 2:
-        raise wrong("two numbers, the lower one first")
-    return values
-
-
-def _not_empty(variants: dict[str, VariantShape]) -> dict[str, VariantShape]:
-    if not variants:
-        raise wrong("at least one variant")
-    return variants
-
-
-_Choice = Annotated[tuple[_Scalar, ...], AfterValidator(_several)]
-_Pair = Annotated[tuple[_Amount, ...], AfterValidator(_two)]
+_Choice = Annotated[tuple[_Scalar, ...], must(_are_several, "two or more different values")]
+_Pair = Annotated[tuple[_Amount, ...], must(lambda pair: len(pair) == 2, "two numbers, the lower one first")]
 
 
 class VariantShape(Shape):
@@ -122,12 +108,7 @@ def _span(shape: VariantShape) -> tuple[Decimal, Decimal, int, str]:
 
 @dataclass(frozen=True, slots=True)
 class VariantOptions:
-    """The possible values of a variant.
-
-    Attributes:
-        name: Its name.
-        count: Number of values.
-    """
+    """The possible values of a variant."""
 
     name: str
     count: int
@@ -177,11 +158,7 @@ class First:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """The values used in an earlier run, for judging its recording.
-
-    Attributes:
-        drawn: The values.
-    """
+    """The values used in an earlier run, for judging its recording."""
 
     drawn: Drawn
 
@@ -201,22 +178,16 @@ def tried(options: Sequence[VariantOptions], usual: Mapping[str, Value]) -> Iter
         yield from ({**usual, option.name: value} for value in option.tried())
 
 
-class _Variants(Shape):
+class Variants(Shape):
     """A rubric, reduced to its variants."""
 
     model_config = ConfigDict(extra="ignore")
 
-    variants: Annotated[VariantsField, AfterValidator(_not_empty)]
+    variants: Annotated[VariantsField, must(bool, "at least one variant")]
 
 
-def variants_model() -> type[Shape]:
-    """Return the model that validates the variants of a rubric and ignores the rest."""
-    return _Variants
-
-
-def options_of(validated: Shape) -> tuple[VariantOptions, ...]:
-    """Return the possible values of variants in a rubric validated by `variants_model`."""
-    assert isinstance(validated, _Variants)
+def options_of(validated: Variants) -> tuple[VariantOptions, ...]:
+    """Return the possible values of the variants of a rubric."""
     return tuple(
         VariantOptions(name, len(shape.choose) if shape.choose is not None else _span(shape)[2], shape)
         for name, shape in validated.variants.items()

@@ -47,12 +47,16 @@ class Position:
 TOP = Position(1, 1)
 
 
+def end_of(text: str) -> Position:
+    """Return the position after a text from the top of a file."""
+    return Position(text.count("\n") + 1, len(text) - text.rfind("\n"))
+
+
 @dataclass(slots=True)
 class YamlTree:
     """A parsed document.
 
     Attributes:
-        data: Mappings with text keys, lists and scalars.
         values: Position of each value.
         keys: Position of the key of each value in a mapping.
         mistakes: Invalid parts: duplicate keys, keys that are not text, unknown tags.
@@ -73,10 +77,7 @@ class YamlSyntaxError(Exception):
 
 
 def read_yaml(text: str) -> YamlTree:
-    """Parse one YAML 1.2 document.
-
-    Args:
-        text: The document; the caller limits its size.
+    """Parse one YAML 1.2 document, whose size the caller limits; the data of an empty document is None.
 
     Returns:
         The tree; `data` is None for an empty document.
@@ -110,14 +111,11 @@ def _refuse_excess(text: str) -> None:
     for count, event in enumerate(_yaml().parse(text)):
         kind = type(event).__name__
         depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
-        if count > MAX_VALUES:
-            raise YamlSyntaxError(
-                _position(event.start_mark).mistake(f"expected at most {MAX_VALUES} values, found more")
-            )
-        if depth > MAX_DEPTH + 2:  # the stream and the document count as well
-            raise YamlSyntaxError(
-                _position(event.start_mark).mistake(f"expected at most {MAX_DEPTH} levels, found more")
-            )
+        deep = depth > MAX_DEPTH + 2  # the stream and the document count as well
+        if count > MAX_VALUES or deep:
+            limit = f"{MAX_VALUES} values" if count > MAX_VALUES else f"{MAX_DEPTH} levels"
+            where = _position(event.start_mark)
+            raise YamlSyntaxError(where.mistake(f"expected at most {limit}, found more"))
 
 
 def _position(mark: StreamMark | None) -> Position:
@@ -125,12 +123,8 @@ def _position(mark: StreamMark | None) -> Position:
 
 
 def _unreadable_character(text: str, error: ReaderError) -> Mistake:
-    before = text[: error.position]
-    line = before.count("\n") + 1
-    column = len(before) - (before.rfind("\n") + 1) + 1
-    return Mistake(
-        line, column, f"expected text, found the control character {shown(text[error.position : error.position + 1])}"
-    )
+    character = shown(text[error.position : error.position + 1])
+    return end_of(text[: error.position]).mistake(f"expected text, found the control character {character}")
 
 
 def _syntax_mistake(error: MarkedYAMLError) -> Mistake:

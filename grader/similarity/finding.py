@@ -36,11 +36,7 @@ MAX_ALL_BYTES = 2 * MAX_BYTES
 
 
 def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
-    """Read the Python files of a submission, and list those that cannot be compared; never raises for a bad submission.
-
-    Args:
-        path: A folder, an archive or one file.
-    """
+    """Read a submission's Python files, and list those that cannot be compared; a bad submission raises nothing."""
     try:
         with tempfile.TemporaryDirectory() as nothing:  # nothing is written
             return programs_of(collect_submission(str(path), (), Path(nothing)))
@@ -111,12 +107,7 @@ class _File:
 
 
 def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram]) -> Similar:
-    """Find the similar submissions of a class.
-
-    Args:
-        handed: The submissions.
-        given: The files that were handed out.
-    """
+    """Find the similar submissions of a class."""
     as_given = {program.digest for program in given}
     kept = [replace(h, programs=tuple(p for p in h.programs if p.digest not in as_given)) for h in handed]
     files, kept = _prints(kept)
@@ -218,12 +209,12 @@ def _same(handed: Sequence[Handed]) -> list[SameText]:
             if program.text.strip():
                 holders[digest].append((one, program))
     found = [
-        SameText(who[0][1].name, tuple(h for h, _ in who), len({_all_of(h) for h, _ in who}) == 1)
+        SameText(
+            file=who[0][1].name,
+            holders=tuple(h for h, _ in who),
+            whole=len({tuple(sorted(program.digest for program in h.programs)) for h, _ in who}) == 1,
+        )
         for who in holders.values()
         if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
     ]
     return sorted(found, key=lambda same: (-len(same.holders), same.file, same.holders[0].name))
-
-
-def _all_of(handed: Handed) -> tuple[str, ...]:
-    return tuple(sorted(program.digest for program in handed.programs))

@@ -17,13 +17,7 @@ Lines = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class ComparedProgram:
-    """One Python file.
-
-    Attributes:
-        name: Path inside the submission.
-        text: Its text, with line feeds as line ends.
-        digest: Digest of its original bytes.
-    """
+    """One Python file: its path inside the submission, its text with line feeds, and the digest of its bytes."""
 
     name: str
     text: str
@@ -35,12 +29,9 @@ class Handed:
     """The programs of one submission.
 
     Attributes:
-        name: Unique name of the submission.
-        label: Name for display.
         programs: Its Python files that can be compared.
         passed_over: Files that cannot be compared, and why; one sentence each.
         own: Names of other submissions by the same person, which are not compared with it.
-        reported: Whether it has a report to link to.
     """
 
     name: str
@@ -56,7 +47,6 @@ class Side:
     """One file of a pair.
 
     Attributes:
-        program: The file.
         share: How much of its own code is in the other file too, 0 to 1; own is what is left without the given code and
             the common code.
         alike: Lines whose code is also in the other file.
@@ -69,13 +59,7 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """Two similar files.
-
-    Attributes:
-        left: The file of the first submission.
-        right: The file of the second.
-        overlap: Number of common characters, with all names shortened to one.
-    """
+    """Two similar files; the overlap counts common characters, with all names shortened to one."""
 
     left: Side
     right: Side
@@ -108,13 +92,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class SameText:
-    """Submissions with the same file, byte for byte.
-
-    Attributes:
-        file: A name of the file.
-        holders: The submissions, in their order.
-        whole: Whether all of their files are the same.
-    """
+    """Submissions with the same file, byte for byte; `whole` if all of their files are the same."""
 
     file: str
     holders: tuple[Handed, ...]
@@ -126,14 +104,10 @@ class Similar:
     """The similar submissions of a class.
 
     Attributes:
-        handed: All submissions, in their order.
         pairs: Similar pairs, the most similar first.
         same: Files handed in more than once, the most frequent first.
         given: Submission and name of each unchanged handed-out file.
         common_from: Code in more submissions than this is ignored as common.
-        threshold: Smallest share of one file's own code for two files to be listed.
-        least_share: Smallest share of the other file's own code.
-        given_files: Names of the handed-out files.
     """
 
     handed: Sequence[Handed]
@@ -162,7 +136,6 @@ class Print:
 
     Attributes:
         pieces: Hash of the piece that begins at each character; comparable only within this process.
-        fingerprint: The library's fingerprint.
         skipped: Number of leading empty lines, which the library skips.
     """
 
@@ -193,11 +166,7 @@ class Overlap:
 
 
 def make_print(text: str) -> Print:
-    """Make the fingerprint of a program from its tokens; the program is never run.
-
-    Raises:
-        TooSlow: It takes longer than any program does.
-    """
+    """Make the fingerprint of a program from its tokens, without running it; raises TooSlow if that takes too long."""
     import numpy as np  # noqa: PLC0415  comes with the library
     from copydetect import CodeFingerprint  # noqa: PLC0415  a heavy, optional library
 

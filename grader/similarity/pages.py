@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -14,7 +14,7 @@ from markupsafe import Markup
 from grader.reporting.class_page.render import REPORT_PAGE, result_link
 from grader.reporting.escape import csv_cell, shown
 from grader.reporting.html.assets import bundle, page_environment
-from grader.similarity.library import Handed, Pair, Side, Similar
+from grader.similarity.library import Handed, Side, Similar
 
 #: Most pairs with a page; further pairs appear only in the table.
 MOST_PAGES = 200
@@ -73,20 +73,17 @@ def render_table(similar: Similar) -> str:
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     for rank, pair in enumerate(similar.pairs):
-        writer.writerows(_pair_rows(pair, f"similarity/{page_name(rank)}" if rank < MOST_PAGES else ""))
+        page = f"similarity/{page_name(rank)}" if rank < MOST_PAGES else ""
+        for one in pair.likenesses:
+            left = _cells(pair.left, one.left.program.name, one.left.share)
+            right = _cells(pair.right, one.right.program.name, one.right.share)
+            writer.writerow(["similar", page, *left, *right, str(one.overlap)])
     for same in similar.same:
         first = same.holders[0]
         for other in same.holders[1:]:
             sides = (*_cells(first, same.file, 1.0), *_cells(other, same.file, 1.0))
             writer.writerow(["identical", "", *sides, ""])
     return text.getvalue()
-
-
-def _pair_rows(pair: Pair, page: str) -> Iterator[list[str]]:
-    for one in pair.likenesses:
-        left = _cells(pair.left, one.left.program.name, one.left.share)
-        right = _cells(pair.right, one.right.program.name, one.right.share)
-        yield ["similar", page, *left, *right, str(one.overlap)]
 
 
 def _cells(handed: Handed, file: str, share: float) -> tuple[str, str, str, str]:

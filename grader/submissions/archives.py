@@ -33,7 +33,7 @@ from grader.submissions.collected import (
     shown,
 )
 
-FILE, FOLDER = "a file", "a folder"
+FILE, FOLDER, LINK = "a file", "a folder", "a link"
 
 REPACK = "pack the folder again with your system's own zip and hand that in"
 HAND_IN_ZIP = "pack the folder with your .py files as a zip"
@@ -47,8 +47,6 @@ class Member:
     Attributes:
         name: Name in the archive, with `/` between the parts and none at the end; may be hostile.
         kind: `FILE`, `FOLDER`, or words for anything else, such as `a link`.
-        size: Size that the archive declares, in bytes.
-        read: Unpacks the member and returns at most the given number of bytes.
     """
 
     name: str
@@ -58,12 +56,7 @@ class Member:
 
 
 class UnusableArchiveError(Exception):
-    """An archive cannot be used; the caller adds its name.
-
-    Args:
-        problem: What was expected and what was found.
-        hint: One thing to do.
-    """
+    """An archive cannot be used; the caller adds its name."""
 
     def __init__(self, problem: str, hint: str = REPACK) -> None:
         super().__init__(problem)
@@ -87,7 +80,7 @@ _PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
 _EXTENDED = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
 # In older versions of Python, tarfile needs quadratic time for such a run.
 _MANY_DIGITS = re.compile(rb"[0-9]{40}")
-_KINDS = {tarfile.LNKTYPE: "a link", tarfile.SYMTYPE: "a link", tarfile.DIRTYPE: FOLDER}
+_KINDS = {tarfile.LNKTYPE: LINK, tarfile.SYMTYPE: LINK, tarfile.DIRTYPE: FOLDER}
 
 
 class _Stream(Protocol):
@@ -117,13 +110,7 @@ def is_tar(head: bytes) -> bool:
 
 
 def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
-    """Return the decompressed data.
-
-    Args:
-        data: The whole compressed file.
-        compression: `gzip`, `bzip2` or `xz`.
-        most: Maximum size of the result, in bytes; nothing is decompressed beyond it.
-        limit: That limit in words.
+    """Return the decompressed data; nothing is decompressed beyond `most` bytes, which is `limit` in words.
 
     Raises:
         UnusableArchiveError: The data is damaged or cut off, or its content is larger than `most`.
@@ -134,11 +121,11 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
         try:
             whole += stream.decompress(data, most - len(whole) + 1)
         except (zlib.error, OSError, lzma.LZMAError, EOFError, ValueError):
-            raise _damaged_tar() from None
+            raise _damaged("tar") from None
         if len(whole) > most:
             raise UnusableArchiveError(f"expected at most {limit}, found more", FEWER)
         if not stream.eof:
-            raise _damaged_tar()
+            raise _damaged("tar")
         data = stream.unused_data.lstrip(b"\0")
         if not data:
             return bytes(whole)
@@ -146,21 +133,13 @@ def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
 
 
 def tar_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of an uncompressed tar archive, in order.
-
-    Args:
-        data: The whole archive.
-        most: Maximum number of members.
-
-    Raises:
-        UnusableArchiveError: The archive is damaged or cut off, has too many members, or uses unusual features.
-    """
+    """Return the members of an uncompressed tar archive in order; raises UnusableArchiveError for more than `most`."""
     places = _places(data, most)
     try:
         with tarfile.open(fileobj=io.BytesIO(data), mode="r:", encoding=_ENCODING, errors=_ERRORS) as archive:
             found = archive.getmembers()
     except (tarfile.TarError, ValueError, OSError, EOFError, OverflowError):
-        raise _damaged_tar() from None
+        raise _damaged("tar") from None
     return [_tar_member(data, info, places) for info in found]
 
 
@@ -182,16 +161,16 @@ def _places(data: bytes, most: int) -> set[tuple[int, int]]:
     while True:
         block = data[at : at + BLOCK]
         if len(block) < BLOCK:
-            raise _damaged_tar()
+            raise _damaged("tar")
         if not any(block):
             return places
         headers += 1
         if headers > 3 * most:  # a member may have two extended headers
-            raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+            raise _too_many(most, "entries")
         at += BLOCK
         size = _size(block)
         if at + size > len(data):
-            raise _damaged_tar()
+            raise _damaged("tar")
         if block[156:157] in _EXTENDED:
             _check_extended(data[at : at + size], pax=block[156:157] in _PAX)
         else:
@@ -203,7 +182,7 @@ def _size(block: bytes) -> int:
     try:
         info = tarfile.TarInfo.frombuf(block, _ENCODING, _ERRORS)
     except (tarfile.HeaderError, ValueError):
-        raise _damaged_tar() from None
+        raise _damaged("tar") from None
     if info.type == tarfile.GNUTYPE_SPARSE or info.size < 0:
         raise _unusual()
     if info.type in _EXTENDED and info.size > MAX_EXTENDED_BYTES:
@@ -223,12 +202,16 @@ def _check_extended(header: bytes, *, pax: bool) -> None:
         length = header[at : at + 8].partition(b" ")[0]
         record = header[at : at + int(length)] if length.isdigit() else b""
         if not record.endswith(b"\n") or b"=" not in record or len(record) != int(length):
-            raise _damaged_tar()
+            raise _damaged("tar")
         at += len(record)
 
 
-def _damaged_tar() -> UnusableArchiveError:
-    return UnusableArchiveError("expected a whole tar archive, found a damaged or incomplete one")
+def _damaged(kind: str) -> UnusableArchiveError:
+    return UnusableArchiveError(f"expected a whole {kind} archive, found a damaged or incomplete one")
+
+
+def _too_many(most: int, what: str) -> UnusableArchiveError:
+    return UnusableArchiveError(f"expected at most {most} {what}, found more", FEWER)
 
 
 def _unusual() -> UnusableArchiveError:
@@ -244,25 +227,17 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, Valu
 
 
 def zip_members(data: bytes, *, most: int) -> list[Member]:
-    """Return the members of a zip archive, in the order of its directory.
-
-    Args:
-        data: The whole archive.
-        most: Maximum number of members.
-
-    Raises:
-        UnusableArchiveError: The archive is damaged, encrypted, uses an uncommon compression, or has too many members.
-    """
+    """Return the members of a zip archive in its order; raises UnusableArchiveError if it is damaged or unusual."""
     # Checked before zipfile creates an object for each member: a few megabytes could become gigabytes.
     if data.count(_DIRECTORY_ENTRY) > most:
-        raise UnusableArchiveError(f"expected at most {most} entries, found more", FEWER)
+        raise _too_many(most, "entries")
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _DAMAGE:
-        raise _damaged_zip() from None
+        raise _damaged("zip") from None
     # Unpacking members that share their bytes could take hours, however small the result.
     if sum(info.compress_size for info in archive.infolist()) > len(data):
-        raise _damaged_zip()
+        raise _damaged("zip")
     return [_zip_member(archive, info) for info in archive.infolist()]
 
 
@@ -278,7 +253,7 @@ def _zip_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Member:
             with archive.open(info) as file:
                 return file.read(most)
         except _DAMAGE:
-            raise _damaged_zip() from None
+            raise _damaged("zip") from None
 
     name = _name(info)
     return Member(name.rstrip("/") or name, _kind(info, name), info.file_size, read)
@@ -297,14 +272,10 @@ def _name(info: zipfile.ZipInfo) -> str:
 def _kind(info: zipfile.ZipInfo, name: str) -> str:
     mode = info.external_attr >> 16
     if stat.S_ISLNK(mode):
-        return "a link"
+        return LINK
     if stat.S_IFMT(mode) and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         return "a device, pipe or socket"
     return FOLDER if name.endswith("/") else FILE
-
-
-def _damaged_zip() -> UnusableArchiveError:
-    return UnusableArchiveError("expected a whole zip archive, found a damaged or incomplete one")
 
 
 #: Largest archive, in bytes.
@@ -340,10 +311,7 @@ _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 
 def archive_kind(head: bytes) -> str | None:
-    """Return the kind of archive or compressed file that begins with these bytes, or None.
-
-    Args:
-        head: The first `HEAD_BYTES` of a file, or all of a shorter one.
+    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None.
 
     Returns:
         `zip`, `tar`, `gzip`, `bzip2` or `xz`, which can be read, or the name of another kind, which cannot.
@@ -358,10 +326,6 @@ def collect_archive(data: bytes, *, where: str) -> Collected:
     """Return the files of an archive.
 
     The same files are skipped as in a folder, so a submission gives the same result packed or not.
-
-    Args:
-        data: The whole archive, at most `MAX_ARCHIVE_BYTES`.
-        where: The archive's name in messages.
 
     Raises:
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could
@@ -391,9 +355,8 @@ def _members(data: bytes) -> list[Member]:
         limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
         data = unpacked(data, kind, most=min(MAX_UNPACKED_BYTES, allowed), limit=limit)
         if not is_tar(data[:HEAD_BYTES]):
-            raise UnusableArchiveError(
-                f"expected a tar archive inside the {kind}, found another kind of file", HAND_IN_ZIP
-            )
+            found = f"expected a tar archive inside the {kind}, found another kind of file"
+            raise UnusableArchiveError(found, HAND_IN_ZIP)
     return tar_members(data, most=MAX_ENTRIES)
 
 
@@ -410,12 +373,10 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
         problem = name_problem(name)
         if problem:
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
-        if is_skipped(name if member.kind != FOLDER else f"{name}/x"):
-            continue
-        if member.kind == FOLDER:
+        if member.kind == FOLDER or is_skipped(name):
             continue
         if member.kind != FILE:
-            hint = "replace it by the file itself" if member.kind == "a link" else REPACK
+            hint = "replace it by the file itself" if member.kind == LINK else REPACK
             raise UnusableArchiveError(f"expected plain files, found {member.kind}: {shown(member.name)}", hint)
         yield name, member
 
@@ -440,9 +401,9 @@ def _without_generated(named: Iterator[tuple[str, Member]], left: LeftOut) -> li
         else:
             left.add(f"it holds {generated[folder]}, so a tool made it", folder)
     if len(kept) > MAX_FILES:
-        raise UnusableArchiveError(f"expected at most {MAX_FILES} files, found more", FEWER)
+        raise _too_many(MAX_FILES, "files")
     if any(name.count("/") > MAX_DEPTH for name, _ in kept):
-        raise UnusableArchiveError(f"expected at most {MAX_DEPTH} folders inside each other, found more", FEWER)
+        raise _too_many(MAX_DEPTH, "folders inside each other")
     twins = collision([name for name, _ in kept])
     if twins is not None:
         found = f"found {shown(twins[0])} and {shown(twins[1])}" if twins[0] != twins[1] else f"found {shown(twins[0])}"

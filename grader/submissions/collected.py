@@ -13,12 +13,7 @@ SHOWN_LENGTH = 80
 
 
 def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
-    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle.
-
-    Args:
-        text: Any text: file names and YAML scalars may hold line breaks, escapes and undecodable bytes.
-        limit: Maximum length of the result, in characters.
-    """
+    """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle."""
     kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
     if len(line) <= limit and len(kept) == len(text):
@@ -32,6 +27,12 @@ def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
     if len(names) == 1:
         return names[0]
     return f"{', '.join(names[:-1])} {conjunction} {names[-1]}"
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first three names as a phrase that ends in `and 2 more`, if there are more."""
+    more = [f"{len(names) - 3} more"] if len(names) > 3 else []
+    return listed([*map(shown, names[:3]), *more], "and")
 
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
@@ -181,12 +182,5 @@ class LeftOut:
 
     def notes(self) -> tuple[str, ...]:
         """Return one sentence per reason, in an order that does not depend on the file system."""
-        return tuple(
-            self._note(reason, sorted(names, key=os.fsencode)) for reason, names in sorted(self.by_reason.items())
-        )
-
-    @staticmethod
-    def _note(reason: str, names: Sequence[str]) -> str:
-        first = [shown(name) for name in names[:3]]
-        more = [f"{len(names) - 3} more"] if len(names) > 3 else []
-        return f"not copied: {listed([*first, *more], 'and')} ({reason})"
+        items = sorted(self.by_reason.items())
+        return tuple(f"not copied: {first_of(sorted(names, key=os.fsencode))} ({reason})" for reason, names in items)

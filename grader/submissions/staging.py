@@ -29,12 +29,7 @@ _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
-    """Read the files of a folder.
-
-    Args:
-        folder: The student's folder.
-        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
-        where: The folder's name in messages.
+    """Read the files of a student's folder; `into`, the destination of the copy, is not part of the submission.
 
     Returns:
         The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out
@@ -65,11 +60,7 @@ def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
 
 
 def read_start(file: Path, most: int, *, where: str) -> bytes:
-    """Return at most `most` bytes from the start of a named file; a link to it is followed.
-
-    Raises:
-        SubmissionError: The file cannot be read, or is not a regular file.
-    """
+    """Return at most `most` bytes from the start of a regular file, or of a link to one; raises SubmissionError."""
     try:
         with os.fdopen(os.open(file, _OPEN_FLAGS & ~os.O_NOFOLLOW), "rb") as opened:
             if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
@@ -166,9 +157,8 @@ class _Walk:
 
 
 def _too_much(where: str, limit: str) -> SubmissionError:
-    return SubmissionError(
-        f"{where}: expected at most {limit}, found more", "name the folder that holds only your work"
-    )
+    hint = "name the folder that holds only your work"
+    return SubmissionError(f"{where}: expected at most {limit}, found more", hint)
 
 
 def _identity(info: os.stat_result) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from grader.core.errors import SubmissionError
 from grader.core.submission import StudentFile, Submission
 from grader.submissions.archives import ARCHIVE_SUFFIXES, HEAD_BYTES, MAX_ARCHIVE_BYTES, archive_kind, collect_archive
-from grader.submissions.collected import MAX_FILE_BYTES, Collected, listed, shown
+from grader.submissions.collected import MAX_FILE_BYTES, Collected, first_of, shown
 from grader.submissions.staging import collect_folder, read_start, write_files
 
 #: Names at least this similar are shown as a possible misspelling.
@@ -50,13 +50,7 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
 
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
-    """Read a submission without writing anything; raises what `stage_submission` raises.
-
-    Args:
-        path: As for `stage_submission`.
-        wanted: As for `stage_submission`.
-        into: Destination of the copy; if it lies in the student's folder, it is not part of the submission.
-    """
+    """Read a submission without writing anything; arguments and errors are those of `stage_submission`."""
     where = shown(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
@@ -65,17 +59,7 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
 
 
 def stage_collected(collected: Collected, path: str, wanted: Sequence[str], into: Path) -> Submission:
-    """Write the files that were read, and find the wanted ones among them.
-
-    Args:
-        collected: The files, read here or on another machine.
-        path: Name of the submission; it need not exist any more.
-        wanted: As for `stage_submission`.
-        into: As for `stage_submission`.
-
-    Raises:
-        HarnessError: The copy cannot be written.
-    """
+    """Write files that were read, here or on another machine, and find the wanted ones; raises HarnessError."""
     digest = write_files(collected, into)
     names = [name for name, _ in collected.files]
     files = {name: _look_for(name, names, wanted) for name in wanted}
@@ -172,9 +156,7 @@ def _nearest_the_top(relative: str) -> tuple[int, bytes]:
 
 
 def _several(file: StudentFile) -> str:
-    others = [shown(name) for name in file.others[:3]]
-    more = [f"{len(file.others) - 3} more"] if len(file.others) > 3 else []
-    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {listed([*others, *more], 'and')}"
+    return f"{shown(file.found or '')} is graded, nearest the top; not graded: {first_of(file.others)}"
 
 
 def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:

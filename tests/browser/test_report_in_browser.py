@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import graded
 import pytest
 
-from grader.reporting.html.assets import shared_assets
+from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
 
 if TYPE_CHECKING:
@@ -82,12 +82,12 @@ def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit: Open, nam
 def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Path) -> None:
     """A class keeps one copy of the scripts."""
     (tmp_path / "assets").mkdir()
-    for name, content in shared_assets().items():
+    for name, content in bundle().files.items():
         (tmp_path / "assets" / name).write_bytes(content)
     page, said, asked = visit(render_html(graded.perfect(), assets="assets"))
     assert all(there for _, there in drawings(page))
     assert said == []
-    assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *shared_assets()}
+    assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *bundle().files}
 
 
 @pytest.mark.parametrize("text", ATTACKS)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from grader.app.request import GradeRequest
+from grader.classroom.grading import ClassRequest
 from grader.classroom.local import Attempt, Task
 from grader.classroom.outputs import Graded
-from grader.classroom.request import ClassRequest
 from grader.classroom.store import ResultStatus, State, unusable_digest
 from grader.classroom.watching import Watcher
 from grader.core.errors import SubmissionError

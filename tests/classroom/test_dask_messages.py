@@ -10,8 +10,8 @@ import pytest
 from dask_samples import CONDITIONS, graded, task
 
 from grader.classroom.cluster.jobs import write_task
-from grader.classroom.cluster.sending import failed, job_for, store_result, terms_of
-from grader.classroom.local import Attempt, Task
+from grader.classroom.cluster.sending import job_for, store_result, terms_of
+from grader.classroom.local import Attempt, Task, failed
 from grader.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
 from grader.classroom.store import State
 from grader.core.errors import HarnessError, RecordingError, RubricError

@@ -9,7 +9,7 @@ import pytest
 from dask_samples import ONE, TWO, FakeClient
 from distributed import Client
 
-from grader.classroom.cluster.worker_pool import WorkerPool
+from grader.classroom.cluster.dispatcher import WorkerPool
 from grader.classroom.messages import Fitness
 from grader.core.errors import EnvironmentFault, HarnessError
 

@@ -34,7 +34,7 @@ from grader.core.trace import (
     StartWay,
     Trace,
 )
-from grader.execution.evidence.shown import encode
+from grader.execution.evidence.recording_file import encode
 from grader.execution.evidence.store import keep
 from grader.judging.judge_run import judge_run
 from grader.reporting.json_report import dumps

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,7 +20,8 @@ from rosbags.rosbag2 import Reader
 from grader.core.errors import EvidenceError
 from grader.core.trace import ClockKind, Delivery, Fault, FaultKind, LogRecord, Mark, Message, Observation, Trace
 from grader.execution.codec import trace_to_json
-from grader.execution.evidence.recording_file import recording_bytes, trace_of
+from grader.execution.evidence.packed import unpack
+from grader.execution.evidence.recording_file import packed_trace, recording_bytes, trace_of
 
 FACTS = {"environment": '{"ros_distro": "jazzy"}', "format": "x", "seed": "7"}
 
@@ -51,14 +53,14 @@ def test_every_kind_of_observation_is_tried() -> None:
 @given(TRACES)
 def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
     """Bytes of messages included, whatever a student's text or message holds."""
-    assert as_text(trace_of(kept(trace), wire=True)) == as_text(trace)
+    assert as_text(trace_of(kept(trace))) == as_text(trace)
 
 
 @settings(deadline=None)
 @given(TRACES)
 def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
     """The quick way gives what the exact way gives."""
-    quick = json.loads(as_text(trace_of(kept(trace))))
+    quick = json.loads(as_text(unpack(packed_trace(kept(trace)))))
     exact = json.loads(as_text(trace))
     for row in exact["observations"]:
         if row[0] in ("message", "delivery", "request", "response"):
@@ -144,7 +146,7 @@ def test_what_other_tools_cannot_read_is_told_apart(message: Message) -> None:
     told = texts(trace, "/grader/undecoded")
     shown = [(row["topic"], row["type"], row["publisher"]) for row in told]
     assert shown == [(message.topic, message.type, "student")]
-    assert as_text(trace_of(kept(trace), wire=True)) == as_text(trace)
+    assert as_text(trace_of(kept(trace))) == as_text(trace)
 
 
 def test_a_number_that_the_grader_published_can_be_read() -> None:
@@ -182,12 +184,12 @@ WHOLE = kept(Trace("s", ClockKind.VIRTUAL, 10, tuple(twist_message(i) for i in r
 def test_damage_is_refused_or_harmless(at: int, other: bytes, cut: bool) -> None:
     """Whatever stands in a file, the answer is EvidenceError or a trace, never a crash."""
     damaged = WHOLE[:at] if cut else WHOLE[:at] + other + WHOLE[at + len(other) :]
-    for wire in (False, True):
-        assert isinstance(trace_or_problem(damaged, wire=wire), (Trace, EvidenceError))
+    for read in (trace_of, lambda recording: unpack(packed_trace(recording))):
+        assert isinstance(trace_or_problem(damaged, read), (Trace, EvidenceError))
 
 
-def trace_or_problem(recording: bytes, *, wire: bool) -> Trace | EvidenceError:
+def trace_or_problem(recording: bytes, read: Callable[[bytes], Trace]) -> Trace | EvidenceError:
     try:
-        return trace_of(recording, wire=wire)
+        return read(recording)
     except EvidenceError as error:
         return error

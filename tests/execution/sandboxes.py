@@ -17,11 +17,12 @@ from typing import Any
 
 import grader
 from grader.core.errors import EnvironmentFault
+from grader.core.limits import Limits
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.bubblewrap import Bubblewrap
 from grader.execution.sandbox.environment import runtime_environment
 from grader.execution.sandbox.exposure import closed_folders, view_of, worker_view
-from grader.execution.sandbox.protocol import Command, Isolation, Limits, StudentProcess
+from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess
 from grader.execution.sandbox.tiers import FlatBubblewrap, Landlock, isolation_from_name
 
 HOST = Path(grader.__file__).resolve().parent / "student_host"

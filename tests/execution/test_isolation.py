@@ -21,9 +21,10 @@ from sandboxes import HOST, Sandbox, close, finish, make_submission, start, wall
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.limits import Limits
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox.bubblewrap import Bubblewrap
-from grader.execution.sandbox.protocol import Limits, StudentProcess
+from grader.execution.sandbox.protocol import StudentProcess
 
 pytestmark = pytest.mark.sandbox
 

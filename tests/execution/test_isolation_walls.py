@@ -17,9 +17,10 @@ from sandboxes import HOST, Sandbox, close, make_submission, start, walls
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
+from grader.core.limits import Limits
 from grader.execution.ros_installation import RosInstallation, find_ros
 from grader.execution.sandbox import seccomp as seccomp_flat
-from grader.execution.sandbox.protocol import Limits, StudentProcess
+from grader.execution.sandbox.protocol import StudentProcess
 from grader.execution.sandbox.start import OUTGROWN, SPARE
 from grader.execution.sandbox.tiers import Landlock
 
@@ -203,7 +204,7 @@ def test_where_landlock_has_no_say_over_signals_the_filter_has(
     ros: RosInstallation, submission: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Older kernels: a process reaches itself and its group, and nobody else."""
-    monkeypatch.setattr("grader.execution.sandbox.starting.WITH_SIGNALS", 99)
+    monkeypatch.setattr("grader.execution.sandbox.tiers.WITH_SIGNALS", 99)
     found = walls("landlock", ros, submission)
     if isinstance(found, str):
         pytest.skip(found)

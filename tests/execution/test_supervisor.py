@@ -58,7 +58,9 @@ for command in line.makefile("r"):
         found = trace(asked["plan"], f"plan {plans}")
         text = told[min(plans, len(told) - 1)]
         plans += 1
-        found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, []]] if text else []
+        unexplained = text[9:] if text.startswith("ended by") and "limit" not in text else ""
+        details = [None, unexplained, None]
+        found["observations"] = [["fault", 0, "a.py", "killed", text, "", 0, [], details]] if text else []
         said = json.dumps({"trace": found}).encode()
     elif behaviour == "is worn":
         said = json.dumps({"trace": trace(asked["plan"], f"worker {number}"), "worn": True}).encode()

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from grader.mutation.operators.mutants import OPERATORS, Mutant, mutants_of
+from grader.mutation.operators.mutants import OPERATORS, mutants_of
+from grader.mutation.operators.program import Candidate
 from grader.mutation.results import one_line_change
 
 #: A program with a publisher, a subscription and a timer.
@@ -145,7 +146,7 @@ CASES = {
 }
 
 
-def made(name: str, source: str) -> tuple[Mutant, ...]:
+def made(name: str, source: str) -> tuple[Candidate, ...]:
     """Return what one operator makes of a program."""
     return mutants_of(source, "node.py", {name: OPERATORS[name]})
 

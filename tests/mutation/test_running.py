@@ -12,7 +12,8 @@ from click.testing import CliRunner
 
 from grader.cli.main import app
 from grader.core.errors import RubricError
-from grader.mutation.running import Candidate, SelftestOptions, _sampled, _sources, selftest
+from grader.mutation.operators.program import Candidate
+from grader.mutation.running import SelftestOptions, _sampled, _sources, selftest
 from grader.rubrics.builtin import builtin_rubrics
 from grader.rubrics.loader import read_rubric
 from grader.submissions.submission import stage_submission

@@ -99,7 +99,7 @@ def test_variants_are_named_by_file_and_rewriter() -> None:
 
 def test_a_program_that_gives_nothing_to_vary_has_no_variants() -> None:
     """Except for the ends of its lines."""
-    assert [variant.name for variant in variants_of("print(1)\n", "a.py")] == ["windows_lines"]
+    assert [variant.operator for variant in variants_of("print(1)\n", "a.py")] == ["windows_lines"]
 
 
 def test_fields_of_messages_and_imports_keep_their_names() -> None:

@@ -12,8 +12,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from grader.app.evidence_writer import request_of
-from grader.app.request import command_words
+from grader.app.request import command_words, request_of
 from grader.core.exercise import Exercise
 from grader.core.report import Report
 from grader.execution.evidence import manifest as kept

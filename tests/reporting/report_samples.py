@@ -1,6 +1,9 @@
 """Sample reports, built in code, that every renderer is tried on."""
 
+import json
 from fractions import Fraction
+from importlib.resources import files
+from typing import Any
 
 from grader.core.checkup import PROPERTIES, Property
 from grader.core.exercise import Location, Outcome
@@ -314,3 +317,9 @@ SAMPLES = {
     "partial": partial,
     "hostile": hostile,
 }
+
+
+def report_schema() -> dict[str, Any]:
+    """Return the JSON Schema of reports that the package holds."""
+    schema: dict[str, Any] = json.loads((files("grader.reporting") / "report.schema.json").read_text(encoding="utf-8"))
+    return schema

@@ -10,12 +10,12 @@ import pytest
 from report_samples import criterion, endpoint, exercise, hostile, report
 
 from grader.core.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
-from grader.core.exercise import Audience, Feedback, Location, Outcome, Shows
+from grader.core.exercise import Audience, Feedback, Location, Outcome, Problem, ProblemKind, Shows
 from grader.core.report import Report, ReportedFault, Reproduction
 from grader.core.trace import ClockKind, GraphSnapshot
 from grader.reporting.audience import Readers, for_student, told, withholds
 from grader.reporting.formats import FORMATS, PageLayout, rendered
-from grader.reporting.surroundings import COMMIT_DATETIME, VARIABLES
+from grader.reporting.platforms.classroom50 import COMMIT_DATETIME, VARIABLES
 
 LAYOUT = PageLayout(width=100, colour=False)
 BEFORE, AFTER = "2026-12-01", "2026-12-02"
@@ -46,6 +46,7 @@ def sample(shown: Shows = Shows.NOTHING, until: str = BEFORE, clock: ClockKind =
         "hint": f"{SECRET} {NUMBER}",
         "location": Location(f"{SECRET}.py", 7357),
         "evidence": {SECRET: NUMBER, "rate_hz": 7357.5},
+        "problem": Problem(ProblemKind.STOPPED, (f"/{SECRET}_{NUMBER}",), SECRET),
     }
     title = f"{SECRET} title" if shown is Shows.NOTHING else "Closed"
     return report(
@@ -63,6 +64,7 @@ def sample(shown: Shows = Shows.NOTHING, until: str = BEFORE, clock: ClockKind =
                 hint=f"the period is 1/{NUMBER}; use a timer",
                 location=Location("pump.py", 17),
                 evidence={"rate_hz": 7357.25},
+                problem=Problem(ProblemKind.STOPPED, (f"/{SECRET}_{NUMBER}",), SECRET),
             ),
             criterion(secret_id, title, 20, Outcome.NOT_MET, **told_all),
             criterion("needs", "Needs it", 4, Outcome.BLOCKED, **needs),

@@ -13,7 +13,7 @@ from grader.core.errors import GraderError
 from grader.reporting import delivery
 from grader.reporting.delivery import Output, deliver, early_delivery, prepared
 from grader.reporting.formats import FORMATS
-from grader.reporting.surroundings import VARIABLES
+from grader.reporting.platforms.classroom50 import VARIABLES
 
 HANDED_IN = {
     **dict.fromkeys(VARIABLES.values(), "x"),

@@ -28,7 +28,7 @@ from report_samples import (
 
 from grader.core.chart import Chart, Excerpt, GraphFigure, Moment, Panel, Series, Stage
 from grader.core.report import Report, Reproduction
-from grader.reporting.html.assets import bundle, shared_assets
+from grader.reporting.html.assets import bundle
 from grader.reporting.html.render import render_html
 
 MARKUP = (
@@ -152,7 +152,7 @@ def test_nothing_is_loaded_from_elsewhere(assets: str | None) -> None:
     page = Page(render_html(pictured(), assets=assets))
     loading = {"src", "href", "action", "data", "poster", "srcset", "formaction", "ping", "background"}
     addresses = {value for _, name, value in page.attributes if name in loading}
-    beside = {f"../assets/{name}" for name in shared_assets()} if assets else set()
+    beside = {f"../assets/{name}" for name in bundle().files} if assets else set()
     assert {a for a in addresses if not a.startswith("#")} == beside
     assert "@import" not in bundle().style
     assert "url(" not in bundle().style
@@ -241,7 +241,7 @@ def test_shared_files_keep_a_class_small() -> None:
     """A page that links to them is small; their names change with their content."""
     page = render_html(pictured(), assets="assets")
     assert len(page) < 60_000
-    for name, content in shared_assets().items():
+    for name, content in bundle().files.items():
         assert f"assets/{name}" in page
         assert hashlib.sha256(content).hexdigest()[:12] in name
 

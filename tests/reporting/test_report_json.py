@@ -13,11 +13,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema.validators import Draft202012Validator
-from report_samples import NASTY, SAMPLES, criterion, exercise, hostile, middling, perfect, report, undecided
+from report_samples import (
+    NASTY,
+    SAMPLES,
+    criterion,
+    exercise,
+    hostile,
+    middling,
+    perfect,
+    report,
+    report_schema,
+    undecided,
+)
 
-from grader.core.exercise import Outcome
+from grader.core.exercise import Outcome, Problem, ProblemKind
 from grader.core.trace import Start, StartWay
-from grader.reporting.json_report import dumps, report_schema, report_to_json
+from grader.reporting.json_report import dumps, report_to_json
 
 
 def validator() -> Draft202012Validator:
@@ -144,6 +155,17 @@ def test_how_files_were_started_is_told_where_it_is_known() -> None:
     ]
     dumps(report(exercise("e", "1", "E", criterion("c", "C", 1), starts=starts))).encode()
     assert "starts" not in report_to_json(middling())["exercises"][0]
+
+
+def test_the_problem_is_told_where_a_check_names_one() -> None:
+    """Its kind and topics, without the numbers that diagnosis needs."""
+    problem = Problem(ProblemKind.STOPPED, ("/temperature",), start=7357)
+    verdicts = [criterion("a", "A", 2, Outcome.NOT_MET, problem=problem), criterion("b", "B", 2, Outcome.NOT_MET)]
+    data = report_to_json(report(exercise("e", "1", "E", *verdicts)))
+    validator().validate(data)
+    first, second = data["exercises"][0]["criteria"]
+    assert first["problem"] == {"kind": "stopped", "topics": ["/temperature"], "detail": None}
+    assert "problem" not in second
 
 
 def test_faults_carry_seconds() -> None:

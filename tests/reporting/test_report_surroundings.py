@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from grader.core.errors import GraderError
-from grader.reporting.surroundings import VARIABLES, handed_in, repository_folder
+from grader.reporting.formats import repository_folder
+from grader.reporting.platforms.classroom50 import VARIABLES, handed_in
 
 CLASSROOM = {
     **{name: f"the {field}" for field, name in VARIABLES.items()},

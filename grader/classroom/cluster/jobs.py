@@ -16,7 +16,7 @@ from distributed import Worker, get_worker
 
 import grader
 from grader.classroom import store as kept
-from grader.classroom.local import Attempt, LocalScheduler, Task
+from grader.classroom.local import AGAIN, Attempt, LocalScheduler, Task
 from grader.classroom.messages import (
     MAX_ANSWER_BYTES,
     Files,
@@ -35,20 +35,15 @@ from grader.execution.ros_installation import find_ros
 from grader.execution.sandbox.choose import TierChoice, choose_isolation
 from grader.execution.temp_dirs import scratch_folder
 
-_AGAIN = "run the same command again"
-
 
 def fitness(isolation: str, machine: str) -> Fitness:
-    """Find out whether this machine can grade in the requested sandbox.
-
-    Args:
-        isolation: As for one submission.
-        machine: Name of this machine in messages.
-    """
+    """Find out whether this machine can grade in the requested sandbox."""
     try:
         choice = choose_isolation(isolation, find_ros())
     except EnvironmentFault as fault:
         return Fitness(machine, fault.message, fault.hint)
+    except Exception as error:  # any failure makes this machine unfit, but not the others
+        return Fitness(machine, f"the grader failed: {type(error).__name__}: {error}")
     name = choice.isolation.name
     remarks = [f"sandbox {name}: {found}" for found in missing(choice.containment)]
     if _one_at_a_time(choice):
@@ -57,14 +52,7 @@ def fitness(isolation: str, machine: str) -> Fitness:
 
 
 def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[str], None]) -> JobResult:
-    """Grade a submission in its own process, in a sandbox chosen on this machine.
-
-    Args:
-        terms: What the class is graded with.
-        job: The submission.
-        machine: Name of this machine in messages.
-        on_step: Called when a step begins; an exception from it aborts the grading.
-    """
+    """Grade a submission in its own process, in a sandbox chosen here; an exception of `on_step` aborts it."""
     try:
         choice = choose_isolation(terms.conditions.isolation, find_ros())
     except EnvironmentFault as fault:
@@ -97,7 +85,7 @@ def _status_with_machine(attempt: Attempt, machine: str) -> ResultStatus:
     return replace(status, problem=f"{machine}: {status.problem}")
 
 
-def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
+def failure(machine: str, problem: str, hint: str = AGAIN) -> JobResult:
     """Build the answer for a failure of this machine, which never counts as a mark."""
     return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
@@ -105,10 +93,8 @@ def failure(machine: str, problem: str, hint: str = _AGAIN) -> JobResult:
 def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
     """Write the received files into an empty folder, and return the task to grade them.
 
-    Files keep the relative paths of the sending machine, so that reports name them the same.
-
-    Raises:
-        HarnessError: A path points outside of the folder.
+    Files keep the relative paths of the sending machine, so that reports name them the same. Raises HarnessError for a
+    path that points outside of the folder.
     """
     start = _start(terms, scratch)
     start.mkdir(parents=True)
@@ -178,23 +164,14 @@ class _UnwantedError(Exception):
 
 
 async def inspect(isolation: str, dask_worker: Worker) -> bytes:
-    """Report whether this worker can grade, as a packed `Fitness`.
-
-    Args:
-        isolation: The requested sandbox.
-        dask_worker: This worker; Dask supplies it because of the parameter's name.
-    """
-    return pack(await asyncio.to_thread(_fitness, isolation, _machine(dask_worker)))
+    """Report whether this worker can grade, as a packed `Fitness`; Dask supplies it because of the parameter's name."""
+    return pack(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
 
 
 def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
     """Grade a submission, and return a packed `JobResult`.
 
-    Args:
-        version: The grader's version on the requesting machine.
-        terms: Packed `Terms` of the class.
-        job: Packed `GradingJob`.
-        topic: Topic for progress events.
+    The version is that of the requesting machine, terms and job are packed, and events of progress go to the topic.
     """
     worker = get_worker()
     machine = _machine(worker)
@@ -227,13 +204,6 @@ def other_version(wanted: str, found: str) -> str:
 def remedy(version: str) -> str:
     """Return the hint that fixes a wrong version."""
     return f"install it there: pip install 'rclpy-grader[dask]=={version}'"
-
-
-def _fitness(isolation: str, machine: str) -> Fitness:
-    try:
-        return fitness(isolation, machine)
-    except Exception as error:  # any failure makes this machine unfit, but not the others
-        return Fitness(machine, f"the grader failed: {type(error).__name__}: {error}")
 
 
 def _machine(worker: Worker) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from grader.app.grade import read_exercises, wanted_files
 from grader.app.request import GradeRequest
 from grader.classroom import store as kept
-from grader.classroom.local import Attempt, Task
+from grader.classroom.local import Attempt, Task, failed
 from grader.classroom.messages import (
     Files,
     GradingJob,
@@ -23,14 +23,13 @@ from grader.classroom.messages import (
     unpack,
     write_answer,
 )
-from grader.classroom.store import ResultStatus, State, unusable_digest
+from grader.classroom.store import State, refused
 from grader.classroom.worker import PARTS
 from grader.core.errors import HarnessError, RecordingError, RubricError, SubmissionError
 from grader.rubrics.loader import own_check_files
 from grader.rubrics.variants import First
 from grader.submissions.submission import collect_submission
 
-AGAIN = "run the same command again"
 _PARTS = frozenset(PARTS)
 
 
@@ -62,19 +61,12 @@ def files_wanted(task: Task) -> Sequence[str]:
 
 
 def job_for(task: Task, wanted: Sequence[str]) -> GradingJob | Attempt:
-    """Pack a submission for the cluster, or return an attempt at once if it cannot be used.
-
-    Args:
-        task: The submission.
-        wanted: Names of the required files.
-    """
+    """Pack a submission for the cluster, or return an attempt at once if it cannot be used."""
     try:
         with tempfile.TemporaryDirectory() as nowhere:
             collected = collect_submission(str(task.submission), wanted, Path(nowhere))
     except SubmissionError as error:
-        digest = unusable_digest(error)
-        key = task.conditions.key(digest)
-        return Attempt(task, ResultStatus(State.REFUSED, key, digest, task.label, error.message, error.hint))
+        return Attempt(task, refused(task.label, task.conditions, error))
     except (OSError, MemoryError, RecursionError) as error:
         return failed(task, f"the submission cannot be read: {type(error).__name__}")
     return GradingJob(
@@ -114,11 +106,6 @@ def answer_in(data: object, machine: str) -> JobResult:
     except HarnessError:
         pass
     return JobResult(machine)
-
-
-def failed(task: Task, problem: str, hint: str = AGAIN) -> Attempt:
-    """Build a failed attempt, which is never the student's fault."""
-    return Attempt(task, ResultStatus(State.FAILED, "", "", task.label, problem, hint))
 
 
 def _content(path: Path) -> bytes:

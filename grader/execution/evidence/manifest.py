@@ -54,13 +54,7 @@ def is_recording(folder: Path) -> bool:
 
 
 def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> None:
-    """Raise EvidenceError if writing would replace a file that the grader did not write.
-
-    Args:
-        folder: The folder for the evidence; may not exist yet.
-        names: The files to write.
-        own: The files that the folder's manifest lists.
-    """
+    """Raise EvidenceError if writing would replace a file that the folder's manifest does not list as `own`."""
     known = set(own)
     for name in names:
         path = folder / name
@@ -73,11 +67,7 @@ def refuse_foreign(folder: Path, names: Iterable[str], own: Iterable[str]) -> No
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files, each atomically.
-
-    Raises:
-        EvidenceError: One cannot be written.
-    """
+    """Write files, each atomically; raises EvidenceError if one cannot be written."""
     for name, data in files.items():
         path = folder / name
         try:
@@ -98,11 +88,7 @@ def remove(folder: Path, names: Iterable[str]) -> None:
 
 
 def read(path: Path, most: int) -> bytes:
-    """Read a regular file without following links.
-
-    Raises:
-        EvidenceError: It is missing, not a regular file, not readable, or longer than `most` bytes.
-    """
+    """Read a regular file of at most `most` bytes without following links; raises EvidenceError for anything else."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(descriptor, "rb") as file:
@@ -153,21 +139,14 @@ class KeptSubmission(_Strict, frozen=True):
 
 
 class KeptRecording(_Strict, frozen=True):
-    """One scenario's recording.
-
-    Attributes:
-        scenario: Scenario id.
-        asked: Digest of the scenario as the rubric described it.
-        digest: `sha256:` of the file; None if the scenario was not recorded because a student's file is missing.
-        at: Offset of the packed trace in the file, in bytes.
-        size: Size of the packed trace, in bytes.
-    """
+    """One scenario's recording."""
 
     scenario: str
-    asked: str
+    asked: str  # digest of the scenario as the rubric described it
+    # `sha256:` of the file; None if the scenario was not recorded because a student's file is missing
     digest: str | None = None
-    at: int = 0
-    size: int = 0
+    at: int = 0  # offset of the packed trace in the file, in bytes
+    size: int = 0  # size of the packed trace, in bytes
 
 
 class KeptExercise(_Strict, frozen=True):
@@ -208,11 +187,7 @@ def dump(manifest: Manifest) -> bytes:
 
 
 def parse(data: bytes) -> Manifest:
-    """Parse a manifest.
-
-    Raises:
-        EvidenceError: The text is not a manifest, or has another version.
-    """
+    """Parse a manifest; raises EvidenceError if the text is none, or has another version."""
     try:
         found = json.loads(data)
         version = found.get("format") if isinstance(found, dict) else None

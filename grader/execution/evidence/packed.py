@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -19,7 +18,6 @@ from grader.core.trace import (
     Delivery,
     Endpoint,
     Fault,
-    FaultKind,
     GraphSnapshot,
     LogRecord,
     Mark,
@@ -42,11 +40,7 @@ _decode = msgspec.json.Decoder(dict[str, Any]).decode
 
 
 class Fields(Mapping[str, Any]):
-    """A mapping that is decoded on each access, because most of a trace is never read.
-
-    Args:
-        text: A JSON object in ASCII with valid syntax.
-    """
+    """A JSON object in ASCII that is decoded on each access, because most of a trace is never read."""
 
     __slots__ = ("_text",)
 
@@ -85,10 +79,8 @@ def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
 
 #: Exit code, signal and Python version of a fault, as `Fault` has them.
 _FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
-# The texts of faults in recordings without these details.
-_EXITED = re.compile(r"exited with code (-?\d{1,9})")
-_KILLED = re.compile(r"ended by (SIG[A-Z0-9]+|signal \d+)")
-_PYTHON = re.compile(r"\(read by Python (\d{1,3})\.(\d{1,3})\)")
+# Early recordings of version 1 do not have them.
+_NO_DETAILS: _FaultDetails = (None, "", None)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 #: Placeholder for bytes that are a message of the recording.
 THERE = "*"
@@ -110,11 +102,8 @@ def _lively(value: Any) -> Any:
 def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: Any) -> Any:
     """Create the struct that validates a packed dataclass: a list of its fields, after its tag if it has one.
 
-    Args:
-        kind: The dataclass.
-        left_out: Fields that are not written, or written in another way.
-        last: Name, type and default of an optional field at the end.
-        others: Types of fields that are written as another type.
+    Fields are left out that are not written, or written in another way; others are written as another type. The last
+    one is name, type and default of an optional field at the end.
     """
     hints = {**get_type_hints(kind), **others}
     fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]
@@ -183,22 +172,7 @@ def _graph(row: Any) -> GraphSnapshot:
 
 def _fault(row: Any) -> Fault:
     *values, details = msgspec.structs.astuple(row)
-    return Fault(*values, *(_details_from_text(row.kind, row.text) if details is msgspec.UNSET else details))
-
-
-def _details_from_text(kind: FaultKind, text: str) -> _FaultDetails:
-    """Return exit code, signal and Python version of a fault whose recording has only the text.
-
-    Early recordings of version 1 have these three only in the text. No other code parses them from it.
-    """
-    exited = _EXITED.fullmatch(text) if kind is FaultKind.EXITED else None
-    killed = _KILLED.fullmatch(text) if kind is FaultKind.KILLED else None
-    version = _PYTHON.search(text) if kind is FaultKind.SYNTAX_ERROR else None
-    return (
-        int(exited[1]) if exited else None,
-        killed[1] if killed else "",
-        (int(version[1]), int(version[2])) if version else None,
-    )
+    return Fault(*values, *details)
 
 
 def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Observation]:
@@ -232,9 +206,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
         endpoints=tuple[_row_of(Endpoint), ...],  # type: ignore[misc]
         last=("services", tuple[_row_of(ServiceEnd), ...], ()),  # type: ignore[misc]
     ),
-    Fault: _row_of(
-        Fault, "exit_code", "signal", "python", last=("details", _FaultDetails | msgspec.UnsetType, msgspec.UNSET)
-    ),
+    Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),
 }
 _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     **{_EXACT_ROWS[kind]: partial(_carrying, kind) for kind in (Message, Delivery, Request, Response)},
@@ -261,9 +233,7 @@ _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 def pack(trace: Trace, there: Sequence[bool]) -> bytes:
     """Pack a trace as JSON; the same trace gives the same bytes.
 
-    Args:
-        trace: The trace.
-        there: For each observation, whether the recording contains its bytes as a message.
+    For each observation, `there` says whether the recording contains its bytes as a message.
     """
     data = trace_to_json(trace)
     for row, left_out in zip(data["observations"], there, strict=True):
@@ -273,11 +243,7 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
 
 
 def unpack(data: bytes) -> Trace:
-    """Unpack a trace without the bytes of messages, which judging does not read.
-
-    Raises:
-        EvidenceError: The data is not a packed trace.
-    """
+    """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if it is none."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
     try:
@@ -293,14 +259,9 @@ def unpack(data: bytes) -> Trace:
 
 
 def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
-    """Unpack a trace.
+    """Unpack a trace; raises EvidenceError if it is none, or does not match the recording.
 
-    Args:
-        data: A packed trace.
-        cdrs: The bytes of the recording's messages, one for each observation; None leaves them out.
-
-    Raises:
-        EvidenceError: The data is not a packed trace, or does not match the recording.
+    The bytes of the recording's messages are given one for each observation; None leaves them out.
     """
     try:
         rows = json.loads(data)

@@ -31,12 +31,7 @@ _NOWHERE = Path()
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """A folder of evidence whose manifest has been read.
-
-    Attributes:
-        folder: The folder.
-        manifest: Its manifest.
-    """
+    """A folder of evidence whose manifest has been read."""
 
     folder: Path
     manifest: kept.Manifest
@@ -50,8 +45,7 @@ class Evidence:
 def check_place(folder: Path) -> None:
     """Check, before anything is run, that evidence can be written to a folder.
 
-    Raises:
-        EvidenceError: The path is not a folder, or it has files of the same names that the grader did not write.
+    Raises EvidenceError if it is no folder, or has files of the same names that the grader did not write.
     """
     if folder.exists() and not folder.is_dir():
         raise EvidenceError(f"{folder}: expected a folder for the evidence, found a file", "name another folder")
@@ -61,15 +55,8 @@ def check_place(folder: Path) -> None:
 def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapping[str, Any], report: bytes) -> None:
     """Write a run as evidence; files of an earlier run are replaced, other files are kept.
 
-    Args:
-        folder: The folder, created if it does not exist.
-        run: The run.
-        exercises: The exercises that were graded.
-        request: The request for grading, as JSON values; not read by judging.
-        report: The report as JSON.
-
-    Raises:
-        EvidenceError: A file cannot be written, or would replace one that the grader did not write.
+    The request for grading is not read by judging. Raises EvidenceError if a file cannot be written, or would replace
+    one that the grader did not write.
     """
     written: dict[str, bytes] = {}
     recordings: dict[tuple[str, str], bytes] = {}
@@ -91,11 +78,7 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
 
 
 def open_evidence(folder: Path) -> Evidence:
-    """Open the evidence in a folder.
-
-    Raises:
-        EvidenceError: There is none, or it has another version, is damaged or incomplete.
-    """
+    """Open the evidence in a folder; raises EvidenceError if there is none, or it has another version or is damaged."""
     path = folder / files.MANIFEST
     data = files.read(path, kept.MOST_BYTES)
     try:
@@ -108,17 +91,10 @@ def open_evidence(folder: Path) -> Evidence:
 
 
 def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = False) -> Run:
-    """Read a run from evidence, as far as these exercises need it.
+    """Read a run from evidence, as far as these exercises need it; raises EvidenceError for a changed recording.
 
-    If the rubric has changed a scenario since then, its trace has a harness problem, which prevents judging.
-
-    Args:
-        evidence: The evidence.
-        exercises: The exercises to judge now.
-        verify: Whether to write every recording again from the judged trace, and compare it with the file.
-
-    Raises:
-        EvidenceError: A recording is missing or was changed.
+    If the rubric has changed a scenario since then, its trace has a harness problem, which prevents judging. To verify
+    is to write every recording again from the judged trace, and to compare it with the file.
     """
     manifest = evidence.manifest
     wanted = {e.id: e for e in exercises}
@@ -133,13 +109,7 @@ def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = 
 
 
 def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Mapping[tuple[str, str], Trace]) -> Run:
-    """Build a run from a manifest.
-
-    Args:
-        manifest: Describes the submission and the software that it was recorded with.
-        exercises: The exercises to judge now.
-        traces: The traces, by exercise and scenario.
-    """
+    """Build a run from a manifest and its traces, by exercise and scenario, for the exercises to judge now."""
     return Run(
         submission=_submission(manifest),
         traces=traces,
@@ -195,7 +165,7 @@ def _trace(
             raise EvidenceError(f"expected the recording {kept_digest[:_SHOWN]}, found one of {found[:_SHOWN]}")
         if not verify:
             return trace_at(data, recording.at, recording.size)
-        trace = trace_of(data, wire=True)
+        trace = trace_of(data)
         _compare(data, trace, evidence, owner, recording)
     except EvidenceError as error:
         raise EvidenceError(f"{path}: {error.message}", "the file was changed or damaged; grade again") from error

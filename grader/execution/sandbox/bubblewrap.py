@@ -6,11 +6,13 @@ import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from grader.core.errors import EnvironmentFault
+from grader.core.limits import Limits
 from grader.execution.sandbox import seccomp
 from grader.execution.sandbox.environment import student_environment
 from grader.execution.sandbox.exposure import (
@@ -23,7 +25,7 @@ from grader.execution.sandbox.exposure import (
     view_of,
 )
 from grader.execution.sandbox.properties import install_command
-from grader.execution.sandbox.protocol import Command, Limits, StudentProcess, WorkerView
+from grader.execution.sandbox.protocol import Command, StudentProcess, WorkerView
 
 ROOT_NAME, USER_NAME = "bubblewrap-root", "bubblewrap"
 SUBMISSION = Path("/submission")
@@ -34,28 +36,22 @@ SYSTEM_PROGRAMS = "/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin"
 
 @dataclass(frozen=True, slots=True)
 class Bubblewrap:
-    """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits.
+    """The tiers `bubblewrap-root` and `bubblewrap`: bubblewrap, seccomp and resource limits."""
 
-    Attributes:
-        bwrap: The bubblewrap program.
-        prlimit: The program of util-linux that sets resource limits.
-        setpriv: The program of util-linux that changes the user; used only as root.
-        as_root: Whether this process is root; students then run as another user instead of in a user namespace.
-        can_forbid_userns: Whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway.
-    """
-
+    shares_network: ClassVar[bool] = False
+    submission_seen_at: ClassVar[str] = str(SUBMISSION)
+    host_seen_at: ClassVar[str] = str(HOST)
     bwrap: Path
-    prlimit: Path
-    setpriv: Path
-    as_root: bool
-    can_forbid_userns: bool
+    prlimit: Path  # the program of util-linux that sets resource limits
+    setpriv: Path  # the program of util-linux that changes the user; used only as root
+    as_root: bool  # whether this process is root; students then run as another user instead of in a user namespace
+    can_forbid_userns: bool  # whether bubblewrap has `--disable-userns` (0.8 and newer); seccomp forbids them anyway
 
     @classmethod
     def here(cls) -> Bubblewrap:
         """Return the tier for this machine and user, without testing whether it works.
 
-        Raises:
-            EnvironmentFault: A program is missing or this processor is unknown; the hint is a fix.
+        Raises EnvironmentFault if a program is missing or this processor is unknown; the hint is a fix.
         """
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
@@ -73,21 +69,6 @@ class Bubblewrap:
     def name(self) -> str:
         """Short name that reports show."""
         return ROOT_NAME if self.as_root else USER_NAME
-
-    @property
-    def shares_network(self) -> bool:
-        """Each worker has a network of its own."""
-        return False
-
-    @property
-    def submission_seen_at(self) -> str:
-        """Where a student's process sees its submission."""
-        return str(SUBMISSION)
-
-    @property
-    def host_seen_at(self) -> str:
-        """Where a student's process sees the `host` package."""
-        return str(HOST)
 
     def worker_command(
         self,
@@ -145,11 +126,12 @@ class Bubblewrap:
         """
         if self.as_root:
             make_readable(process.submission)
+        environment = student_environment(process, HOME)
         filter_fd = _memory_file("filter", seccomp.student_filter())
         options = [
             *self._namespaces(),
             *("--clearenv", "--chdir", str(WORK), "--seccomp", str(filter_fd)),
-            *_settings(student_environment(process, HOME)),
+            *(word for setting in environment.items() for word in ("--setenv", *setting)),
             *self._files(process, limits),
         ]
         options_fd = _memory_file("options", b"".join(os.fsencode(option) + b"\0" for option in options))
@@ -215,10 +197,6 @@ def _program(name: str, hint: str) -> Path:
     if found is None:
         raise EnvironmentFault(f"sandbox: expected the program {name}, found none", hint)
     return Path(found).absolute()
-
-
-def _settings(environment: Mapping[str, str]) -> Iterable[str]:
-    return (word for name, value in environment.items() for word in ("--setenv", name, value))
 
 
 def _memory_file(name: str, content: bytes) -> int:

@@ -22,15 +22,10 @@ MOST_CHARACTERS = 100
 
 @dataclass(frozen=True, slots=True)
 class TierChoice:
-    """The tier to record in.
-
-    Attributes:
-        isolation: The tier.
-        containment: What the self-test found it to prevent; empty without a sandbox.
-    """
+    """The tier to record in."""
 
     isolation: Isolation
-    containment: tuple[Property, ...] = ()
+    containment: tuple[Property, ...] = ()  # what the self-test found it to prevent; empty without a sandbox
 
 
 def _silent(step: str) -> None:
@@ -38,16 +33,10 @@ def _silent(step: str) -> None:
 
 
 def choose_isolation(wanted: str, ros: RosInstallation, progress: Callable[[str], None] = _silent) -> TierChoice:
-    """Choose the tier to record in.
+    """Choose the tier to record in; raises EnvironmentFault, with a fix as its hint, if it does not work here.
 
-    Args:
-        wanted: `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
-            tier, which must have the properties that it promises.
-        ros: The ROS installation that students' processes will use.
-        progress: Called with a message when a sandbox is tested, and why the last result cannot be used.
-
-    Raises:
-        EnvironmentFault: The requested tier does not exist or does not work here, or no tier does; the hint is a fix.
+    Wanted is `auto` for the strongest tier that has all required properties, `none` for no sandbox, or the name of a
+    tier, which must have the properties that it promises. When a sandbox is tested, `progress` is told why.
     """
     if wanted == NO_SANDBOX:
         return TierChoice(isolation_from_name(wanted))
@@ -86,11 +75,7 @@ def inspect_tier(
 ) -> TierReport:
     """Return the report on one tier, from the last self-test if nothing relevant has changed since.
 
-    Args:
-        name: Tier name.
-        ros: The ROS installation that students' processes will use.
-        progress: Called with a message when the tier is tested, and why.
-        afresh: Whether to test it in any case.
+    When the tier is tested, `progress` is told why; `afresh` tests it in any case.
     """
     try:
         isolation = isolation_from_name(name)

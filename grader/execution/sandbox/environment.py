@@ -32,12 +32,9 @@ FEW_RESOURCES: Mapping[str, str] = {
 
 
 def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
-    """Return the variable that names a Fast DDS profile.
+    """Return the variable that names a Fast DDS profile in a folder, as the process sees it.
 
-    Args:
-        folder: The folder at which the process sees the profiles.
-        name: `NAME.xml` is the profile for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
-        distro: ROS release, e.g. `jazzy`.
+    `NAME.xml` is the profile for Fast DDS 2, `NAME3.xml` for Fast DDS 3.
     """
     if release_of(distro).fast_dds == 2:
         return {"FASTRTPS_DEFAULT_PROFILES_FILE": f"{folder}/{name}.xml"}
@@ -73,12 +70,7 @@ def runtime_environment(runtime: PythonRuntime) -> dict[str, str]:
 
 
 def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
-    """Return the environment of a trusted worker, with ROS and this package.
-
-    Args:
-        runtime: Interpreter and ROS.
-        home: A folder for files that ROS writes, such as logs.
-    """
+    """Return the environment of a trusted worker, with ROS and this package; ROS writes its logs to `home`."""
     environment = runtime_environment(runtime)
     python_paths = [environment["PYTHONPATH"]] if "PYTHONPATH" in environment else []
     return {
@@ -91,11 +83,9 @@ def worker_environment(runtime: PythonRuntime, home: Path) -> dict[str, str]:
 
 
 def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
-    """Return the complete environment of a student's process.
+    """Return the complete environment of a student's process; its own variables take precedence.
 
-    Args:
-        process: The process to start; its own variables take precedence.
-        home: A folder that the process may write to, as the process sees it.
+    The process may write to `home`, which is the path as it sees it.
     """
     return {
         **runtime_environment(process.runtime),

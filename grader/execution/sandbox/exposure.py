@@ -23,14 +23,10 @@ MOST_LINKS = 40  # what the kernel allows in one path
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A minimal view of the machine's files.
+    """A minimal view of the machine's files."""
 
-    Attributes:
-        bound: Real files and folders, sorted, none inside another.
-        links: Symbolic links on the way to them, (path, target), sorted, none inside a bound folder.
-    """
-
-    bound: tuple[Path, ...]
+    bound: tuple[Path, ...]  # real files and folders, sorted, none inside another
+    # Symbolic links on the way to them, (path, target), sorted, none inside a bound folder
     links: tuple[tuple[Path, str], ...]
 
     def parents(self) -> tuple[Path, ...]:
@@ -41,9 +37,8 @@ class View:
 def view_of(paths: Iterable[Path]) -> View:
     """Return a view in which every existing path can be opened by its own name.
 
-    Args:
-        paths: Absolute paths. Links are followed one by one, so that a virtual environment whose interpreter is a link
-            to a link works; a path that does not exist is left out.
+    Links are followed one by one, so that a virtual environment whose interpreter is a link to a link works; a path
+    that does not exist is left out.
     """
     real: set[Path] = set()
     links: dict[Path, str] = {}
@@ -53,16 +48,15 @@ def view_of(paths: Iterable[Path]) -> View:
             real.add(target)
             links.update(on_the_way)
     bound = tuple(path for path in sorted(real) if not any(parent in real for parent in path.parents))
-    return View(bound, tuple((where, links[where]) for where in sorted(links) if not _is_inside(where, bound)))
+    return View(
+        bound,
+        tuple((where, links[where]) for where in sorted(links) if not any(folder in where.parents for folder in bound)),
+    )
 
 
 def parents_of(paths: Iterable[Path]) -> tuple[Path, ...]:
     """Return every folder above the paths except the root, outermost first."""
     return tuple(sorted({parent for path in paths for parent in path.parents if parent != Path("/")}))
-
-
-def _is_inside(path: Path, folders: Iterable[Path]) -> bool:
-    return any(folder in path.parents for folder in folders)
 
 
 def _follow(path: Path) -> tuple[Path | None, dict[Path, str]]:
@@ -104,11 +98,8 @@ TAKEN = Path("/run/rclpy-grader.users")
 class StudentUsers:
     """Allocates users for student processes, each to one process on this machine.
 
-    A user stays allocated until the process that requested it ends. Without a file of locks, users are random, and two
-    processes are only unlikely to get the same one.
-
-    Args:
-        taken: The file of locks, created if it does not exist.
+    A user stays allocated until the process that requested it ends. Without a file of locks, which is created if it
+    does not exist, users are random, and two processes are only unlikely to get the same one.
     """
 
     def __init__(self, taken: Path) -> None:
@@ -166,9 +157,7 @@ def secrets_within(bound: Iterable[Path], runtime: PythonRuntime) -> list[Path]:
 def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     """Return the view of a worker: Python, ROS, the part of this package that it runs, and its working folder.
 
-    Args:
-        runtime: Interpreter and ROS.
-        folder: The working folder, which also contains the staged submissions.
+    The working folder also contains the staged submissions.
     """
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)

@@ -29,14 +29,10 @@ UNUSABLE = (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionE
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """The cached self-test of one tier.
+    """The cached self-test of one tier."""
 
-    Attributes:
-        file: A file in the user's private folder; None if there is no such folder.
-        key: A digest of each thing that the result depends on, by name; a result with another key is ignored.
-    """
-
-    file: Path | None
+    file: Path | None  # a file in the user's private folder; None if there is no such folder
+    # A digest of each thing that the result depends on, by name; a result with another key is ignored
     key: Mapping[str, str]
 
     @classmethod

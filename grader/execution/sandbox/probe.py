@@ -61,9 +61,6 @@ def works(attempt: Callable[..., Any], *arguments: Any) -> bool:
     return True
 
 
-# --- files ---
-
-
 def reads(request: dict[str, Any]) -> Iterator[str]:
     """Open hidden files."""
     for path in request["hidden"]:
@@ -125,9 +122,6 @@ def outgrows(size: int) -> bool:
     return True
 
 
-# --- processes ---
-
-
 def others(request: dict[str, Any]) -> set[int]:
     """Return the pids that other processes may have."""
     seen = set()
@@ -160,9 +154,6 @@ def disturbs(request: dict[str, Any]) -> Iterator[str]:
             yield f"{what} the worker"
     works(os.setpriority, os.PRIO_PROCESS, worker, 15)
     works(os.sched_setaffinity, worker, {max(os.sched_getaffinity(0))})
-
-
-# --- network and memory that is shared ---
 
 
 def leaves(request: dict[str, Any]) -> Iterator[str]:
@@ -222,9 +213,6 @@ def shares(request: dict[str, Any]) -> Iterator[str]:
         yield "made a System V segment"
 
 
-# --- limits ---
-
-
 def raises(which: int) -> bool:
     """Return whether a limit is missing or can be raised."""
     _, most = resource.getrlimit(which)
@@ -271,9 +259,6 @@ def computes(request: dict[str, Any]) -> Iterator[str]:
     del request
     if raises(resource.RLIMIT_CPU):
         yield "has no limit of processor time"
-
-
-# --- ROS ---
 
 
 def exchange() -> Any:

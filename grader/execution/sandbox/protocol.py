@@ -10,52 +10,30 @@ from typing import Protocol
 from grader.core.limits import Limits
 from grader.execution.ros_installation import PythonRuntime
 
-__all__ = [
-    "Command",
-    "Isolation",
-    "Limits",
-    "StudentProcess",
-    "WorkerView",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class StudentProcess:
-    """One student process to start.
+    """One student process to start."""
 
-    Attributes:
-        runtime: Interpreter and ROS.
-        host_folder: The folder of the host package, the only part of the grader that the process may read; None if the
-            process may read no part of the grader.
-        submission: The staged copy, which the process sees read-only at `submission_seen_at`.
-        arguments: Interpreter arguments, e.g. `("-I", "-u", "/grader_host/host/launcher.py")`; paths as the process
-            sees them.
-        environment: Variables beyond those of the sandbox and the runtime.
-        pass_fds: Descriptors that the process inherits besides 0, 1 and 2, with the same numbers.
-    """
-
-    runtime: PythonRuntime
+    runtime: PythonRuntime  # interpreter and ROS
+    # The folder of the host package, the only part of the grader that the process may read; None if the process may
+    # read no part of the grader.
     host_folder: Path | None
-    submission: Path
+    submission: Path  # the staged copy, which the process sees read-only at `submission_seen_at`
+    # Interpreter arguments, e.g. `("-I", "-u", "/grader_host/host/launcher.py")`; paths as the process sees them.
     arguments: tuple[str, ...]
-    environment: Mapping[str, str]
-    pass_fds: tuple[int, ...]
+    environment: Mapping[str, str]  # variables beyond those of the sandbox and the runtime
+    pass_fds: tuple[int, ...]  # descriptors that the process inherits besides 0, 1 and 2, with the same numbers
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerView:
-    """The files of this machine that the trusted worker can see.
+    """The files of this machine that the trusted worker can see."""
 
-    Attributes:
-        read: Absolute paths of files and folders, read-only; one that does not exist is left out.
-        hidden: Folders within them that it does not need.
-        own: Files and folders within the hidden ones that it does need, read-only.
-        write: Folders that it may write to; the submission that students' processes see is in one of them.
-    """
-
-    read: tuple[Path, ...]
-    hidden: tuple[Path, ...]
-    own: tuple[Path, ...]
+    read: tuple[Path, ...]  # absolute paths of files and folders, read-only; one that does not exist is left out
+    hidden: tuple[Path, ...]  # folders within them that it does not need
+    own: tuple[Path, ...]  # files and folders within the hidden ones that it does need, read-only
+    # Folders that it may write to; the submission that students' processes see is in one of them
     write: tuple[Path, ...]
 
 
@@ -65,17 +43,12 @@ class Command:
 
     Start it with `start_new_session=True`, so that Ctrl-C in the terminal reaches only the grader, and from a thread
     that outlives it: the kernel kills the process when the thread that started it ends.
-
-    Attributes:
-        argv: Complete list of arguments.
-        environment: Complete environment of the program.
-        pass_fds: Descriptors to inherit.
-        opened_fds: Descriptors that the tier opened for this start; the caller closes them afterwards.
     """
 
-    argv: tuple[str, ...]
-    environment: Mapping[str, str]
-    pass_fds: tuple[int, ...]
+    argv: tuple[str, ...]  # complete list of arguments
+    environment: Mapping[str, str]  # complete environment of the program
+    pass_fds: tuple[int, ...]  # descriptors to inherit
+    # Descriptors that the tier opened for this start; the caller closes them afterwards
     opened_fds: tuple[int, ...] = ()
 
 
@@ -85,22 +58,18 @@ class Isolation(Protocol):
     @property
     def name(self) -> str:
         """Short name for reports, e.g. `bubblewrap-root`."""
-        ...
 
     @property
     def shares_network(self) -> bool:
         """Whether the worker uses the caller's network, where other graders and nodes may run."""
-        ...
 
     @property
     def submission_seen_at(self) -> str:
         """Absolute folder at which a student process sees its submission; empty if that is the real path."""
-        ...
 
     @property
     def host_seen_at(self) -> str:
         """Absolute folder at which a student process sees the host package, with `launcher.py`."""
-        ...
 
     def worker_command(
         self,
@@ -109,16 +78,10 @@ class Isolation(Protocol):
         pass_fds: tuple[int, ...],
         view: WorkerView | None = None,
     ) -> Command:
-        """Return the command that starts the trusted worker.
+        """Return the command that starts the trusted worker with this complete environment.
 
-        Args:
-            argv: Program and arguments.
-            environment: Its complete environment.
-            pass_fds: Descriptors that it inherits.
-            view: The files that it sees, if the tier can hide files; None for all.
+        It sees the files of the view, if the tier can hide files; None for all.
         """
-        ...
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
         """Return the command that starts a student process inside the worker, which shares only its network."""
-        ...

@@ -53,23 +53,14 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentRule:
-    """Refuses a system call depending on the low 32 bits of one argument.
+    """Refuses a system call depending on the low 32 bits of one argument."""
 
-    Attributes:
-        call: Key of `NUMBERS`.
-        argument: Index of the argument.
-        only: The values allowed; empty if all are.
-        never: The values refused.
-        never_bits: Refused if any of these bits is set.
-        error: The errno that the caller gets.
-    """
-
-    call: str
-    argument: int
-    only: tuple[int, ...] = ()
-    never: tuple[int, ...] = ()
-    never_bits: int = 0
-    error: int = errno.EPERM
+    call: str  # key of `NUMBERS`
+    argument: int  # index of the argument
+    only: tuple[int, ...] = ()  # the values allowed; empty if all are
+    never: tuple[int, ...] = ()  # the values refused
+    never_bits: int = 0  # refused if any of these bits is set
+    error: int = errno.EPERM  # the errno that the caller gets
 
 
 ARGUMENT_RULES = (
@@ -174,11 +165,7 @@ def supports(machine: str) -> bool:
 def student_filter(machine: str | None = None) -> bytes:
     """Return the filter for student processes with their own namespaces, an array of `struct sock_filter`.
 
-    Args:
-        machine: Architecture, named as by `platform.machine()`; that of this machine if None.
-
-    Raises:
-        KeyError: There is no filter for the architecture; call `supports` first.
+    Without a machine it is for this one. Raises KeyError for an unknown architecture; call `supports` first.
     """
     return assembled(NUMBERS, ARGUMENT_RULES, machine or platform.machine())
 
@@ -321,9 +308,7 @@ SIGNAL_RULES = (
 def flat_filter(*, signals: bool, machine: str | None = None) -> bytes:
     """Return the filter for student processes without their own namespaces, an array of `struct sock_filter`.
 
-    Args:
-        signals: Whether to refuse signals to other processes; `start.load_filter` then inserts the process's number.
-        machine: Architecture, named as by `platform.machine()`; that of this machine if None.
+    With `signals` it refuses signals to other processes; `start.load_filter` then inserts the process's number.
     """
     numbers = {**FLAT_NUMBERS, **(SIGNAL_NUMBERS if signals else {})}
     return assembled(numbers, (*FLAT_RULES, *(SIGNAL_RULES if signals else ())), machine or platform.machine())

@@ -37,32 +37,18 @@ SIOCGIFADDR = 0x8915  # linux/sockios.h
 
 @dataclass(frozen=True, slots=True)
 class Bait:
-    """The bait for the probe of one trial.
+    """The bait for the probe of one trial."""
 
-    Attributes:
-        folder: The folder of the trial; deleted afterwards.
-        canary: A file next to the submission that every user may read and write.
-        segment: A file in this machine's shared memory that every user may read and write.
-        secret: A text in the worker's command line and environment.
-        sinks: Listeners on this machine's addresses other than the loopback.
-        loopback: A listener on the loopback address.
-    """
-
-    folder: Path
-    canary: Path
-    segment: Path
-    secret: str
-    sinks: tuple[socket.socket, ...]
-    loopback: socket.socket
+    folder: Path  # the folder of the trial; deleted afterwards
+    canary: Path  # a file next to the submission that every user may read and write
+    segment: Path  # a file in this machine's shared memory that every user may read and write
+    secret: str  # a text in the worker's command line and environment
+    sinks: tuple[socket.socket, ...]  # listeners on this machine's addresses other than the loopback
+    loopback: socket.socket  # a listener on the loopback address
 
 
 def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
-    """Run a probe inside a tier and return the report on the tier; takes about half a second.
-
-    Args:
-        isolation: The tier.
-        ros: The ROS installation that students' processes will use.
-    """
+    """Run a probe inside a tier and return the report on the tier; takes about half a second."""
     letter = TIERS[isolation.name]
     with laid_bait() as bait:
         answer, why = trial(isolation, ros, bait)
@@ -89,9 +75,6 @@ def why_not(contained: tuple[Property, ...]) -> str:
     if any(NO_EXCHANGE in found.found for found in contained if found.name == EXCHANGE):
         return NO_EXCHANGE
     return "; ".join(map(str, missing(contained)))
-
-
-# --- the trial ---
 
 
 def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
@@ -154,9 +137,6 @@ def asked_of_probe(bait: Bait) -> dict[str, Any]:
         "sinks": [sink.getsockname()[:2] for sink in bait.sinks if sink.type == socket.SOCK_STREAM],
         "loopback": bait.loopback.getsockname()[1],
     }
-
-
-# --- the bait ---
 
 
 @contextlib.contextmanager

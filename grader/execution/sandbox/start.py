@@ -87,9 +87,6 @@ def main(arguments: list[str]) -> None:
     os.execv(arguments[1], arguments[1:])  # noqa: S606 -- becoming the program is the purpose
 
 
-# --- folder and limits ---
-
-
 def enter_folder(request: dict[str, Any]) -> None:
     """Create the folder, if requested, and change to it."""
     folder = request["folder"]
@@ -184,17 +181,10 @@ def entries(folder: str) -> Iterator[os.DirEntry[str]]:
                     folders.append(entry.path)
 
 
-# --- user ---
-
-
 def become(system: Any, user: int, group: int, *, reach: bool) -> None:
-    """Change to another user without privileges.
+    """Change to another user with a single group, without privileges.
 
-    Args:
-        system: The C library.
-        user: User id.
-        group: Id of its only group.
-        reach: Whether to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
+    To `reach` is to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.
     """
     for capability in range(LAST_CAPABILITY + 1):
         if capability != CAP_DAC_READ_SEARCH or not reach:
@@ -210,9 +200,6 @@ def become(system: Any, user: int, group: int, *, reach: bool) -> None:
         checked(call(system.capset, header, struct.pack("=6I", kept, kept, kept, 0, 0, 0)), "capset")
         raised = call(system.prctl, AMBIENT, AMBIENT_RAISE, CAP_DAC_READ_SEARCH, 0, 0)
         checked(raised, "an ambient capability")
-
-
-# --- Landlock and seccomp ---
 
 
 def landlock_version(system: Any = None) -> int:

@@ -1,9 +1,16 @@
-"""The sandbox tiers: `bubblewrap-flat`, `landlock` and `none`, and every tier by its name."""
+"""The sandbox tiers: `bubblewrap-flat`, `landlock` and `none`, and every tier by its name.
+
+The first two start a student's process through `start.py`, which sandboxes and limits it without namespaces.
+"""
 
 from __future__ import annotations
 
+import functools
+import json
 import os
+import platform
 import secrets
+import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,22 +18,22 @@ from pathlib import Path
 from typing import ClassVar
 
 from grader.core.checkup import TIERS
-from grader.core.errors import EnvironmentFault
+from grader.core.errors import EnvironmentFault, HarnessError
 from grader.core.limits import Limits
+from grader.execution.sandbox import seccomp
 from grader.execution.sandbox.bubblewrap import ROOT_NAME, USER_NAME, Bubblewrap
-from grader.execution.sandbox.environment import student_environment
-from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess, WorkerView
-from grader.execution.sandbox.starting import (
-    HOST,
-    Ground,
-    by_resource,
-    loopback_only,
-    require_domain,
-    require_landlock,
-    sandboxed_command,
-    start_command,
-    worker_on_shared_network,
+from grader.execution.sandbox.environment import PACKAGE, dds_profile, distro_of, student_environment
+from grader.execution.sandbox.exposure import (
+    STUDENT_GROUP,
+    closed_folders,
+    make_readable,
+    secrets_within,
+    some_user,
+    view_of,
 )
+from grader.execution.sandbox.protocol import Command, Isolation, StudentProcess, WorkerView
+from grader.execution.sandbox.seccomp import flat_filter
+from grader.execution.sandbox.start import landlock_version
 
 FLAT_NAME, LANDLOCK_NAME, PLAIN_NAME = "bubblewrap-flat", "landlock", "none"
 #: The tiers that isolate anything, strongest first.
@@ -35,13 +42,18 @@ ISOLATING = (ROOT_NAME, USER_NAME, FLAT_NAME, LANDLOCK_NAME)
 IN_PLACE = ""
 #: A worker's own memory file system, which disappears with it.
 SCRATCH = Path("/dev/shm")  # noqa: S108
+HERE = Path(__file__).parent
+HOST = PACKAGE / "student_host"
+DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+_version = functools.cache(landlock_version)
+#: The first Landlock version that restricts signals.
+WITH_SIGNALS = 6
 
 
 def isolation_from_name(name: str) -> Isolation:
     """Return a tier without testing whether it works.
 
-    Raises:
-        EnvironmentFault: There is no such tier, it is for another user, or a part of it is missing.
+    Raises EnvironmentFault if there is no such tier, it is for another user, or a part of it is missing.
     """
     if name not in TIERS:
         raise EnvironmentFault(f"isolation: expected one of {', '.join(TIERS)}, found {name}")
@@ -69,24 +81,17 @@ class FlatBubblewrap:
 
     It is for systems that let bubblewrap create namespaces, but do not let it be nested, such as Ubuntu with its
     restriction of user namespaces.
-
-    Attributes:
-        outer: The bubblewrap around the worker.
     """
 
     name: ClassVar[str] = FLAT_NAME
     shares_network: ClassVar[bool] = False
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
-    outer: Bubblewrap
+    outer: Bubblewrap  # the bubblewrap around the worker
 
     @classmethod
     def here(cls) -> FlatBubblewrap:
-        """Return the isolation for this machine and user.
-
-        Raises:
-            EnvironmentFault: Bubblewrap is missing, or this kernel or processor has no Landlock.
-        """
+        """Return the isolation for this machine and user; raises EnvironmentFault without bubblewrap or Landlock."""
         require_landlock()
         return cls(Bubblewrap.here())
 
@@ -105,27 +110,13 @@ class FlatBubblewrap:
         return sandboxed_command(process, limits, Ground(SCRATCH, loopback=False, as_root=self.outer.as_root))
 
 
-@dataclass(frozen=True, slots=True)
-class Landlock:
-    """The tier `landlock`: Landlock, seccomp, limits and another user, for containers that allow no namespaces.
+class _OnSharedNetwork:
+    """What the tiers have in common that use the caller's network."""
 
-    The network is the caller's: outgoing traffic is contained only if there is no interface but `lo`.
-
-    Attributes:
-        as_root: Whether this process is root; students then run as another user.
-    """
-
-    name: ClassVar[str] = LANDLOCK_NAME
+    __slots__ = ()
     shares_network: ClassVar[bool] = True
     submission_seen_at: ClassVar[str] = IN_PLACE
     host_seen_at: ClassVar[str] = str(HOST)
-    as_root: bool
-
-    @classmethod
-    def here(cls) -> Landlock:
-        """Return the isolation for this machine; raises EnvironmentFault if its kernel or processor has none."""
-        require_landlock()
-        return cls(as_root=os.geteuid() == 0)
 
     def worker_command(
         self,
@@ -139,21 +130,35 @@ class Landlock:
         Nothing is hidden from it, because that would need namespaces.
         """
         del view
-        return worker_on_shared_network(argv, environment, pass_fds)
+        environment = {**environment, **loopback_only(environment)}
+        return Command((*start_command("/"), *argv), environment, tuple(pass_fds))
+
+
+@dataclass(frozen=True, slots=True)
+class Landlock(_OnSharedNetwork):
+    """The tier `landlock`: Landlock, seccomp, limits and another user, for containers that allow no namespaces.
+
+    The network is the caller's: outgoing traffic is contained only if there is no interface but `lo`.
+    """
+
+    name: ClassVar[str] = LANDLOCK_NAME
+    as_root: bool  # whether this process is root; students then run as another user
+
+    @classmethod
+    def here(cls) -> Landlock:
+        """Return the isolation for this machine; raises EnvironmentFault if its kernel or processor has none."""
+        require_landlock()
+        return cls(as_root=os.geteuid() == 0)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process.
-
-        Raises:
-            HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
-        """
+        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, LANDLOCK_NAME)
         ground = Ground(Path(tempfile.gettempdir()), loopback=True, as_root=self.as_root)
         return sandboxed_command(process, limits, ground)
 
 
 @dataclass(frozen=True, slots=True)
-class Plain:
+class Plain(_OnSharedNetwork):
     """The tier `none`: students' processes see everything that the caller sees.
 
     They still have a controlled environment, a temporary working directory and limits. The number of processes is not
@@ -161,27 +166,9 @@ class Plain:
     """
 
     name: ClassVar[str] = PLAIN_NAME
-    shares_network: ClassVar[bool] = True
-    submission_seen_at: ClassVar[str] = IN_PLACE
-    host_seen_at: ClassVar[str] = str(HOST)
-
-    def worker_command(
-        self,
-        argv: Sequence[str],
-        environment: Mapping[str, str],
-        pass_fds: tuple[int, ...],
-        view: WorkerView | None = None,
-    ) -> Command:
-        """Return the command that starts the worker, in a session of its own; it is killed when the caller dies."""
-        del view
-        return worker_on_shared_network(argv, environment, pass_fds)
 
     def student_command(self, process: StudentProcess, limits: Limits) -> Command:
-        """Return the command that starts a student's process.
-
-        Raises:
-            HarnessError: No ROS domain was given: on a shared network nodes of different runs would talk.
-        """
+        """Return the command that starts a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
         folder = Path(tempfile.gettempdir()) / f"grade-student-{secrets.token_hex(8)}"
         start = start_command(str(folder), made=True, limits=by_resource(limits))
@@ -189,3 +176,91 @@ class Plain:
         environment |= loopback_only(environment)
         argv = (*start, str(process.runtime.executable), *process.arguments)
         return Command(argv, environment, tuple(process.pass_fds))
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """The surroundings of a sandboxed process."""
+
+    scratch: Path  # the folder in which its own folder is created; any user may enter it
+    loopback: bool  # whether to restrict Fast DDS to the loopback address, because the network is shared
+    as_root: bool  # whether this process is root; the student's then runs as another user
+
+
+def start_command(
+    folder: str, *, made: bool = False, limits: Mapping[str, int] | None = None, **further: object
+) -> tuple[str, ...]:
+    """Return the beginning of a command line; the program and its arguments follow. See `start.py`."""
+    request = {"folder": folder, "made": made, "scratch": 0, "limits": dict(limits or {})}
+    request |= {"user": None, "processes": 0, "confinement": None, **further}
+    return (sys.executable, "-I", "-S", str(HERE / "start.py"), json.dumps(request))
+
+
+def by_resource(limits: Limits) -> dict[str, int]:
+    """Return the limits that hold for each process alone, by their names in `resource`."""
+    return {
+        "RLIMIT_AS": limits.address_space_bytes,
+        "RLIMIT_NOFILE": limits.open_files,
+        "RLIMIT_FSIZE": limits.file_bytes,
+        "RLIMIT_CORE": 0,
+        "RLIMIT_CPU": limits.processor_s,
+    }
+
+
+def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
+    """Keep Fast DDS to the loopback address, on both sides: there is no network of one's own."""
+    return dds_profile(HERE, "loopback", distro_of(environment))
+
+
+def require_domain(process: StudentProcess, tier: str) -> None:
+    """Raise HarnessError without a ROS domain: on a shared network nodes of different runs would talk."""
+    if "ROS_DOMAIN_ID" not in process.environment:
+        raise HarnessError(f"isolation {tier}: expected ROS_DOMAIN_ID for a student's process, found none")
+
+
+def require_landlock() -> None:
+    """Raise EnvironmentFault if this kernel has no Landlock or this processor is unknown to the filter."""
+    if not seccomp.supports(platform.machine()):
+        raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
+    if not _version():
+        raise EnvironmentFault(
+            "sandbox: expected a kernel with Landlock, found none",
+            "start Linux 6.2 or newer with landlock in its lsm= list",
+        )
+
+
+def sandboxed_command(process: StudentProcess, limits: Limits, ground: Ground) -> Command:
+    """Return the command of a student's process behind Landlock and a filter, in the caller's own namespaces.
+
+    As root the process becomes another user, and the staged copy is made readable by everyone.
+    """
+    if ground.as_root:
+        make_readable(process.submission)
+    folder = ground.scratch / f"grade-student-{secrets.token_hex(8)}"
+    environment = student_environment(process, folder / "home")
+    environment |= loopback_only(environment) if ground.loopback else {}
+    # Without RLIMIT_RTPRIO a privileged parent's would hold.
+    start = start_command(
+        str(folder),
+        made=True,
+        scratch=limits.scratch_bytes,
+        limits={**by_resource(limits), "RLIMIT_RTPRIO": 0, "RLIMIT_MSGQUEUE": 0},
+        processes=limits.processes,
+        user=[some_user(), STUDENT_GROUP] if ground.as_root else None,
+        confinement=_confinement(process, ground),
+    )
+    return Command((*start, str(process.runtime.executable), *process.arguments), environment, tuple(process.pass_fds))
+
+
+def _confinement(process: StudentProcess, ground: Ground) -> dict[str, object]:
+    bound = view_of((*process.runtime.read_paths, process.runtime.executable)).bound
+    host = (process.host_folder,) if process.host_folder else ()
+    own = (process.submission, *host, *(HERE.glob("loopback*.xml") if ground.loopback else ()))
+    return {
+        "read": [str(path) for path in (*bound, *own)],
+        "hidden": [str(path) for path in secrets_within(bound, process.runtime)],
+        "devices": DEVICES,
+        "tcp": not ground.loopback,
+        "reach": ground.as_root and bool(closed_folders((*bound, *own, process.runtime.executable))),
+        "filter": flat_filter(signals=_version() < WITH_SIGNALS).hex(),
+    }

@@ -25,8 +25,7 @@ from grader.execution.sandbox import probe
 from grader.execution.sandbox.environment import quick_discovery
 from grader.execution.sandbox.protocol import Command, StudentProcess
 from grader.execution.sandbox.start import SPARE
-from grader.execution.sandbox.starting import HOST
-from grader.execution.sandbox.tiers import isolation_from_name
+from grader.execution.sandbox.tiers import HOST, isolation_from_name
 
 #: Seconds in which a message must have come back, and between two attempts to send it.
 EXCHANGE_S, AGAIN_S = 15.0, 0.03

@@ -9,11 +9,11 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import DurationNs, seconds
-from grader.core.trace import Message, Request, Trace
-from grader.judging.findings import explain_no_message, faulted, first_fault, met, not_met
-from grader.judging.service_calls import LATENESS_NS, Call, calls_of
+from grader.core.trace import Message, Trace
+from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
+from grader.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node
 from grader.judging.values import (
     JITTER_NS,
     FieldRule,
@@ -64,7 +64,6 @@ class ActionResult:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         result = f" with {rules_text(self.result)}" if self.result else ""
         within = "" if self.within is None else f" within {number(seconds(self.within))} s"
         return f"every goal for {self.action} {self.status}{result}{within}"
@@ -95,7 +94,8 @@ class ActionResult:
             return f"rejected, expected that it {_ends(self.status)}", "accept the goal: GoalResponse.ACCEPT"
         mine = next((r for r in results if _goal_id(r.request.value) == _goal_id(goal.request.value)), None)
         if mine is None or mine.response is None:
-            if mine is not None and self._still_running(trace, goal):
+            running = self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
+            if mine is not None and running:
                 raise HarnessError(f"{self.action}: the recording ends before the result is due")
             return f"no result in {span(trace.stop_ns - goal.request.t_ns)}", ""
         return self._result_flaw(trace, goal, mine)
@@ -115,9 +115,6 @@ class ActionResult:
         if self.within is not None and took > self.within + LATENESS_NS[trace.clock]:
             return f"its result came after {seconds(took):.3f} s, expected within {number(seconds(self.within))} s", ""
         return "", ""
-
-    def _still_running(self, trace: Trace, goal: Call) -> bool:
-        return self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +141,6 @@ class ActionFeedback:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         grows = f", {self.grows} growing" if self.grows else ""
         each = f", in each {rules_text(self.fields)}" if self.fields else ""
         return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
@@ -243,9 +239,8 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     Raises:
         HarnessError: Nothing prevented sending a goal.
     """
-    fault = first_fault(trace)
-    if fault is not None:
-        return faulted(fault, f"no goal could be sent to {action}")
+    if crashed := explain_fault(trace, f"no goal could be sent to {action}"):
+        return crashed
     ends = [e.service for e in trace.service_ends("service")]
     seen = sorted({e.partition("/_action/")[0] for e in ends if "/_action/" in e})
     if action in seen:
@@ -253,7 +248,12 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
     found = f"; seen: {listed(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
-    return not_met(f"{action}: no action server in {span(trace.stop_ns)}{found}", {"seen": seen[:20]}, hint=hint)
+    return not_met(
+        f"{action}: no action server in {span(trace.stop_ns)}{found}",
+        {"seen": seen[:20]},
+        hint=hint,
+        problem=ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT,
+    )
 
 
 #: Numbers of lifecycle_msgs/msg/Transition -> label.
@@ -295,23 +295,26 @@ class LifecycleStates:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         states = f", telling {', '.join(self.states)}" if self.states else ""
         topic = f", publishing {self.topic} only while active" if self.topic else ""
         return f"every transition made{states}{topic}"
 
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if all of this holds; the reason names the first violation."""
-        changes, asked = self._calls(trace, "change_state"), self._calls(trace, "get_state")
+        changes, asked = (
+            sorted(calls_of_node(trace, self.node, service), key=lambda call: call.request.t_ns)
+            for service in ("change_state", "get_state")
+        )
         if not changes and not asked:
             return self._never_asked(trace)
         evidence: dict[str, object] = {
             "transitions": [[seconds(c.request.t_ns), _label(c), _succeeded(c)] for c in changes],
             "states": [[seconds(c.request.t_ns), _state(c)] for c in asked],
         }
-        flaw = self._transition_flaw(changes) or self._state_flaw(asked)
-        if flaw:
-            return self._explain(trace, flaw, evidence)
+        flawed = self._transition_flaw(changes, evidence) or self._state_flaw(asked, evidence)
+        if flawed is not None:
+            fault = first_fault(trace)
+            return flawed if fault is None else faulted(fault, flawed.reason, evidence)
         if self.topic is not None:
             silent = self._publishing(trace, changes, evidence)
             if silent is not None:
@@ -319,28 +322,27 @@ class LifecycleStates:
         told = ", ".join(_state(c) for c in asked) or "none asked for"
         return met(f"{counted(len(changes), 'transition')} made; states: {told}", evidence)
 
-    def _calls(self, trace: Trace, service: str) -> list[Call]:
-        asked = (r.service for r in trace.of(Request) if r.sender == "grader" and r.service.endswith(f"/{service}"))
-        names = [name for name in dict.fromkeys(asked) if self.node in (None, name.rpartition("/")[0])]
-        return sorted((c for n in names for c in calls_of(trace, n, "grader")), key=lambda c: c.request.t_ns)
-
-    def _transition_flaw(self, changes: Sequence[Call]) -> str:
+    def _transition_flaw(self, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         for call in changes:
             if call.response is None:
-                return f"{moment(call.request.t_ns)}: no answer to the transition {_label(call)}"
+                reason = f"{moment(call.request.t_ns)}: no answer to the transition {_label(call)}"
+                return not_met(reason, evidence, problem=ProblemKind.NO_ANSWER)
             if not _succeeded(call):
-                return f"{moment(call.response.t_ns)}: the transition {_label(call)} failed"
-        return ""
+                reason = f"{moment(call.response.t_ns)}: the transition {_label(call)} failed"
+                hint = "return TransitionCallbackReturn.SUCCESS from the callback of the transition"
+                return not_met(reason, evidence, hint=hint, problem=ProblemKind.REFUSED)
+        return None
 
-    def _state_flaw(self, asked: Sequence[Call]) -> str:
+    def _state_flaw(self, asked: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         if not self.states:
-            return ""
+            return None
         if len(asked) < len(self.states):
             raise HarnessError(f"the state was asked for {len(asked)} times, expected {len(self.states)}")
         for call, wanted in zip(asked, self.states, strict=False):
             if _state(call) != wanted:
-                return f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
-        return ""
+                reason = f"{moment(call.request.t_ns)}: the state is {quote(_state(call))}, expected {wanted}"
+                return not_met(reason, evidence, problem=ProblemKind.WRONG_VALUE)
+        return None
 
     def _publishing(self, trace: Trace, changes: Sequence[Call], evidence: dict[str, object]) -> Finding | None:
         """Return a finding if the node publishes while inactive, or does not while active; None otherwise."""
@@ -352,32 +354,39 @@ class LifecycleStates:
         if stray is not None:
             reason = f"{moment(stray)}, {topic}: a message though the node is not active"
             hint = "create the publisher with create_lifecycle_publisher, and call super().on_activate(state)"
-            return not_met(reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint)
+            return not_met(
+                reason, evidence | {"first_stray_s": seconds(stray)}, hint=hint, problem=ProblemKind.TOO_MANY
+            )
         mute = next(((a, b) for a, b in spans if not any(a <= t <= b for t in times)), None)
         if mute is None:
             return None
         if not times:
             return explain_no_message(trace, topic)
-        return not_met(f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}", evidence)
-
-    def _explain(self, trace: Trace, flaw: str, evidence: dict[str, object]) -> Finding:
-        fault = first_fault(trace)
-        if fault is None:
-            hint = "return TransitionCallbackReturn.SUCCESS from the callback of the transition"
-            return not_met(flaw, evidence, hint=hint if "failed" in flaw else "")
-        return faulted(fault, flaw, evidence)
+        return not_met(
+            f"{topic}: no message while active from {moment(mute[0])} to {moment(mute[1])}",
+            evidence,
+            problem=ProblemKind.SILENT,
+        )
 
     def _never_asked(self, trace: Trace) -> Finding:
-        fault = first_fault(trace)
-        if fault is not None:
-            return faulted(fault, "no transition could be asked for")
+        if crashed := explain_fault(trace, "no transition could be asked for"):
+            return crashed
         nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
         if self.node is not None and self.node not in nodes:
-            return not_met(f"{self.node}: not in the ROS graph", {"nodes": nodes[:20]}, blocked_by="node_name")
+            return not_met(
+                f"{self.node}: not in the ROS graph",
+                {"nodes": nodes[:20]},
+                blocked_by="node_name",
+                problem=ProblemKind.OTHER_NAME,
+            )
         if any(e.service.endswith("/change_state") for e in trace.service_ends("service")):
             raise HarnessError("the recording asks for no transition and no state")
         hint = "derive it from rclpy.lifecycle.Node"
-        return not_met("no node of the program can be asked for a transition: none has a lifecycle", hint=hint)
+        return not_met(
+            "no node of the program can be asked for a transition: none has a lifecycle",
+            hint=hint,
+            problem=ProblemKind.ABSENT,
+        )
 
 
 def _label(call: Call) -> str:

@@ -8,11 +8,12 @@ from itertools import pairwise
 from typing import Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, Pattern, seconds
 from grader.core.trace import OutputLine, Trace
 from grader.judging.checks.logs import LOGGER_HINT, complained
 from grader.judging.findings import (
+    explain_fault,
     explain_no_client,
     fault_hint,
     fault_sentence,
@@ -20,7 +21,7 @@ from grader.judging.findings import (
     first_fault,
     met,
     not_met,
-    partly,
+    only_printed,
     waiting_for,
 )
 from grader.judging.output import Output, printed_lines, shape_of, student_records
@@ -63,7 +64,6 @@ class CallsOfClient:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         text = f"{self.calls} requests on {self.service}"
         if self.period is None:
             return text
@@ -90,7 +90,12 @@ class CallsOfClient:
         place, gap = wrong
         wanted = f"{span(self.period or 0)} ± {number(seconds(self.tolerance))} s"
         reason = f"{asked}; {seconds(gap):.3f} s from number {place} to number {place + 1}, expected {wanted}"
-        return not_met(reason, evidence, hint=f"wait {span(self.period or 0)} after each answer before asking again")
+        return not_met(
+            reason,
+            evidence,
+            hint=f"wait {span(self.period or 0)} after each answer before asking again",
+            problem=ProblemKind.WRONG_RATE,
+        )
 
     def _wrong_gap(self, trace: Trace, calls: Sequence[Call]) -> tuple[int, int] | None:
         """Return the number of the first call whose gap to the next is wrong, and the gap."""
@@ -106,17 +111,21 @@ class CallsOfClient:
     def _miscounted(self, trace: Trace, calls: Sequence[Call], evidence: dict[str, object]) -> Finding:
         reason = f"{self.service}: {counted(len(calls), 'request')}, expected {self.calls}"
         if len(calls) > self.calls:
-            return not_met(reason, evidence, hint=f"ask {self.calls} times: for i in range({self.calls})")
-        fault = first_fault(trace)
-        if fault is not None:
-            return faulted(fault, reason, evidence, last=True)
+            return not_met(
+                reason,
+                evidence,
+                hint=f"ask {self.calls} times: for i in range({self.calls})",
+                problem=ProblemKind.TOO_MANY,
+            )
+        if crashed := explain_fault(trace, reason, evidence, last=True):
+            return crashed
         last = calls[-1]
         waiting = "; the last one got no response" if last.response is None else ""
         ended = trace.marks("exited")
         ended_said = f"; {ended[0].detail} ended at {moment(ended[0].t_ns)}" if ended else ""
         if not ended and not waiting and last.request.t_ns + (self.period or 0) + self.tolerance >= trace.stop_ns:
             raise HarnessError(f"{self.service}: the recording ends before {self.calls} requests could be sent")
-        return not_met(reason + waiting + ended_said, evidence)
+        return not_met(reason + waiting + ended_said, evidence, problem=ProblemKind.TOO_FEW)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +147,6 @@ class WaitsForService:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} waits for {self.service}, logs that it does, and asks once it is there"
 
     def judge(self, trace: Trace) -> Finding:
@@ -165,7 +173,7 @@ class WaitsForService:
         ended = next((m for m in trace.marks("exited", self.process) if m.t_ns < appears_ns), None)
         if ended is not None:
             reason = f"{self.process} ended at {moment(ended.t_ns)}, {when}"
-            return not_met(reason, {"ended_s": seconds(ended.t_ns)}, hint=_WAIT_HINT)
+            return not_met(reason, {"ended_s": seconds(ended.t_ns)}, hint=_WAIT_HINT, problem=ProblemKind.ENDED)
         records = [r for r in student_records(trace, self.process) if r.t_ns < appears_ns]
         bad = [r for r in records if r.severity in ("ERROR", "FATAL")]
         if not bad:
@@ -173,17 +181,17 @@ class WaitsForService:
         return complained(self.process, bad, f" {when}", {}, "waiting is no error: say it with info or warn")
 
     def _never_asked(self, trace: Trace, appears_ns: int, asked: Sequence[int]) -> Finding:
-        fault = first_fault(trace, self.process)
         there = f"{self.service} appeared at {moment(appears_ns)}"
-        if fault is not None:
-            return faulted(fault, f"{there}, no request came")
+        if crashed := explain_fault(trace, f"{there}, no request came", process=self.process):
+            return crashed
         if not trace.requests(self.service, "student") and not trace.service_ends("client", self.service):
             return waiting_for("service_calls", explain_no_client(trace, self.service))
         when = f"the first request came at {moment(asked[0])}" if asked else "no request came"
         if not asked and trace.stop_ns - appears_ns <= self.within:
             raise HarnessError(f"{self.service}: the recording ends too soon after the server appeared")
         reason = f"{there}, {when}, expected one within {span(self.within)}"
-        return not_met(reason, {"appears_s": seconds(appears_ns)}, hint=_WAIT_HINT)
+        problem = ProblemKind.TOO_LATE if asked else ProblemKind.SILENT
+        return not_met(reason, {"appears_s": seconds(appears_ns)}, hint=_WAIT_HINT, problem=problem)
 
     def _said(self, trace: Trace, appears_ns: int, asked_ns: int) -> Finding:
         records = [r for r in student_records(trace, self.process) if r.t_ns < appears_ns]
@@ -200,8 +208,10 @@ class WaitsForService:
                 f"{waited}; {counted(len(records), 'record')} meanwhile: {quote(records[-1].text, 80)}", evidence
             )
         if lines:
-            return partly(f"{waited}; that it waits is printed, not logged", evidence, hint=LOGGER_HINT)
-        return not_met(f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT)
+            return only_printed(f"{waited}; that it waits is printed, not logged", evidence, LOGGER_HINT)
+        return not_met(
+            f"{waited}, but logs nothing while it waits", evidence, hint=_WAIT_HINT, problem=ProblemKind.NOT_LOGGED
+        )
 
 
 #: A client that has sent no request for this long is not expected to send another.
@@ -242,7 +252,6 @@ class ReactsToResponses:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         limit = number(self.threshold)
         goes, warns = f"goes on above {limit}", f"logs a warning at or below {limit}"
         text = {"above": goes, "at_or_below": warns, "both": f"{goes} and {warns}"}[self.side]
@@ -266,7 +275,7 @@ class ReactsToResponses:
         if not student_records(trace, self.process) or all(e.kind is CallKind.LOW for e, _ in wrong):
             printed = self._by_printing(mine, episodes)
             if printed:
-                return partly(f"{self.process}: {printed}", evidence, hint=LOGGER_HINT)
+                return only_printed(f"{self.process}: {printed}", evidence, LOGGER_HINT)
         return self._explain(trace, wrong, evidence)
 
     def _wrong(self, episode: Episode, episodes: Sequence[Episode]) -> str:
@@ -286,7 +295,7 @@ class ReactsToResponses:
         reason = f"{self.process}: right after each of {counted(len(mine), 'response')} "
         reason += f"({', '.join(number(e.number) for e in mine[:8] if e.number is not None)})"
         if not student_records(trace, self.process):
-            return partly(f"{reason}, printed and not logged", evidence, hint=LOGGER_HINT)
+            return only_printed(f"{reason}, printed and not logged", evidence, LOGGER_HINT)
         return met(reason, evidence)
 
     def _by_printing(self, mine: Sequence[Episode], episodes: Sequence[Episode]) -> str:
@@ -316,7 +325,7 @@ class ReactsToResponses:
         fault = first_fault(trace, self.process)
         if fault is not None and episode.start_ns <= fault.t_ns <= episode.stop_ns:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence, hint=self._hint(wrong))
+        return not_met(reason, evidence, hint=self._hint(wrong), problem=ProblemKind.WRONG_ANSWER)
 
     def _hint(self, wrong: Sequence[tuple[Episode, str]]) -> str:
         kinds = {e.kind for e, _ in wrong}
@@ -358,7 +367,6 @@ class NoGoWithoutAnswer:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
 
     def judge(self, trace: Trace) -> Finding:
@@ -425,9 +433,8 @@ def _quotes(output: Output, episode: Episode) -> bool:
 
 
 def _not_asked(trace: Trace, process: str, service: str) -> Finding:
-    fault = first_fault(trace, process)
-    if fault is not None:
-        return faulted(fault, f"it had not asked {service} by then")
+    if crashed := explain_fault(trace, f"it had not asked {service} by then", process=process):
+        return crashed
     return waiting_for("service_calls", explain_no_client(trace, service))
 
 
@@ -439,13 +446,16 @@ def _not_reached(trace: Trace, process: str, service: str, episodes: Sequence[Ep
     """
     last = episodes[-1]
     asked = f"{service}: {process} asked {counted(len(episodes), 'time')}"
-    fault = first_fault(trace, process)
-    if fault is not None:
-        return faulted(fault, f"{asked} and did not get to the answer in question")
+    if crashed := explain_fault(trace, f"{asked} and did not get to the answer in question", process=process):
+        return crashed
     ended = trace.marks("exited", process)
     stopped = trace.stop_ns - last.start_ns > _ASKS_AGAIN_NS
     if ended or stopped or last.kind is CallKind.UNANSWERED:
         why = "waits for a response that never comes" if last.kind is CallKind.UNANSWERED else "then asked no more"
         why = f"ended at {moment(ended[0].t_ns)}" if ended else why
-        return not_met(f"{asked} and {why}; the answer in question never came", blocked_by="service_calls")
+        return not_met(
+            f"{asked} and {why}; the answer in question never came",
+            blocked_by="service_calls",
+            problem=ProblemKind.ENDED if ended else ProblemKind.STOPPED,
+        )
     raise HarnessError(f"{service}: no answer of the kind in question was sent")

@@ -8,17 +8,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
-from grader.core.chart import Chart, Look, Tone
+from grader.core.chart import Chart, Look
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
 from grader.judging.charts import (
     answer_panel,
-    happenings,
     input_panel,
-    points_of,
-    series,
     time_chart,
     which_answers,
 )
@@ -83,7 +80,6 @@ class ThresholdResponse:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         limit = f"{number(self.threshold)}{unit_of(self.input)}"
         side, answer = ("above", self.above) if self.side == "above" else ("at or below", self.otherwise)
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
@@ -94,14 +90,14 @@ class ThresholdResponse:
         messages = published(trace, self.output)
         if not messages:
             return self._once(self._silent(trace))
-        mine = [h for h in inputs if self._on_side(h.value)]
+        mine = [h for h in inputs if (h.value > self.threshold) == (self.side == "above")]
         if not mine:
             return self._nothing_asked(trace)
         every = published_numbers(trace, self.output)
         answers = last_of_instant(every)
         if not answers:
             type_ = messages[0].type
-            reason, problem = f"{self.output}: {quote(type_)} carries no number", Problem(ProblemKind.NO_NUMBER)
+            reason, problem = f"{self.output}: {quote(type_)} carries no number", ProblemKind.NO_NUMBER
             return self._once(not_met(reason, {"type": type_}, problem=problem))
         grace_ns = _grace(answers)
         prompt = answers if _answers_at_once(trace, self.input, answers) else ()
@@ -120,9 +116,6 @@ class ThresholdResponse:
     def _once(self, finding: Finding) -> Finding:
         """Return a finding that is the same for both sides, so that the second side waits for the first."""
         return replace(finding, blocked_by="threshold_response")
-
-    def _on_side(self, value: float) -> bool:
-        return (value > self.threshold) == (self.side == "above")
 
     def _expected(self, value: float) -> float:
         return self.above if value > self.threshold else self.otherwise
@@ -195,15 +188,19 @@ class ThresholdResponse:
         if len(both) > 1:
             cause = f"; {' and '.join(map(number, sorted(both)))} are published at one instant"
             hint = f"publish one answer to each number on {self.input}"
-            return not_met(reason + cause, evidence, hint=hint)
+            return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION)
         lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             cause = f"; the answers are right for what was published {span(lag)} before"
             return not_met(
-                reason + cause, evidence | {"lag_s": seconds(lag)}, hint=f"answer what has just come on {self.input}"
+                reason + cause,
+                evidence | {"lag_s": seconds(lag)},
+                hint=f"answer what has just come on {self.input}",
+                problem=ProblemKind.BEHIND,
             )
         cause, hint = self._diagnosis(violations, inputs, answers)
-        return not_met(reason + cause, evidence, hint=hint)
+        kind = ProblemKind.NO_ANSWER if first.got is None else ProblemKind.WRONG_ANSWER
+        return not_met(reason + cause, evidence, hint=hint, problem=kind)
 
     def _diagnosis(
         self, violations: Sequence[_Violation], inputs: Sequence[Held], answers: Sequence[Reading]
@@ -258,8 +255,17 @@ class ThresholdResponse:
             others = [e.topic for e in student_endpoints(trace, "subscription")]
             instead = f"; it subscribes to {quote(others[0])}" if others else ""
             hint = f"subscribe to {self.input}"
-            return not_met(f"{why.reason}; nothing subscribes to {self.input}{instead}", why.evidence, hint=hint)
-        return not_met(f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}", why.evidence)
+            return not_met(
+                f"{why.reason}; nothing subscribes to {self.input}{instead}",
+                why.evidence,
+                hint=hint,
+                problem=ProblemKind.ABSENT,
+            )
+        return not_met(
+            f"{why.reason}; {quote(ends[0].node)} subscribes to {self.input}{_deaf(ends)}",
+            why.evidence,
+            problem=why.problem,
+        )
 
     def _nothing_asked(self, trace: Trace) -> Finding:
         fault = first_fault(trace)
@@ -274,17 +280,15 @@ class ThresholdResponse:
         if not sent:
             return None
         asked = held(trace, self.input)
-        expected = [Reading(h.start_ns, self.above if h.value > self.threshold else self.otherwise) for h in asked]
+        expected = [Reading(h.start_ns, self._expected(h.value)) for h in asked]
         expected += [Reading(trace.stop_ns, expected[-1].value)]
         about = f"{counted(len(asked), 'value')} on {self.input}, each held for a while "
         about += f"({', '.join(number(h.value) for h in asked)}{unit_of(self.input)}); "
         about += f"{counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
         upper = input_panel(self.input, sent, self.threshold, Look.STEP)
-        lower = answer_panel(
-            self.output, answers, series("expected", points_of(expected), look=Look.STEP, tone=Tone.FAINT)
-        )
+        lower = answer_panel(self.output, answers, expected)
         title = f"Answers on {self.output} to {self.input}"
-        return time_chart(f"response {self.input}", title, about, (upper, lower), happenings(trace))
+        return time_chart(trace, f"response {self.input}", title, about, upper, lower)
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:

@@ -12,7 +12,7 @@ from grader.core.chart import Band, Chart, Look, Panel
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import SLACK, Formula, seconds, within
 from grader.core.trace import Message, Trace
-from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart
+from grader.judging.charts import plain_topic, points_of, series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import Curve, Sample, curve, followed_instead, pattern_of
 from grader.judging.values import (
@@ -48,7 +48,6 @@ class FieldEqual:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -64,7 +63,9 @@ class FieldEqual:
         clause = breach(wrong[0].value, path, as_rule(self.fields[path], self.tolerance))
         reason = f"{moment(wrong[0].t_ns)}, {self.topic}: {clause}; wrong in {len(wrong)} of "
         reason += counted(len(messages), "message")
-        return not_met(reason, evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)})
+        return not_met(
+            reason, evidence | {"field": path, "first_wrong_s": seconds(wrong[0].t_ns)}, problem=ProblemKind.WRONG_VALUE
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,6 @@ class FieldInRange:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -108,7 +108,7 @@ class FieldInRange:
         message, value = outside[0]
         reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {rule.wanted}; "
         reason += f"{len(outside)} of {counted(len(values), 'value')} lie outside"
-        return not_met(reason, evidence | {"first_outside_s": seconds(message.t_ns)})
+        return not_met(reason, evidence | {"first_outside_s": seconds(message.t_ns)}, problem=ProblemKind.WRONG_VALUE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,6 @@ class FieldMonotone:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} on {self.topic} only {self.direction}{', never equal' if self.strictly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -148,10 +147,16 @@ class FieldMonotone:
             k = wrong[0]
             reason = f"{moment(messages[k].t_ns)}, {self.topic}: {self.field} goes from {number(values[k - 1])} to "
             reason += f"{number(values[k])}, expected it {self.direction}; so {counted(len(wrong), 'time')}"
-            return not_met(reason, evidence | {"first_wrong_s": seconds(messages[k].t_ns)})
+            return not_met(
+                reason, evidence | {"first_wrong_s": seconds(messages[k].t_ns)}, problem=ProblemKind.WRONG_VALUE
+            )
         ends = f"from {number(values[0])} to {number(values[-1])} in {counted(len(values), 'message')}"
         if values[0] == values[-1]:
-            return not_met(f"{self.topic}: {self.field} never moves, {ends}, expected it {self.direction}", evidence)
+            return not_met(
+                f"{self.topic}: {self.field} never moves, {ends}, expected it {self.direction}",
+                evidence,
+                problem=ProblemKind.CONSTANT,
+            )
         return met(f"{self.topic}: {self.field} only {self.direction}, {ends}", evidence)
 
     def _fine(self, before: float, after: float) -> bool:
@@ -168,7 +173,7 @@ def _numbers(messages: Sequence[Message], path: str) -> Finding | tuple[float, .
         return found
     bare = next(m for m, v in zip(messages, values, strict=True) if v is None)
     reason = f"{moment(bare.t_ns)}, {bare.topic}: {quote(bare.type)} has no number {path}"
-    return not_met(reason, {"topic": bare.topic, "type": bare.type})
+    return not_met(reason, {"topic": bare.topic, "type": bare.type}, problem=ProblemKind.NO_FIELD)
 
 
 def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Finding:
@@ -176,7 +181,7 @@ def too_few_messages(trace: Trace, topic: str, found: int, wanted: int) -> Findi
     if found == 0:
         return explain_no_message(trace, topic)
     reason = f"{topic}: {counted(found, 'message')}, expected at least {wanted}"
-    return explain_fault(trace, reason, last=True) or not_met(reason, {"messages": found})
+    return explain_fault(trace, reason, last=True) or not_met(reason, {"messages": found}, problem=ProblemKind.TOO_FEW)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +209,6 @@ class FieldFunction:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
 
     def judge(self, trace: Trace) -> Finding:
@@ -257,7 +261,7 @@ class FieldFunction:
         found = f"{self.topic}: {counted(len(samples), 'message')}, expected at least {self.at_least}"
         fault = first_fault(trace)
         if fault is None:
-            return not_met(found, evidence, blocked_by="topic_rate")
+            return not_met(found, evidence, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
         return faulted(fault, found, evidence, last=True)
 
     def _differs(
@@ -277,7 +281,8 @@ class FieldFunction:
         reason += f"wrong in {len(wrong)} of {counted(len(samples), 'message')}"
         instead = followed_instead(wanted, samples, self.tolerance)
         reason += f"; {instead.said}" if instead.said else ""
-        problem = Problem(ProblemKind.COUNT_START, start=instead.start) if instead.start is not None else None
+        kind = ProblemKind.WRONG_VALUE if instead.start is None else ProblemKind.COUNT_START
+        problem = Problem(kind, start=instead.start)
         return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, hint=instead.hint, problem=problem)
 
 
@@ -304,7 +309,6 @@ class RandomInRange:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         span_ = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
@@ -313,10 +317,14 @@ class RandomInRange:
         messages = published(trace, self.topic)
         if not messages:
             silent = explain_no_message(trace, self.topic)
-            return not_met(silent.reason, silent.evidence, blocked_by="topic_rate")
+            return not_met(silent.reason, silent.evidence, blocked_by="topic_rate", problem=silent.problem)
         values = published_numbers(trace, self.topic)
         if len(values) < len(messages):
-            return not_met(f"{self.topic}: {quote(messages[0].type)} carries no number", {"type": messages[0].type})
+            return not_met(
+                f"{self.topic}: {quote(messages[0].type)} carries no number",
+                {"type": messages[0].type},
+                problem=ProblemKind.NO_NUMBER,
+            )
         return self._outside(values) or self._computed(values) or self._drawn(values)
 
     @property
@@ -344,7 +352,7 @@ class RandomInRange:
         reason = f"{self.topic}: first {side} at {moment(first.t_ns)} ({number(first.value)}{unit}); "
         reason += f"{len(bad)} of {len(values)} values lie outside {number(self.low)} to {number(self.high)}{unit}"
         evidence = self._evidence(values) | {"outside": len(bad), "first_outside_s": seconds(first.t_ns)}
-        return not_met(reason, evidence, hint=self._hint)
+        return not_met(reason, evidence, hint=self._hint, problem=ProblemKind.WRONG_VALUE)
 
     def _computed(self, values: Sequence[Reading]) -> Finding | None:
         got = [r.value for r in values]
@@ -355,11 +363,13 @@ class RandomInRange:
             reason = (
                 f"{self.topic}: {counted(len(got), 'value')} ({numbers(got)}{unit_of(self.topic)}) cannot show chance"
             )
-            return not_met(reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate")
-        problem = None
+            return not_met(
+                reason, self._evidence(values), hint=self._hint, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW
+            )
+        problem = ProblemKind.NOT_RANDOM
         if pattern == "constant":
             shown = f"constant, {number(got[0])}{unit_of(self.topic)} in all {len(got)} messages"
-            problem = Problem(ProblemKind.CONSTANT)
+            problem = ProblemKind.CONSTANT
         else:
             shown = f"{pattern} ({numbers(got[:5])}, ...)"
         reason = f"{self.topic}: the values are not random but {shown}"
@@ -386,10 +396,5 @@ class RandomInRange:
         label = f"{number(self.low)} to {number(self.high)}{unit_of(self.topic)}"
         dots = series(plain_topic(self.topic), points_of(values), look=Look.LINE)
         band = Band(self.low, self.high, f"{label}: accepted")
-        return time_chart(
-            f"range {self.topic}",
-            f"Values on {self.topic}",
-            f"{about}{label}.",
-            (Panel(plain_topic(self.topic), unit, (dots,), bands=(band,)),),
-            happenings(trace),
-        )
+        panel = Panel(plain_topic(self.topic), unit, (dots,), bands=(band,))
+        return time_chart(trace, f"range {self.topic}", f"Values on {self.topic}", f"{about}{label}.", panel)

@@ -32,7 +32,6 @@ class BidirectionalGraph:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"one node reached by {self.forward}, the other by {self.back}, with the types agreeing"
 
     def judge(self, trace: Trace) -> Finding:
@@ -69,16 +68,13 @@ class BidirectionalGraph:
                 f"{self.forward} and {self.back}: both have an edge, but not between the same two processes at once"
             )
             return not_met(reason, evidence, problem=Problem(ProblemKind.NO_EDGE, (self.forward, self.back)))
-        reason = "; ".join(_gap(topic, endpoints) for topic in broken)
-        reason += "; only one direction" if len(broken) == 1 else ""
-        problem = Problem(ProblemKind.NO_EDGE, tuple(broken))
-        return not_met(reason, evidence, hint=_gap_hint(broken[0], endpoints), problem=problem)
+        gaps = [_gap(topic, endpoints) for topic in broken]
+        reason = "; ".join(said for said, _ in gaps) + ("; only one direction" if len(broken) == 1 else "")
+        return not_met(reason, evidence, hint=gaps[0][1], problem=Problem(ProblemKind.NO_EDGE, tuple(broken)))
 
 
 def _edges(snapshot: GraphSnapshot, topic: str) -> list[Pair]:
-    ends = [e for e in snapshot.endpoints if e.topic == topic and e.participant != -1]
-    publishers = [e for e in ends if e.kind == "publisher"]
-    subscriptions = [e for e in ends if e.kind == "subscription"]
+    publishers, subscriptions = _ends(topic, (e for e in snapshot.endpoints if e.participant != -1))
     return [(p, s) for p in publishers for s in subscriptions if p.type == s.type]
 
 
@@ -90,34 +86,28 @@ def _drawn(publisher: Endpoint, subscription: Endpoint) -> str:
     return f"{quote(publisher.node)} ─{publisher.topic}→ {quote(subscription.node)}"
 
 
-def _split(topic: str, endpoints: Iterable[Endpoint]) -> tuple[list[Endpoint], list[Endpoint]]:
+def _ends(topic: str, endpoints: Iterable[Endpoint]) -> tuple[list[Endpoint], list[Endpoint]]:
+    """Return the publishers and the subscriptions of a topic."""
     mine = [e for e in endpoints if e.topic == topic]
     return [e for e in mine if e.kind == "publisher"], [e for e in mine if e.kind == "subscription"]
 
 
-def _gap(topic: str, endpoints: list[Endpoint]) -> str:
-    publishers, subscriptions = _split(topic, endpoints)
+def _gap(topic: str, endpoints: list[Endpoint]) -> tuple[str, str]:
+    """Return why a topic connects no two processes, and a hint, which may be empty."""
+    publishers, subscriptions = _ends(topic, endpoints)
     if not publishers and not subscriptions:
-        return f"{topic}: nothing publishes it and nothing subscribes to it"
+        return f"{topic}: nothing publishes it and nothing subscribes to it", ""
     if not publishers:
-        return f"{topic}: {quote(subscriptions[0].node)} subscribes to it, nothing publishes it"
+        said = f"{topic}: {quote(subscriptions[0].node)} subscribes to it, nothing publishes it"
+        return said, f"publish {topic} in the other node"
     if not subscriptions:
-        return f"{topic}: {quote(publishers[0].node)} publishes it, nothing subscribes to it"
+        said = f"{topic}: {quote(publishers[0].node)} publishes it, nothing subscribes to it"
+        return said, f"subscribe to {topic} in the other node"
     if publishers[0].type != subscriptions[0].type:
-        there = f"{quote(publishers[0].node)} publishes {quote(publishers[0].type)}"
-        return f"{topic}: {there}, {quote(subscriptions[0].node)} subscribes {quote(subscriptions[0].type)}"
-    return f"{topic}: its publisher and its subscription are in one process or not there at the same time"
-
-
-def _gap_hint(topic: str, endpoints: list[Endpoint]) -> str:
-    publishers, subscriptions = _split(topic, endpoints)
-    if publishers and not subscriptions:
-        return f"subscribe to {topic} in the other node"
-    if subscriptions and not publishers:
-        return f"publish {topic} in the other node"
-    if publishers and subscriptions and publishers[0].type != subscriptions[0].type:
-        return f"use the same message type for {topic} in both files"
-    return ""
+        said = f"{topic}: {quote(publishers[0].node)} publishes {quote(publishers[0].type)}, "
+        said += f"{quote(subscriptions[0].node)} subscribes {quote(subscriptions[0].type)}"
+        return said, f"use the same message type for {topic} in both files"
+    return f"{topic}: its publisher and its subscription are in one process or not there at the same time", ""
 
 
 _QOS_HINT = "pass a QoSProfile with that policy where the {kind} is created"
@@ -148,7 +138,6 @@ class Qos:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a {self.kind} on {self.topic} with {self._wanted}"
 
     @property
@@ -166,7 +155,7 @@ class Qos:
             return self._absent(trace)
         fitting = [e for e in mine if self._fits(e) and (self.depth is None or e.depth >= self.depth)]
         unknown = [e for e in mine if self._fits(e) and e.depth == 0]
-        evidence = {"endpoints": [_qos(e) for e in mine]}
+        evidence = {"endpoints": [[e.node, e.reliability, e.durability, seconds(e.deadline_ns), e.depth] for e in mine]}
         if fitting:
             return met(f"{self.topic}: the {self.kind} of {quote(fitting[0].node)} has {self._wanted}", evidence)
         if unknown:
@@ -184,25 +173,17 @@ class Qos:
     def _absent(self, trace: Trace) -> Finding:
         if self.kind == "subscription":
             return explain_no_subscription(trace, self.topic)
-        fault = first_fault(trace)
-        if fault is not None:
-            return faulted(fault, f"no publisher on {self.topic}")
+        if crashed := explain_fault(trace, f"no publisher on {self.topic}"):
+            return crashed
         seen = list(dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")))
-        return not_met(f"{self.topic}: no publisher{_seen(seen)}", {"seen": seen[:20]})
-
-
-def _qos(end: Endpoint) -> list[object]:
-    return [end.node, end.reliability, end.durability, seconds(end.deadline_ns), end.depth]
+        ending = f"; seen: {listed(seen)}" if seen else ""
+        return not_met(f"{self.topic}: no publisher{ending}", {"seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
 def _policies(end: Endpoint) -> str:
     deadline = f", a deadline of {number(seconds(end.deadline_ns))} s" if end.deadline_ns else ""
     depth = f", a depth of {end.depth}" if end.depth else ""
     return f"{quote(end.reliability)} reliability, {quote(end.durability)} durability{deadline}{depth}"
-
-
-def _seen(names: Sequence[str]) -> str:
-    return f"; seen: {listed(names)}" if names else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +198,6 @@ class NodeName:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a node named {self.name}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -232,7 +212,8 @@ class NodeName:
         found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
         near = nearest(wanted, nodes) or (nodes[0] if len(nodes) == 1 else None)
         hint = f"name the node {wanted.rsplit('/', 1)[-1]!r} instead of {quote(near)}" if near else ""
-        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint)
+        kind = ProblemKind.OTHER_NAME if nodes else ProblemKind.ABSENT
+        return not_met(f"{wanted}: not in the ROS graph, found {found}", {"nodes": nodes[:20]}, hint=hint, problem=kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +236,6 @@ class TopicNames:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"publishes {', '.join(self.publishes)}"] if self.publishes or self.exactly else []
         parts += [f"subscribes to {', '.join(self.subscribes)}"] if self.subscribes or self.exactly else []
         return f"{self.node or 'the program'} {' and '.join(parts)}{' and nothing else' if self.exactly else ''}"
@@ -318,7 +298,6 @@ class GraphEdges:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{', '.join(map(str, self.edges))} in the ROS graph{' at one moment' if self.at_once else ''}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -335,7 +314,7 @@ class GraphEdges:
         if missing is None:
             return not_met("every edge is there, but never all of them at once", evidence)
         return explain_fault(trace, f"no edge {missing}", evidence) or not_met(
-            f"no edge {missing}; {self._instead(trace, missing)}", evidence
+            f"no edge {missing}; {self._instead(trace, missing)}", evidence, problem=ProblemKind.NO_EDGE
         )
 
     def _has(self, graph: GraphSnapshot, edge: GraphEdge) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
-from grader.core.exercise import Finding, Location
+from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import DurationNs, Pattern, seconds, within
 from grader.core.trace import LogRecord, Message, Trace
 from grader.judging.findings import (
@@ -20,7 +20,7 @@ from grader.judging.findings import (
     first_fault,
     met,
     not_met,
-    partly,
+    only_printed,
     waiting_for,
 )
 from grader.judging.output import Output, is_no_node, numbers_in, printed_lines, shape_of, student_records
@@ -36,7 +36,13 @@ def no_node(trace: Trace, process: str, evidence: dict[str, object]) -> Finding:
     fault = first_fault(trace, process)
     if fault is not None:
         reason = f"{fault_sentence(fault)}; {reason}"
-    return not_met(reason, evidence, hint="create the node, and log with node.get_logger()", fault=fault)
+    return not_met(
+        reason,
+        evidence,
+        hint="create the node, and log with node.get_logger()",
+        fault=fault,
+        problem=ProblemKind.NO_NODE,
+    )
 
 
 def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[str, object], hint: str) -> Finding:
@@ -44,7 +50,9 @@ def complained(process: str, bad: Sequence[LogRecord], when: str, more: Mapping[
     reason = f"{process}: {counted(len(bad), 'record')} of severity ERROR or FATAL{when}, the first at "
     reason += f"{moment(bad[0].t_ns)}: {quote(bad[0].text)}"
     location = Location(bad[0].file, bad[0].line) if bad[0].file and bad[0].line > 0 else None
-    return replace(not_met(reason, {"records": len(bad), **more}, hint=hint), location=location)
+    return replace(
+        not_met(reason, {"records": len(bad), **more}, hint=hint, problem=ProblemKind.ERRORS_LOGGED), location=location
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +70,6 @@ class UsesLogger:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a record of {self.process} through its logger; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -79,9 +86,12 @@ class UsesLogger:
             return met(f"{reason}: {quote(first.text)}", evidence)
         if lines:
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, none through the logger"
-            return partly(reason, evidence | {"first": quote(lines[0].text)}, hint=LOGGER_HINT)
+            return only_printed(reason, evidence | {"first": quote(lines[0].text)}, LOGGER_HINT)
         return explain_fault(trace, "nothing was logged", evidence, process=self.process) or not_met(
-            f"{self.process}: no log record in {span(trace.stop_ns)}", evidence, hint=LOGGER_HINT
+            f"{self.process}: no log record in {span(trace.stop_ns)}",
+            evidence,
+            hint=LOGGER_HINT,
+            problem=ProblemKind.NOT_LOGGED,
         )
 
 
@@ -117,7 +127,6 @@ class LogsMatching:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         most = f" and at most {self.at_most}" if self.at_most is not None else ""
         text = f" matching {self.pattern}" if self.pattern else ""
         level = "" if self.level == "DEBUG" else f" of severity {self.level}{'' if self.exactly else ' or higher'}"
@@ -142,7 +151,7 @@ class LogsMatching:
             and not self._flaw(sorted([*mine, *lines], key=lambda o: o.t_ns))
         ):
             reason = f"{self.process}: {counted(len(lines), 'line')} printed, {counted(len(mine), 'record')} logged"
-            return partly(f"{reason}; expected {self.expected}", evidence, hint=LOGGER_HINT)
+            return only_printed(f"{reason}; expected {self.expected}", evidence, LOGGER_HINT)
         reason = f"{self.process}: {flaw}; expected {self.expected}"
         fault = first_fault(trace, self.process)
         if fault is not None and len(mine) < self.at_least:
@@ -219,7 +228,6 @@ class LogsEvery:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return (
             f"one log of {self.process} for every {self.every} messages on {self.topic}; printing alone is half of it"
         )
@@ -243,7 +251,7 @@ class LogsEvery:
         shown = next((r for r in printed if not self._flaw(r, messages)), None)
         if shown is not None and not self._flooded(printed, messages):
             reason = f"{self._said(shown, lines, 'printed')}, not through the logger"
-            return partly(reason, self._evidence(shown, messages), hint=LOGGER_HINT)
+            return only_printed(reason, self._evidence(shown, messages), LOGGER_HINT)
         return self._wrong(messages, logged or printed)
 
     def _rhythms(self, trace: Trace, messages: Sequence[Message], outputs: Sequence[Output]) -> list[_Rhythm]:
@@ -290,7 +298,9 @@ class LogsEvery:
             return None
         reason = f"{self.process}: something is written with {len(most.places)} of {len(messages)} messages; "
         hint = f"count the messages, and log when the count is divisible by {self.every}: count % {self.every} == 0"
-        return not_met(reason + self._wanted, self._evidence(most, messages), hint=hint)
+        return not_met(
+            reason + self._wanted, self._evidence(most, messages), hint=hint, problem=ProblemKind.ONE_PER_MESSAGE
+        )
 
     @property
     def _wanted(self) -> str:
@@ -309,14 +319,19 @@ class LogsEvery:
         fault = first_fault(trace, self.process)
         reason = f"{self.topic}: {counted(len(messages), 'message')} cannot show one log for every {self.every}"
         if fault is None:
-            return not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate")
+            return not_met(reason, {"messages": len(messages)}, blocked_by="topic_rate", problem=ProblemKind.TOO_FEW)
         return faulted(fault, reason)
 
     def _wrong(self, messages: Sequence[Message], found: Sequence[_Rhythm]) -> Finding:
         if not found:
             first = moment(messages[0].t_ns)
             reason = f"{self.process}: nothing is logged from the first message at {first} on; {self._wanted}"
-            return not_met(reason, {"messages": len(messages), "logs": 0, "every": self.every}, hint=LOGGER_HINT)
+            return not_met(
+                reason,
+                {"messages": len(messages), "logs": 0, "every": self.every},
+                hint=LOGGER_HINT,
+                problem=ProblemKind.NOT_LOGGED,
+            )
         flaw = self._flaw(found[0], messages)
         reason = f"{self.process}: {counted(len(found[0].places), 'log')}, {flaw}; {self._wanted}"
         hint = f"count every message that is published, and log when count % {self.every} == 0"

@@ -12,14 +12,21 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.checks.logs import complained
-from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, partly
+from grader.judging.findings import (
+    fault_hint,
+    fault_sentence,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    only_printed,
+)
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (
     Analysis,
-    Group,
     Track,
     X,
     Y,
@@ -74,7 +81,6 @@ class LogsPosition:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -87,7 +93,7 @@ class LogsPosition:
             return met(self._right(logged), _evidence(logged))
         printed = printed_positions(trace, self.process, track)
         if self._shows(trace, printed):
-            return partly(f"{self._right(printed)}, printed and not logged", _evidence(printed), hint=_LOGGER_HINT)
+            return only_printed(f"{self._right(printed)}, printed and not logged", _evidence(printed), _LOGGER_HINT)
         chosen = logged if logged.groups or not printed.groups else printed
         return self._explain(trace, track, chosen)
 
@@ -109,14 +115,12 @@ class LogsPosition:
         evidence = _evidence(found) | {"cause": cause.name}
         if fault is not None and cause.name in ("no_pair", "few"):
             return faulted(fault, cause.sentence if found.right else "no position was logged before it", evidence)
-        if not found.groups and not self._wrote_after(trace, track):
+        if not found.groups and not any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process)):
             during = span(track.stop_ns - track.start_ns)
             reason = f"{self.process}: nothing was logged while {self.topic} was played for {during}"
-            return not_met(reason, evidence | {"cause": "nothing"})
-        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint)
-
-    def _wrote_after(self, trace: Trace, track: Track) -> bool:
-        return any(o.t_ns >= track.times_ns[0] for o in written(trace, self.process))
+            return not_met(reason, evidence | {"cause": "nothing"}, problem=ProblemKind.NOT_LOGGED)
+        problem = Problem(ProblemKind.WRONG_VALUE, detail=cause.name)
+        return not_met(f"{self.process}: {cause.sentence}", evidence, hint=cause.hint, problem=problem)
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the driven path with the logged positions on it, or None without odometry."""
@@ -175,7 +179,6 @@ class LogPeriod:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         share = number(100 * self.tolerance)
         return f"one log every {number(seconds(self.period))} s ± {share} % on average while {self.topic} is played"
 
@@ -183,11 +186,11 @@ class LogPeriod:
         """Return full credit if the average is right and there is no long gap."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
-            return not_met(track.reason, track.evidence, blocked_by="logs_position")
+            return not_met(track.reason, track.evidence, blocked_by="logs_position", problem=track.problem)
         times = [t for t in self.log_times(trace, track) if track.start_ns <= t < track.stop_ns]
         if not times:
             reason = f"{self.process}: nothing with a number was logged while {self.topic} was played"
-            return not_met(reason, blocked_by="logs_position")
+            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
         average_ns = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 0.0
         evidence = {
             "logs": len(times),
@@ -203,7 +206,9 @@ class LogPeriod:
         wanted = f"expected one every {span(self.period)} ± {number(100 * self.tolerance)} %"
         if len(times) == 1:
             only = f"{self.process}: 1 log in {span(track.stop_ns - track.start_ns)}, at {moment(times[0])}; {wanted}"
-            return not_met(only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process))
+            return not_met(
+                only, evidence, hint=_TIMER_HINT, fault=first_fault(trace, self.process), problem=ProblemKind.TOO_FEW
+            )
         average = f"{self.process}: {len(times)} logs, one every {average_ns / 1e9:.3f} s on average"
         if not within(average_ns, self.period, self.tolerance * self.period):
             return self._off(track, times, f"{average}; {wanted}", wanted, evidence)
@@ -213,7 +218,10 @@ class LogPeriod:
         fault = first_fault(trace, self.process)
         ended = f"; {fault_sentence(fault)}" if fault else ""
         return not_met(
-            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}", evidence, fault=fault
+            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}",
+            evidence,
+            fault=fault,
+            problem=ProblemKind.STOPPED,
         )
 
     def _off(
@@ -222,10 +230,10 @@ class LogPeriod:
         """Return a finding that the average is wrong, with `reason`, or that each message is logged."""
         played = sum(track.start_ns <= t < track.stop_ns for t in track.times_ns)
         if len(times) < _ONE_A_MESSAGE * played:
-            return not_met(reason, evidence, hint=_TIMER_HINT)
+            return not_met(reason, evidence, hint=_TIMER_HINT, problem=ProblemKind.WRONG_RATE)
         rate = len(times) / seconds(track.stop_ns - track.start_ns)
         each = f"{self.process}: {rate:.0f} logs a second: one for every message; {wanted}"
-        return not_met(each, evidence, hint=_TIMER_HINT, problem=Problem(ProblemKind.ONE_PER_MESSAGE))
+        return not_met(each, evidence, hint=_TIMER_HINT, problem=ProblemKind.ONE_PER_MESSAGE)
 
     def _long_gap(self, track: Track, times: Sequence[int]) -> tuple[int, int] | None:
         ends = [track.start_ns, *times, track.stop_ns]
@@ -242,8 +250,9 @@ class LogPeriod:
             return printed.times_ns
         for outputs in (student_records(trace, self.process), printed_lines(trace, self.process)):
             during = [o for o in outputs if track.start_ns <= o.t_ns < track.stop_ns]
-            commonest = _commonest(grouped(blocks(during, trace.clock)))
-            if commonest is not None:
+            groups = grouped(blocks(during, trace.clock))
+            if groups:  # of equally frequent templates, the one with two numbers
+                commonest = max(groups, key=lambda group: (len(group.entries), bool(group.pairs)))
                 return tuple(dict.fromkeys(e.t_ns for e in commonest.entries))
         return ()
 
@@ -263,20 +272,13 @@ class LogPeriod:
         share = self.tolerance * period_s
         label = f"{number(period_s)} s ± {number(100 * self.tolerance)} % on average"
         return time_chart(
+            trace,
             f"period {self.topic}",
             "When positions were logged",
             _describe_period(times, self),
-            (
-                Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
-                Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
-            ),
-            happenings(trace),
+            Panel("logs", "", (dots,), lanes=("log",), grid=(seconds(times[0]), period_s)),
+            Panel("interval", "s", (gaps,), bands=(Band(period_s - share, period_s + share, label),)),
         )
-
-
-def _commonest(groups: Sequence[Group]) -> Group | None:
-    """Return the most frequent template; of equally frequent ones, the one with two numbers."""
-    return max(groups, key=lambda g: (len(g.entries), bool(g.pairs)), default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +297,6 @@ class WaitsGracefully:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         silence = number(seconds(self.silence))
         return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
 
@@ -333,7 +334,11 @@ class WaitsGracefully:
         after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
-            return not_met(f"{alive}, but no sign that the data arrived", blocked_by="logs_position")
+            return not_met(
+                f"{alive}, but no sign that the data arrived",
+                blocked_by="logs_position",
+                problem=ProblemKind.NOT_LOGGED,
+            )
         evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
 

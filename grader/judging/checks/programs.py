@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding, Location
+from grader.core.exercise import Finding, Location, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import FaultKind, Message, Trace
 from grader.judging.findings import (
+    explain_fault,
     explain_no_message,
     fault_hint,
     fault_sentence,
@@ -59,7 +60,6 @@ class ParameterDeclared:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         kind = f" of type {self.type}" if self.type else ""
         value = "" if self.value is None else f", by default {shown(self.value)}"
         return f"the parameter {self.name}{kind}{value}"
@@ -74,10 +74,12 @@ class ParameterDeclared:
         evidence = {"node": found.node, "name": self.name, "type": found.type, "value": found.value}
         if not found.type:
             reason = f"{quote(found.node)}: has no parameter {self.name}, expected {self.expected}"
-            return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name))
+            return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name), problem=ProblemKind.ABSENT)
         flaw = self._flaw(found)
         text = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
-        return not_met(f"{text}, expected {flaw}", evidence) if flaw else met(text, evidence)
+        if not flaw:
+            return met(text, evidence)
+        return not_met(f"{text}, expected {flaw}", evidence, problem=ProblemKind.WRONG_VALUE)
 
     def _flaw(self, found: ReportedParameter) -> str:
         if self.type not in (None, found.type):
@@ -93,16 +95,19 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     Raises:
         HarnessError: The node was there, but nobody asked it.
     """
-    fault = first_fault(trace)
-    if fault is not None:
-        return faulted(fault, f"the parameter {name} could not be asked for")
+    if crashed := explain_fault(trace, f"the parameter {name} could not be asked for"):
+        return crashed
     nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
     if node is not None and node not in nodes:
         reason = f"{node}: not in the ROS graph, so it was not asked for {name}; found {listed(nodes) or 'no node'}"
-        return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name")
+        return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
-        return not_met(f"{who}: no answer to the question for {name}", hint="spin the node: rclpy.spin(node)")
+        return not_met(
+            f"{who}: no answer to the question for {name}",
+            hint="spin the node: rclpy.spin(node)",
+            problem=ProblemKind.NO_ANSWER,
+        )
     raise HarnessError(f"the recording does not ask for the parameter {name}")
 
 
@@ -134,7 +139,6 @@ class ParameterTakesEffect:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         what = self.field if self.effect == "field" else f"the {self.effect}"
         return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
 
@@ -220,7 +224,6 @@ class NoFault:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process or 'every process'} runs to the end without an exception"
 
     def judge(self, trace: Trace) -> Finding:
@@ -250,7 +253,6 @@ class CleanShutdown:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
     def judge(self, trace: Trace) -> Finding:
@@ -264,7 +266,10 @@ class CleanShutdown:
                 return not_met(reason, hint=fault_hint(first), fault=first)
             ended = trace.marks("exited", self.process)
             if ended:
-                return not_met(f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped")
+                return not_met(
+                    f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped",
+                    problem=ProblemKind.ENDED,
+                )
             raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so nobody stopped it")
         asked_ns = signals[0].t_ns
         stopped = [m for m in trace.marks("stopped", self.process) if m.t_ns >= asked_ns]
@@ -274,17 +279,31 @@ class CleanShutdown:
             reason = f"{self.process}: ended {seconds(took):.3f} s after Ctrl-C"
             if took <= self.within + LATENESS_NS[trace.clock]:
                 return met(reason, {"took_s": seconds(took)})
-            return not_met(f"{reason}, expected within {number(seconds(self.within))} s", {"took_s": seconds(took)})
+            return not_met(
+                f"{reason}, expected within {number(seconds(self.within))} s",
+                {"took_s": seconds(took)},
+                problem=ProblemKind.TOO_LATE,
+            )
         if after:
             reason = f"{moment(after[0].t_ns)}, after Ctrl-C: {fault_sentence(after[0])}"
             hint = "" if after[0].kind is FaultKind.EXCEPTION else _SHUTDOWN_HINT
             return not_met(reason, hint=hint, fault=after[0])
         reason = f"{self.process}: still running {span(self.within)} after Ctrl-C at {moment(asked_ns)}"
-        return not_met(reason, {"asked_s": seconds(asked_ns)}, hint=_SHUTDOWN_HINT)
+        return not_met(reason, {"asked_s": seconds(asked_ns)}, hint=_SHUTDOWN_HINT, problem=ProblemKind.STILL_RUNNING)
+
+
+class _OfSource:
+    """A check of a file's text, which is in no recording."""
+
+    __slots__ = ()
+    process: str
+
+    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
+        raise HarnessError(f"{self.process}: its text was not kept")
 
 
 @dataclass(frozen=True, slots=True)
-class SourceUses:
+class SourceUses(_OfSource):
     """A student's file contains a class that derives from a given one, and calls of given functions or methods.
 
     The file is read, not run: imports under other names are followed, and unreachable lines count.
@@ -302,13 +321,8 @@ class SourceUses:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"a class that derives from {' or '.join(self.derives_from)}"] if self.derives_from else []
         return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
-
-    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise HarnessError: the recording does not contain the file."""
-        raise HarnessError(f"{self.process}: its text was not kept")
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Return full credit if everything is there; the reason names what is missing."""
@@ -332,7 +346,7 @@ class SourceUses:
 
 
 @dataclass(frozen=True, slots=True)
-class SourceAvoids:
+class SourceAvoids(_OfSource):
     """A file does not call given functions, anywhere or in callbacks, and optionally has no `global` statement.
 
     The file is read, not run: imports under other names are followed. A callback is a function passed to a timer,
@@ -352,13 +366,11 @@ class SourceAvoids:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
-        parts = [f"no call of {name}" for name in self.calls] + ["no global"] * self.globals
-        return f"in {self.process}{' in callbacks' if self.where == 'callbacks' else ''} {' and '.join(parts)}"
+        return f"in {self.process}{' in callbacks' if self.where == 'callbacks' else ''} {self._nothing_forbidden}"
 
-    def judge(self, trace: Trace) -> Finding:  # noqa: ARG002 - as every check
-        """Raise HarnessError: the recording does not contain the file."""
-        raise HarnessError(f"{self.process}: its text was not kept")
+    @property
+    def _nothing_forbidden(self) -> str:
+        return " and ".join([f"no call of {name}" for name in self.calls] + ["no global"] * self.globals)
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
         """Return full credit if nothing forbidden is there; the reason names the first place."""
@@ -368,7 +380,8 @@ class SourceAvoids:
         found = self._found(source)
         evidence = {"found": [[name, line] for line, name in found][:20]}
         if not found:
-            return met(f"{self.process}: {self.expected.partition(' ')[2].partition(' ')[2]}", evidence)
+            place = "in callbacks " if self.where == "callbacks" else ""
+            return met(f"{self.process}: {place}{self._nothing_forbidden}", evidence)
         line, name = found[0]
         inside = " in a callback" if self.where == "callbacks" else ""
         reason = f"{self.process}:{line}: {name}{inside}, expected none; {counted(len(found), 'place')}"

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from grader.core.chart import Band, Chart, Level, Look, Panel, Point, Tone
-from grader.core.exercise import Finding, Problem, ProblemKind
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, seconds, within
 from grader.core.trace import ClockKind, Fault, FaultKind, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.findings import explain_no_message, fault_hint, fault_sentence, first_fault, met, not_met, partly
 from grader.judging.values import published
 from grader.judging.wording import counted, moment, number, quote, span
@@ -77,7 +77,6 @@ class TopicRate:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         over = "over the whole observation" if self.window is None else f"over {span(self.window)}"
         text = f"{self.topic} at {number(self.rate)} ± {number(self.tolerance)} Hz on average {over}"
         if self.partly_tolerance is not None:
@@ -118,7 +117,9 @@ class TopicRate:
             return None
         reason = f"{self.topic}: {found.sentence()}; {rate_hz:.3f} Hz from {moment(later[0])} on; "
         reason += f"{self._wanted} to the end"
-        return not_met(reason, evidence | {"later_rate_hz": rate_hz}, hint=self._hint(rate_hz))
+        return not_met(
+            reason, evidence | {"later_rate_hz": rate_hz}, hint=self._hint(rate_hz), problem=ProblemKind.RATE_CHANGES
+        )
 
     def _evidence(self, found: _Measured) -> dict[str, object]:
         return {
@@ -138,9 +139,10 @@ class TopicRate:
         reason = f"{self.topic}: {found.sentence()}; {self._wanted}"
         if within(found.rate_hz, self.rate, self.tolerance):
             return met(reason, evidence)
+        problem = ProblemKind.WRONG_RATE
         if self.partly_tolerance is not None and within(found.rate_hz, self.rate, self.partly_tolerance):
-            return partly(reason, evidence, hint=self._hint(found.rate_hz))
-        return not_met(reason, evidence, hint=self._hint(found.rate_hz))
+            return partly(reason, evidence, hint=self._hint(found.rate_hz), problem=problem)
+        return not_met(reason, evidence, hint=self._hint(found.rate_hz), problem=problem)
 
     def _flaw(self, trace: Trace, found: _Measured, evidence: dict[str, object]) -> Finding | None:
         """Return why the average of a window is not meaningful, or None if it is."""
@@ -148,13 +150,13 @@ class TopicRate:
         seen = f"{self.topic}: {found.sentence()}"
         if not found.steady:
             hint = f"publish one message every {self._period_text()} rather than several at once"
-            problem = Problem(ProblemKind.BURSTS)
+            problem = ProblemKind.BURSTS
             return not_met(f"{seen}; the messages come in bursts; {self._wanted}", evidence, hint=hint, problem=problem)
         silence = found.stop_ns - last
         if silence > max(2 * self._period_ns, 2 * found.average_ns) + _END_SLACK_NS[trace.clock]:
             ended, fault = _ending(trace, first, last)
             hint = fault_hint(fault) if fault else ""
-            reason, problem = f"{seen}; {ended}; {self._wanted}", Problem(ProblemKind.STOPPED)
+            reason, problem = f"{seen}; {ended}; {self._wanted}", ProblemKind.STOPPED
             return not_met(reason, evidence, hint=hint, fault=fault, problem=problem)
         if (
             self.window is not None
@@ -167,7 +169,9 @@ class TopicRate:
             observed += f"; {fault_sentence(fault)}" if fault else ""
             off = fault is None and not within(found.rate_hz, self.rate, self.tolerance)
             hint = self._hint(found.rate_hz) if off else ""
-            return not_met(f"{seen}; {observed}; {self._wanted}", evidence, hint=hint, fault=fault)
+            return not_met(
+                f"{seen}; {observed}; {self._wanted}", evidence, hint=hint, fault=fault, problem=ProblemKind.TOO_LATE
+            )
         return None
 
     def _too_few(self, trace: Trace, times: tuple[int, ...]) -> Finding:
@@ -180,7 +184,7 @@ class TopicRate:
         if fault is not None:
             return not_met(f"{self.topic}: {found}; {fault_sentence(fault)}; {self._wanted}", evidence, fault=fault)
         hint = f"publish from a timer: create_timer({self._period_text(bare=True)}, ...) takes the period in seconds"
-        return not_met(f"{self.topic}: {found}; {self._wanted}", evidence, hint=hint)
+        return not_met(f"{self.topic}: {found}; {self._wanted}", evidence, hint=hint, problem=ProblemKind.TOO_FEW)
 
     def _period_text(self, *, bare: bool = False) -> str:
         return number(1 / self.rate) + ("" if bare else " s")
@@ -200,13 +204,8 @@ class TopicRate:
         if len(times) < 2 or times[0] == times[-1]:
             return None
         inside = [t for t in times if self.window is None or t < times[0] + self.window]
-        return time_chart(
-            f"rate {self.topic}",
-            f"How often {self.topic} came",
-            _describe_rate(self, inside),
-            (_rate_panel(self, times), _interval_panel(self, times)),
-            happenings(trace),
-        )
+        title, panels = f"How often {self.topic} came", (_rate_panel(self, times), _interval_panel(self, times))
+        return time_chart(trace, f"rate {self.topic}", title, _describe_rate(self, inside), *panels)
 
 
 def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:

@@ -8,12 +8,20 @@ from functools import partial
 
 from grader.core.chart import Chart, Look, Panel, Tone
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.core.trace import Endpoint, Trace
-from grader.judging.charts import happenings, plain_topic, points_of, series, time_chart, written_in_lane
+from grader.judging.charts import plain_topic, points_of, series, time_chart, written_in_lane
 from grader.judging.checks.logs import LOGGER_HINT
-from grader.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met, partly
+from grader.judging.findings import (
+    explain_fault,
+    explain_no_subscription,
+    faulted,
+    first_fault,
+    met,
+    not_met,
+    only_printed,
+)
 from grader.judging.output import (
     LoggedNumbers,
     Output,
@@ -83,7 +91,6 @@ class LogsValues:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         products = " and ".join(map(times, self.unit_factors))
         return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
 
@@ -107,7 +114,7 @@ class LogsValues:
             return met(f"{self._said(received, unlogged)} logged{self._example(received, records)}", evidence)
         lines = printed_lines(trace, self.process)
         if self._enough(received, self._unlogged(received, sorted([*records, *lines], key=lambda o: o.t_ns))):
-            return partly(f"{self._said(received, ())} printed, not all of them logged", evidence, hint=LOGGER_HINT)
+            return only_printed(f"{self._said(received, ())} printed, not all of them logged", evidence, LOGGER_HINT)
         absent = self._unlogged(received, records, standing)
         hidden = self._enough(received, absent)
         if fault is not None:
@@ -193,7 +200,8 @@ class LogsValues:
         )
         reason += f"rightly, the first at {moment(first.t_ns)}: expected {wanted}, {wrote}"
         cause, hint = self._cause(received, unlogged, outputs)
-        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint)
+        problem = ProblemKind.WRONG_VALUE if found else ProblemKind.NOT_LOGGED
+        return not_met(f"{reason}; {cause}" if cause else reason, evidence, hint=hint, problem=problem)
 
     def _cause(
         self, received: Sequence[_Received], unlogged: Sequence[_Received], outputs: Sequence[Output]
@@ -249,7 +257,6 @@ class LogsReceived:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -274,7 +281,7 @@ class LogsReceived:
             return met(f"{reason} ({numbers(v.value for v in values)})", evidence)
         if not _missing(values, followed([*records, *printed_lines(trace, self.process)], sought), trace):
             reason = f"{self.process}: all {len(values)} values of {self.topic} are printed, not all of them are logged"
-            return partly(reason, evidence, hint=_PRINT_HINT)
+            return only_printed(reason, evidence, _PRINT_HINT)
         absent = _missing(values, standing(records, sought), trace)
         evidence["missing"] = [v.value for v in absent or unlogged]
         if fault is not None:
@@ -290,14 +297,19 @@ class LogsReceived:
         types = [e.type for e in subscriptions]
         if types and not any(carries_number(t) for t in types):
             reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
-            return not_met(reason, {"type": types[0]}, hint="use a numeric message type, e.g. std_msgs/msg/Float32")
+            return not_met(
+                reason,
+                {"type": types[0]},
+                hint="use a numeric message type, e.g. std_msgs/msg/Float32",
+                problem=ProblemKind.NO_NUMBER,
+            )
         return _nothing(trace, self.process, f"{self.topic}: no number was published on it")
 
     def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
         scale = max(abs(v.value) for v in values)
         stops = [v.stop_ns + (_LATE_NS if v.stop_ns < trace.stop_ns else 1) for v in values]
         return [
-            Sought(v.start_ns, stop_ns, v.value, scale, partial(_shows_exactly, v.value))
+            Sought(v.start_ns, stop_ns, v.value, scale, partial(Printed.shows, value=v.value))
             for v, stop_ns in zip(values, stops, strict=True)
         ]
 
@@ -319,7 +331,7 @@ class LogsReceived:
                 "; the subscription asks for transient_local durability, which a volatile publisher does not offer"
             )
         hint = "log msg.data in the callback of the subscription to " + self.topic
-        return not_met(reason, evidence, hint=hint)
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.NOT_LOGGED)
 
     def chart(self, trace: Trace) -> Chart | None:
         """Return the numbers published to a node and what it wrote meanwhile, or None without numbers."""
@@ -334,25 +346,15 @@ class LogsReceived:
         distinct = list(dict.fromkeys(number(r.value) for r in sent))
         about = f"{counted(len(sent), 'message')} on {self.topic} ({', '.join(distinct[:8])}); meanwhile "
         about += f"{counted(len(records), 'log record')} and {counted(len(lines), 'printed line')}."
-        return time_chart(
-            f"received {self.topic}",
-            f"What came on {self.topic} and what was logged",
-            about,
-            (
-                Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,)),
-                Panel("written", "", tuple(rows), lanes=tuple(lanes)),
-            ),
-            happenings(trace),
-        )
+        came = Panel(plain_topic(self.topic), unit_of(self.topic).strip(), (given,))
+        wrote = Panel("written", "", tuple(rows), lanes=tuple(lanes))
+        title = f"What came on {self.topic} and what was logged"
+        return time_chart(trace, f"received {self.topic}", title, about, came, wrote)
 
 
 def _missing(values: Sequence[Held], logged: frozenset[int], trace: Trace) -> list[Held]:
     """Return the values that are not logged, except for one that came too late."""
     return [v for k, v in enumerate(values) if k not in logged and trace.stop_ns - v.start_ns >= _SHORTEST_NS]
-
-
-def _shows_exactly(value: float, printed: Printed) -> bool:
-    return printed.shows(value)
 
 
 def _hidden(
@@ -362,7 +364,7 @@ def _hidden(
     value, t_ns = first
     reason = f"{check.process}: {share} of {check.topic} are not told from other numbers, the first is {number(value)} "
     hint = f"log the number that came on {check.topic}, and none that it might have been"
-    return not_met(f"{reason}at {moment(t_ns)}: {among}", evidence, hint=hint)
+    return not_met(f"{reason}at {moment(t_ns)}: {among}", evidence, hint=hint, problem=ProblemKind.AMONG_OTHERS)
 
 
 def _nothing(trace: Trace, process: str, problem: str) -> Finding:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
 from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
@@ -33,7 +33,6 @@ class ServiceAvailable:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"the service {self.service} with type {self.type}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -65,7 +64,6 @@ class ServiceAnswersAll:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a response to every request on {self.service} within {number(seconds(self.within))} s"
 
     def judge(self, trace: Trace) -> Finding:
@@ -94,9 +92,9 @@ class ServiceAnswersAll:
         reason = f"{moment(first.request.t_ns)}, {self.service}: {took}, expected one within {span(self.within)}; "
         reason += f"so for {len(unanswered)} of {counted(len(calls), 'request')}"
         known = dict(evidence) | {"first_unanswered_s": seconds(first.request.t_ns)}
-        return explain_fault(trace, reason, known, last=True) or not_met(
-            reason, known, hint="" if any(c.response for c in calls) else _RETURN_HINT
-        )
+        hint = "" if any(c.response for c in calls) else _RETURN_HINT
+        problem = ProblemKind.NO_ANSWER if first.response is None else ProblemKind.TOO_LATE
+        return explain_fault(trace, reason, known, last=True) or not_met(reason, known, hint=hint, problem=problem)
 
 
 def _due(call: Call, trace: Trace, late_ns: int) -> bool:
@@ -121,7 +119,6 @@ class ServiceResponse:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -138,7 +135,10 @@ class ServiceResponse:
         reason = f"{moment(first.t_ns)}, {self.service}: {breach(first.value, path, self.fields[path])} in response "
         reason += f"{place}; wrong in {len(wrong)} of {counted(len(found), 'response')}"
         return not_met(
-            reason, evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)}, hint=_hint(first, path)
+            reason,
+            evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)},
+            hint=_hint(first, path),
+            problem=ProblemKind.WRONG_VALUE,
         )
 
 
@@ -153,7 +153,9 @@ def too_few_responses(trace: Trace, service: str, found: int, wanted: int) -> Fi
     if not trace.requests(service, "grader"):
         return never_asked(trace, service)
     reason = f"{service}: {counted(found, 'response')}, expected at least {max(1, wanted)}"
-    return explain_fault(trace, reason) or not_met(reason, {"responses": found}, blocked_by="service_answers_all")
+    return explain_fault(trace, reason) or not_met(
+        reason, {"responses": found}, blocked_by="service_answers_all", problem=ProblemKind.TOO_FEW
+    )
 
 
 def never_asked(trace: Trace, service: str) -> Finding:
@@ -215,7 +217,6 @@ class ServiceSequence:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         text = (
             f"{self.field} of {self.service} tells {number(self.first)} first, then {number(self.step)} more each time"
         )
@@ -225,11 +226,11 @@ class ServiceSequence:
     def judge(self, trace: Trace) -> Finding:
         """Return full credit if every number is the expected one; the reason names the first that is not."""
         calls = calls_of(trace, self.service, "grader")
-        answered = sorted((c for c in calls if c.response is not None), key=answered_ns)
+        answered = sorted((c for c in calls if c.response is not None), key=_answered_ns)
         if len(answered) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(answered), self.at_least)
         # A server that lags behind may lose requests, or process them in another order.
-        orders = (self._answers(calls, asked_ns), self._answers(answered, answered_ns))
+        orders = (self._answers(calls, lambda c: c.request.t_ns), self._answers(answered, _answered_ns))
         answers = min(orders, key=lambda order: len(self._wrong(order)))
         wrong = self._wrong(answers)
         got = [a.got for a in answers]
@@ -295,7 +296,7 @@ class ServiceSequence:
         reason += f"expected {number(first.wanted)}"
         cause, hint = self._instead([a.got for a in answers], place)
         known = evidence | {"first_wrong": place + 1, "first_wrong_s": seconds(first.response.t_ns)}
-        return not_met(f"{reason}; {cause}" if cause else reason, known, hint=hint)
+        return not_met(f"{reason}; {cause}" if cause else reason, known, hint=hint, problem=ProblemKind.WRONG_VALUE)
 
     def _found(self, answer: _Answer) -> str:
         if answer.got is not None:
@@ -327,11 +328,5 @@ class ServiceSequence:
         return "", ""
 
 
-def asked_ns(call: Call) -> int:
-    """Return when a call was sent."""
-    return call.request.t_ns
-
-
-def answered_ns(call: Call) -> int:
-    """Return when a call was answered; without a response, when it was sent."""
+def _answered_ns(call: Call) -> int:
     return call.request.t_ns if call.response is None else call.response.t_ns

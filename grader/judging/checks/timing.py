@@ -10,11 +10,12 @@ from itertools import pairwise
 from typing import Literal
 
 from grader.core.errors import HarnessError
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Delivery, Message, Trace
 from grader.judging.checks.fields import too_few_messages
 from grader.judging.findings import (
+    explain_fault,
     explain_no_message,
     explain_no_subscription,
     faulted,
@@ -70,7 +71,6 @@ class Period:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"{word} {_ms(ns)}" for word, ns in (("at least", self.least), ("at most", self.largest)) if ns]
         if self.average is not None:
             parts.append(f"{_ms(self.average)} ± {number(100 * self.tolerance)} % on average")
@@ -131,7 +131,6 @@ class Latency:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a message on {self.output} within {_ms(self.within)} of each one on {self.input}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -158,7 +157,8 @@ class Latency:
         fault = first_fault(trace)
         if fault is not None and delay is None:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)})
+        problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
+        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
 
     def _inputs(self, trace: Trace, jitter: int) -> list[int]:
         from_ns = heard_from_ns(trace, self.input)
@@ -196,7 +196,6 @@ class Silence:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         parts = [f"{word} {mark}" for word, mark in (("after", self.after), ("before", self.before)) if mark]
         grace = f", {_ms(self.grace)} of grace" if self.grace else ""
         return f"no message on {self.topic} {' and '.join(parts).replace('_', ' ')}{grace}".replace("  ", " ")
@@ -236,9 +235,8 @@ def _ms(duration_ns: int) -> str:
 
 
 def _no_input(trace: Trace, topic: str) -> Finding:
-    fault = first_fault(trace)
-    if fault is not None:
-        return faulted(fault, f"nothing had come on {topic} by then")
+    if crashed := explain_fault(trace, f"nothing had come on {topic} by then"):
+        return crashed
     if trace.deliveries(topic) or published(trace, topic):
         raise HarnessError(f"{topic}: no input was published early enough in {span(trace.stop_ns)}")
     return waiting_for("publishes", explain_no_message(trace, topic))
@@ -311,7 +309,6 @@ class Reaction:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"within {span(self.within)} of each {self.input} a message on {self.output} that fits it"
 
     def judge(self, trace: Trace) -> Finding:
@@ -382,7 +379,8 @@ class Reaction:
         fault = first_fault(trace)
         if fault is not None and not asked.outputs:
             return faulted(fault, reason, evidence, last=True)
-        return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)})
+        problem = ProblemKind.WRONG_ANSWER if asked.outputs else ProblemKind.NO_ANSWER
+        return not_met(reason, evidence | {"first_wrong_s": seconds(asked.given.t_ns)}, problem=problem)
 
     def _silent(self, trace: Trace) -> Finding:
         subscriptions = student_endpoints(trace, "subscription", self.input)
@@ -391,10 +389,9 @@ class Reaction:
         return explain_no_message(trace, self.output)
 
     def _untried(self, trace: Trace, missing: Sequence[ReactionCase]) -> Finding:
-        fault = first_fault(trace)
         case = rules_text(missing[0].when)
-        if fault is not None:
-            return faulted(fault, f"{self.input} with {case} did not come before")
+        if crashed := explain_fault(trace, f"{self.input} with {case} did not come before"):
+            return crashed
         if not trace.deliveries(self.input):
             return waiting_for("publishes", explain_no_message(trace, self.input))
         raise HarnessError(f"{self.input}: no input with {case} was published in time")

@@ -9,17 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from grader.core.chart import Chart, Look, Tone
+from grader.core.chart import Chart, Look
 from grader.core.exercise import Finding, Problem, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Fault, LogRecord, OutputLine, Trace
 from grader.judging.charts import (
     answer_panel,
-    happenings,
     input_panel,
     plain_topic,
-    points_of,
-    series,
     time_chart,
     which_answers,
 )
@@ -84,7 +81,6 @@ class AnswersTogether:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         limit = f"{number(self.threshold)}{unit_of(self.input)}"
         answers = f"{number(self.above)} above {limit}, {number(self.otherwise)} otherwise"
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
@@ -275,15 +271,13 @@ class AnswersTogether:
         if not inputs:
             return None
         above = sum(r.value > self.threshold for r in inputs)
-        wanted = [Reading(r.t_ns, self.above if r.value > self.threshold else self.otherwise) for r in inputs]
+        wanted = [Reading(r.t_ns, self._expected(r.value)) for r in inputs]
         about = f"{counted(len(inputs), 'value')} on {self.input}, {above} above {number(self.threshold)}"
         about += f"{unit_of(self.input)}; {counted(len(answers), 'answer')} on {self.output}{which_answers(answers)}."
         upper = input_panel(self.input, inputs, self.threshold, Look.LINE)
-        lower = answer_panel(
-            self.output, answers, series("expected", points_of(wanted), look=Look.STEP, tone=Tone.FAINT)
-        )
+        lower = answer_panel(self.output, answers, wanted)
         title = f"{plain_topic(self.input).capitalize()} and {plain_topic(self.output)}, both nodes together"
-        return time_chart(f"together {self.input}", title, about, (upper, lower), happenings(trace))
+        return time_chart(trace, f"together {self.input}", title, about, upper, lower)
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:

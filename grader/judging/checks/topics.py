@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.core.chart import Chart, Level, Look, Panel, Point, Tone
-from grader.core.exercise import Finding
+from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import SLACK, Hertz, seconds, within
 from grader.core.trace import Endpoint, Message, Trace
-from grader.judging.charts import happenings, series, time_chart
+from grader.judging.charts import series, time_chart
 from grader.judging.findings import explain_fault, explain_no_message, explain_no_subscription, met, not_met
 from grader.judging.values import field, leaves, number_at, published, student_endpoints, text_at
 from grader.judging.wording import counted, listed, moment, number, numbers, quote
@@ -30,7 +30,6 @@ class Publishes:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"at least one {self.type} message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -58,7 +57,6 @@ class Subscribes:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         return f"a subscription to {self.topic} with type {self.type} that an ordinary publisher reaches"
 
     def judge(self, trace: Trace) -> Finding:
@@ -80,7 +78,12 @@ class Subscribes:
         reason = (
             f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}: no message arrives"
         )
-        return not_met(reason, evidence, hint="subscribe with the default durability: pass the queue depth 10 as QoS")
+        return not_met(
+            reason,
+            evidence,
+            hint="subscribe with the default durability: pass the queue depth 10 as QoS",
+            problem=ProblemKind.KEPT_APART,
+        )
 
 
 def _demand(subscription: Endpoint) -> str:
@@ -112,7 +115,6 @@ class FieldValues:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         wanted = ", ".join(f"{path} = {number(value)}" for path, value in self.values.items())
         return f"{wanted} in every message on {self.topic}"
 
@@ -160,12 +162,14 @@ class FieldValues:
         }
         where = f"{moment(first.t_ns)}, {self.topic}"
         if missing:
-            return not_met(f"{where}: {quote(first.type)} has no field {missing[0]}", evidence)
+            return not_met(
+                f"{where}: {quote(first.type)} has no field {missing[0]}", evidence, problem=ProblemKind.NO_FIELD
+            )
         found = ", ".join(f"{p} is {number(g)}" for p, g in fields.items() if g is not None)
         wanted = ", ".join(number(self.values[p]) for p in fields)
         share = f"in all {total} messages" if len(wrong) == total else f"in {len(wrong)} of {total} messages"
         reason = f"{where}: {found}, expected {wanted}; wrong {'in the only message' if total == 1 else share}"
-        return not_met(reason, evidence, hint=self._hint(first))
+        return not_met(reason, evidence, hint=self._hint(first), problem=ProblemKind.WRONG_VALUE)
 
     def _hint(self, message: Message) -> str:
         """Return the very likely slip in a message: field, sign or unit; empty if there is none."""
@@ -194,13 +198,8 @@ class FieldValues:
             return None
         group = next(iter(self.values)).partition(".")[0]
         title = "Commanded velocities" if group in _UNITS else "Values"
-        return time_chart(
-            f"fields {self.topic}",
-            f"{title} on {self.topic}",
-            _describe_fields(self, messages),
-            (_field_panel(self, messages, group),),
-            happenings(trace),
-        )
+        title, about = f"{title} on {self.topic}", _describe_fields(self, messages)
+        return time_chart(trace, f"fields {self.topic}", title, about, _field_panel(self, messages, group))
 
 
 def _sign_or_unit(path: str, got: float, want: float) -> str:
@@ -299,7 +298,6 @@ class Transform:
 
     @property
     def expected(self) -> str:
-        """What is expected, in one phrase."""
         rate = "" if self.rate is None else f" at {number(self.rate)} ± {number(self.rate_tolerance)} Hz"
         return f"the transform {self.parent} → {self.child} on {' or '.join(self._topics)}{rate}"
 
@@ -319,12 +317,14 @@ class Transform:
             flaw = self._flaw(one)
             if flaw:
                 reason = f"{moment(one.t_ns)}, {self.parent} → {self.child}: {flaw}"
-                return not_met(reason, evidence | {"first_wrong_s": seconds(one.t_ns)})
+                return not_met(reason, evidence | {"first_wrong_s": seconds(one.t_ns)}, problem=ProblemKind.WRONG_VALUE)
         pace = self._pace_flaw(mine)
         text = f"{self.parent} → {self.child}: {counted(len(mine), 'transform')}"
         if not pace:
             return met(text, evidence)
-        return explain_fault(trace, f"{text}, {pace}", evidence, last=True) or not_met(f"{text}, {pace}", evidence)
+        return explain_fault(trace, f"{text}, {pace}", evidence, last=True) or not_met(
+            f"{text}, {pace}", evidence, problem=ProblemKind.WRONG_RATE
+        )
 
     def _flaw(self, one: _Found) -> str:
         got = one.numbers("translation", _AXES)
@@ -353,13 +353,13 @@ class Transform:
             other = {"/tf": "/tf_static", "/tf_static": "/tf"}.get(self._topics[0]) if self.static is not None else None
             if other and published(trace, other):
                 reason = f"{self._topics[0]}: no transform; there are some on {other}"
-                return not_met(reason, hint=f"publish it on {self._topics[0]}")
+                return not_met(reason, hint=f"publish it on {self._topics[0]}", problem=ProblemKind.OTHER_NAME)
             return explain_no_message(trace, self._topics[0])
         pairs = list(dict.fromkeys(f"{quote(p, 30)} → {quote(c, 30)}" for p, c in (f.frames for f in found)))
         reason = f"no transform {self.parent} → {self.child}; found {listed(pairs)}"
         swapped = any(f.frames == (self.child.lstrip("/"), self.parent.lstrip("/")) for f in found)
         hint = f"header.frame_id is the parent, {self.parent}, and child_frame_id is {self.child}" if swapped else ""
-        return not_met(reason, {"found": pairs[:20]}, hint=hint)
+        return not_met(reason, {"found": pairs[:20]}, hint=hint, problem=ProblemKind.OTHER_NAME)
 
 
 def _transforms(message: Message) -> list[Mapping[str, object]]:

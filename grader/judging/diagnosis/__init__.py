@@ -37,15 +37,7 @@ def diagnose(
     submission: Submission,
     sources: Mapping[str, str],
 ) -> tuple[Verdict, ...]:
-    """Return the verdicts with a place and one hint wherever a cause is very likely.
-
-    Args:
-        verdicts: In rubric order; outcomes, points and reasons stay unchanged.
-        exercise: The exercise.
-        traces: Scenario id -> trace.
-        submission: Gives the path at which each wanted file was found.
-        sources: Wanted file name -> its text.
-    """
+    """Return the verdicts, in rubric order, with a place and one hint wherever a cause is very likely."""
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
     if not asked:
         return verdicts
@@ -149,10 +141,8 @@ def _placed(file: str, text: str) -> str:
     source = read(file, text)
     guard = _wrong_guard(source)
     if guard is not None:
-        problem = (
-            f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so `python3 {file}` would"
-        )
-        return f"{problem} do nothing; write: if __name__ == '__main__':"
+        problem = f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so "
+        return f"{problem}`python3 {file}` would do nothing; write: if __name__ == '__main__':"
     main = next(iter(source.functions("main")), None)
     return main_not_called(file, first_line(main) if main is not None else 0)
 

@@ -19,7 +19,7 @@ def _callback_called(crash: Crash) -> Clue | None:
     """`create_timer(0.05, self.tick())`: the function runs once, and its result is used as the callback."""
     source = crash.source
     result = crash.said(r"not callable|callable object|callback should be either")
-    for item in (*made(source, "timer"), *made(source, "subscription")):
+    for item in made(source, "timer", "subscription"):
         called = item.callback
         if not isinstance(called, ast.Call) or not _returns_nothing(source, called):
             continue
@@ -123,7 +123,7 @@ def _no_data_yet(crash: Crash) -> Clue | None:
         if name != f"self.{node.attr}" or not isinstance(node.ctx, ast.Load):
             continue
         stores = source.stores(name)
-        stored_by = {f.name for n in stores if (f := source.function_of(n)) is not None}
+        stored_by = {source.function_name(n) for n in stores} - {""}
         if not stored_by & callbacks:
             continue
         begin = f"begin {function.name} with: if {name} is None: return"
@@ -275,7 +275,7 @@ def _init_elsewhere(source: Source, inits: list[ast.Call], used: int) -> Clue | 
 def _endpoint_arguments(crash: Crash) -> Clue | None:
     """Arguments of create_publisher, create_subscription or create_timer have the wrong order or type."""
     source = crash.source
-    items = (m for kind in ("publisher", "subscription", "timer") for m in made(source, kind))
+    items = made(source, "publisher", "subscription", "timer")
     item = next((m for m in items if covers(m.call, crash.line) and m.call.args), None)
     if item is None:
         return None
@@ -286,9 +286,8 @@ def _timer_arguments(crash: Crash, item: Made) -> Clue | None:
     if not crash.said(r"must be a string or a real number, not '(method|function)'|operand type.*'(method|function)'"):
         return None
     period = crash.source.code(item.call.args[1]) if len(item.call.args) > 1 else "..."
-    return Clue(
-        f"the period comes first, then the callback: create_timer({period}, {crash.source.code(item.call.args[0])})"
-    )
+    callback = crash.source.code(item.call.args[0])
+    return Clue(f"the period comes first, then the callback: create_timer({period}, {callback})")
 
 
 def _topic_arguments(crash: Crash, item: Made) -> Clue | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 from grader.core.trace import FaultKind
 from grader.judging.diagnosis.names import FIELDS, LOGGER, MESSAGE_FIELDS, NODE_METHODS, PUBLISHER, RCLPY, closest
@@ -112,25 +113,19 @@ def _own_attribute(crash: Crash, owner: str, name: str) -> Clue | None:
     source = crash.source
     if not any(c.name == owner for c in source.all(ast.ClassDef)):
         return None
-    items = [m for kind in ("publisher", "subscription", "timer") for m in made(source, kind)]
+    items = made(source, "publisher", "subscription", "timer")
     local = next((m for m in items if target_of(source, m.call) == name), None)
     if local is not None:
-        hint = f"{name} is a variable of {_name_of(source, local.call)} only: write self.{name} = ..."
+        owned_by = source.function_name(local.call) or "the file"
+        hint = f"{name} is a variable of {owned_by} only: write self.{name} = ..."
         return Clue(hint, source.place(local.call))
     publishers = [t for m in items if m.kind == "publisher" and (t := target_of(source, m.call)).startswith("self.")]
     if f"self.{name}.publish(" in source.line(crash.line) and len(publishers) == 1:
         return Clue(f"the publisher is called {publishers[0]}: write {publishers[0]}.publish(...)")
-    stored = [
-        n.attr for n in source.all(ast.Attribute) if chain(n) == f"self.{n.attr}" and isinstance(n.ctx, ast.Store)
-    ]
+    stored = [dotted.removeprefix("self.") for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
     methods = [f.name for f in source.functions() if source.is_method(f) and not f.name.startswith("__")]
     near = closest(name, [*stored, *methods], 0.8) or closest(name, NODE_METHODS, 0.85)
     return Clue(f"self.{name} should be self.{near}") if near else None
-
-
-def _name_of(source: Source, node: ast.AST) -> str:
-    function = source.function_of(node)
-    return function.name if function is not None else "the file"
 
 
 @crash_rule("does not support the context manager|__enter__")
@@ -207,15 +202,11 @@ def _endless_loop(crash: Crash) -> Clue | None:
     head = f"'{head_of(source, loop)}'"
     if name == "__init__":
         hint = f"the loop {head} keeps the constructor from returning, so nothing else can happen"
-    elif name in _callbacks(source):
+    elif name in {last_name(m.callback) for m in made(source, "timer", "subscription")}:
         hint = f"the loop {head} keeps {name} from returning: a callback must return at once"
     else:
         hint = f"the loop {head} neither waits nor spins: let a timer call the code instead"
     return Clue(hint, source.place(loop))
-
-
-def _callbacks(source: Source) -> set[str]:
-    return {last_name(m.callback) for kind in ("timer", "subscription") for m in made(source, kind)}
 
 
 @crash_rule("", FaultKind.EXITED)
@@ -245,7 +236,8 @@ def _left_by_arguments(crash: Crash) -> Clue | None:
 def _left_by_exit(crash: Crash) -> Clue | None:
     source = crash.source
     exits: list[ast.AST] = [c for c in source.calls(*_EXITS) if chain(c.func) in (*_EXITS, "sys.exit", "os._exit")]
-    exits += [r for r in source.all(ast.Raise) if last_name(_raised(r)) == "SystemExit"]
+    raised = {r: r.exc.func if isinstance(r.exc, ast.Call) else r.exc for r in source.all(ast.Raise)}
+    exits += [r for r, name in raised.items() if last_name(name) == "SystemExit"]
     if len(exits) != 1 or _at_the_end(source, exits[0]):
         return None
     leaving = exits[0]
@@ -261,12 +253,8 @@ def _left_by_exit(crash: Crash) -> Clue | None:
 
 def _argument_test(source: Source, node: ast.AST) -> str:
     """Return the condition on the command line around a node; empty if there is none."""
-    tests = (source.code(n.test, 40) for n in source.around(node) if isinstance(n, ast.If))
+    tests = (source.code(n.test, 40) for n in source.around(node, ast.If))
     return next((t for t in tests if "argv" in t), "")
-
-
-def _raised(node: ast.Raise) -> ast.AST | None:
-    return node.exc.func if isinstance(node.exc, ast.Call) else node.exc
 
 
 def _exit_code(node: ast.AST) -> str:
@@ -279,20 +267,18 @@ def _exit_code(node: ast.AST) -> str:
 
 def _at_the_end(source: Source, node: ast.AST) -> bool:
     """Return whether an exit comes after main(), or handles Ctrl-C."""
-    if any(isinstance(n, ast.ExceptHandler) for n in source.around(node)):
-        return True
-    return source.function_of(node) is None and not _argument_test(source, node)
+    handles = any(source.around(node, ast.ExceptHandler))
+    return handles or (source.function_of(node) is None and not _argument_test(source, node))
 
 
 @crash_rule("", FaultKind.EXITED)
 def _shut_down_in_callback(crash: Crash) -> Clue | None:
     source = crash.source
-    for kind in ("timer", "subscription"):
-        for item in made(source, kind):
-            for node in reached(source, source.functions(last_name(item.callback))):
-                if isinstance(node, ast.Call) and chain(node.func) in ("rclpy.shutdown", "rclpy.try_shutdown"):
-                    hint = f"{source.code(node)} in a callback ends the node: it must run until it is stopped"
-                    return Clue(hint, source.place(node))
+    for item in made(source, "timer", "subscription"):
+        for node in reached(source, source.functions(last_name(item.callback))):
+            if isinstance(node, ast.Call) and chain(node.func) in ("rclpy.shutdown", "rclpy.try_shutdown"):
+                hint = f"{source.code(node)} in a callback ends the node: it must run until it is stopped"
+                return Clue(hint, source.place(node))
     return None
 
 
@@ -329,7 +315,7 @@ def _spins_once(crash: Crash) -> Clue | None:
     if crash.fault.exit_code != 0 or any(last_name(n) == "spin" for n in spins(source)):
         return None
     once = list(source.calls("spin_once"))
-    loops = [n for c in once for n in source.around(c) if isinstance(n, (ast.While, ast.For))]
+    loops = [n for c in once for n in source.around(c, ast.AST) if isinstance(n, (ast.While, ast.For))]
     if len(once) == 1 and not loops:
         hint = f"{source.code(once[0])} handles one event and returns: use spin to go on until the node is stopped"
         return Clue(hint, source.place(once[0]))
@@ -347,7 +333,7 @@ def _gave_up(crash: Crash) -> Clue | None:
         return None
     leaving = [r for r in source.all(ast.Return) if source.function_of(r) is source.function_of(last[0])]
     early = [r for r in leaving if first_line(r) < first_line(last[0])]
-    test = next((n for n in source.around(early[0]) if isinstance(n, ast.If)), None) if len(early) == 1 else None
+    test = next(source.around(early[0], ast.If), None) if len(early) == 1 else None
     if test is None:
         return None
     hint = f"the return under 'if {source.code(test.test, 40)}' ends the program before {source.code(last[0], 40)}"

@@ -21,8 +21,7 @@ from grader.judging.diagnosis.wiring import (
     made_for,
     number_at,
     publish_calls,
-    reached,
-    roots,
+    runs,
     text,
     timer_code,
 )
@@ -33,7 +32,9 @@ from grader.judging.wording import number
 #: Answers delayed by at most this count as prompt.
 _PROMPT_S = 0.3
 _MEANS = ("mean", "fmean", "average", "median", "nanmean")
-_ORDERS = (ast.Gt, ast.GtE, ast.Lt, ast.LtE)
+#: Comparison -> the same one with its sides exchanged.
+_TURNED: dict[type[ast.cmpop], type[ast.cmpop]] = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
+_ORDERS = tuple(_TURNED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ def _subscribers(case: Case) -> Iterator[_Subscriber]:
     for source in case.sources.values():
         item = made_for(source, "subscription", case.check.input)
         if item is not None and made_for(source, "publisher", case.check.output) is not None:
-            yield _Subscriber(source, list(reached(source, roots(source, item.callback))))
+            yield _Subscriber(source, runs(source, item))
 
 
 def _late(case: Case) -> _Subscriber | None:
@@ -105,12 +106,8 @@ def _switches(source: Source, limit: float | None = None) -> list[_Switch]:
         if right is not None and left is None and isinstance(op, _ORDERS):
             found.append(_Switch(node, op, right, node.left))
         elif left is not None and right is None and isinstance(op, _ORDERS):
-            found.append(_Switch(node, _turned(op), left, node.comparators[0]))
+            found.append(_Switch(node, _TURNED[type(op)](), left, node.comparators[0]))
     return [s for s in found if limit is None or within(s.limit.value, limit, EXACT)]
-
-
-def _turned(op: ast.cmpop) -> ast.cmpop:
-    return {ast.Gt: ast.Lt(), ast.GtE: ast.LtE(), ast.Lt: ast.Gt(), ast.LtE: ast.GtE()}.get(type(op), op)
 
 
 def _rows(case: Case) -> list[tuple[float, float | None, float]]:
@@ -177,17 +174,13 @@ def _compared_as_text(case: Case) -> Clue | None:
     for source, test in _compared(case):
         sides = [text(source, side) for side in (test.left, test.comparators[0])]
         constant = next((side for side in sides if side is not None), None)
-        ordered = isinstance(test.ops[0], (ast.Gt, ast.GtE, ast.Lt, ast.LtE))
-        if constant is None or not _is_number(constant) or not ordered:
+        is_number = constant is not None and constant.strip().replace(".", "", 1).isdigit()
+        if not is_number or not isinstance(test.ops[0], _ORDERS):
             continue
         limit = number(case.check.threshold)
         hint = f"{source.code(test, 50)} compares texts, letter by letter: compare the number itself with {limit}"
         return Clue(hint, source.place(test), key="as_text")
     return None
-
-
-def _is_number(text: str) -> bool:
-    return text.strip().replace(".", "", 1).isdigit()
 
 
 @rule(ThresholdResponse, AnswersTogether)
@@ -241,9 +234,8 @@ def _at_the_threshold(controller: _Controller) -> Clue | None:
 def _inverted(controller: _Controller) -> Clue | None:
     """The answers are exchanged."""
     source, check = controller.source, controller.check
-    away = [
-        (v, got) for v, got, _ in _rows(controller.case) if not within(v, check.threshold, EXACT) and got is not None
-    ]
+    known = ((v, got) for v, got, _ in _rows(controller.case) if got is not None)
+    away = [(v, got) for v, got in known if not within(v, check.threshold, EXACT)]
     flipped = [within(got, check.otherwise if v > check.threshold else check.above, EXACT) for v, got in away]
     both = len({v > check.threshold for v, _ in away}) == 2
     switches = _switches(source, check.threshold)
@@ -259,7 +251,7 @@ def _inverted(controller: _Controller) -> Clue | None:
 
 def _says_inverted(source: Source, switch: _Switch, check: ThresholdResponse | AnswersTogether) -> bool:
     """Return whether the text, too, gives each side the answer of the other."""
-    choice = next((n for n in source.around(switch.node) if isinstance(n, (ast.If, ast.IfExp))), None)
+    choice = next((n for n in source.around(switch.node, ast.AST) if isinstance(n, (ast.If, ast.IfExp))), None)
     if choice is None:
         return False
     body = choice.body if isinstance(choice, ast.If) else [choice.body]
@@ -281,10 +273,8 @@ def _rounded(controller: _Controller) -> Clue | None:
         calls = [n for n in subtree(switch.tested) if isinstance(n, ast.Call)]
         calls = [c for c in calls if last_name(c.func) in ("int", "round", "floor", "ceil", "trunc")]
         if calls:
-            hint = (
-                f"{source.code(calls[0], 40)} changes values near {number(check.threshold)}: compare the value itself"
-            )
-            return Clue(hint, source.place(switch.node), key="rounded")
+            hint = f"{source.code(calls[0], 40)} changes values near {number(check.threshold)}"
+            return Clue(f"{hint}: compare the value itself", source.place(switch.node), key="rounded")
     return None
 
 
@@ -354,7 +344,7 @@ def _one_branch(controller: _Controller) -> Clue | None:
     if given not in ({check.above}, {check.otherwise}):
         return None
     for call in publish_calls(source, item):
-        tests = [n for n in source.around(call) if isinstance(n, ast.If)]
+        tests = list(source.around(call, ast.If))
         if len(tests) == 1 and not tests[0].orelse and _tests_threshold(source, tests[0].test, check.threshold):
             missing = next(v for v in (check.above, check.otherwise) if v not in given)
             hint = f"{source.code(call)} runs only under 'if {source.code(tests[0].test, 40)}'"
@@ -384,11 +374,6 @@ def _answered_once(controller: _Controller) -> Clue | None:
     return None
 
 
-def _in_constructor(source: Source, node: ast.AST) -> bool:
-    function = source.function_of(node)
-    return function is not None and function.name == "__init__"
-
-
 def _asks_none(test: ast.expr, name: str) -> bool:
     if isinstance(test, ast.Compare) and chain(test.left) == name:
         return any(isinstance(c, ast.Constant) and c.value is None for c in test.comparators)
@@ -400,14 +385,15 @@ def _latched(controller: _Controller) -> Clue | None:
     """A variable is set on one side of the threshold, and never reset."""
     source, check = controller.source, controller.check
     item = made_for(source, "subscription", check.input)
-    inside: Iterable[ast.AST] = list(reached(source, roots(source, item.callback))) if item is not None else []
+    inside: Iterable[ast.AST] = runs(source, item) if item is not None else []
     for node in inside:
         if not isinstance(node, ast.If) or node.orelse:
             continue
         stores = [n for s in node.body for n in subtree(s) if isinstance(n, ast.Attribute)]
         kept = [n for n in stores if isinstance(n.ctx, ast.Store) and chain(n) == f"self.{n.attr}"]
         for store in kept:
-            others = [n for n in source.stores(chain(store)) if n is not store and not _in_constructor(source, n)]
+            stored = source.stores(chain(store))
+            others = [n for n in stored if n is not store and source.function_name(n) != "__init__"]
             read = any(chain(n) == chain(store) and isinstance(n.ctx, ast.Load) for n in source.all(ast.Attribute))
             once = _asks_none(node.test, chain(store)) or _tests_threshold(source, node.test, check.threshold)
             if not others and read and once:
@@ -423,7 +409,7 @@ def _slow_timer(controller: _Controller) -> Clue | None:
     calls = publish_calls(source, made_for(source, "publisher", check.output))
     for item in made(source, "timer"):
         worth = constant(source, item.period)
-        inside = set(reached(source, roots(source, item.callback)))
+        inside = set(runs(source, item))
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
             hint = f"{timer_code(source, item)} answers every {number(worth.value)} s only: answer each temperature"
             return Clue(hint, source.place(worth.origin), key="slow_timer")

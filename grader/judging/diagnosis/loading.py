@@ -124,9 +124,8 @@ def _ros_1(crash: Crash) -> Clue | None:
         return None
     hint = f"{module} belongs to ROS 1; this is ROS 2: use {ROS_1[module]}"
     if module == "rospy":
-        used = dict.fromkeys(
-            last_name(n) for n in crash.case.source.all(ast.Attribute) if chain(n).startswith("rospy.")
-        )
+        attributes = crash.case.source.all(ast.Attribute)
+        used = dict.fromkeys(last_name(n) for n in attributes if chain(n).startswith("rospy."))
         pairs = [f"rospy.{name} becomes {ROS_1_CALLS[name]}" for name in used if name in ROS_1_CALLS]
         hint += f"; {', '.join(pairs[:3])}" if pairs else ""
     return Clue(hint)
@@ -140,9 +139,8 @@ def _missing_module(crash: Crash) -> Clue | None:
     if near and near.count(".") == wanted.count("."):
         return Clue(f"the module is called {near}, not {wanted}")
     if wanted.startswith("rclpy."):
-        return (
-            Clue(f"there is no {wanted}; the class Node is in rclpy.node") if wanted.lower() == "rclpy.node" else None
-        )
+        hint = f"there is no {wanted}; the class Node is in rclpy.node"
+        return Clue(hint) if wanted.lower() == "rclpy.node" else None
     if wanted.endswith(_MESSAGE_ENDINGS) or _gives_messages(crash.case.source, wanted):
         listed = ", ".join(PACKAGES[:5])
         return Clue(f"the package {wanted} is not here; use messages of the standard packages: {listed}, ...")

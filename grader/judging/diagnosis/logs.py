@@ -19,10 +19,12 @@ from grader.judging.diagnosis.wiring import (
     is_log,
     made,
     made_for,
+    names_in,
     number_at,
     python_loggers,
     reached,
     roots,
+    runs,
     timer_code,
 )
 from grader.judging.output import printed_lines, student_records
@@ -44,7 +46,7 @@ def _prints(source: Source) -> list[ast.Call]:
 def _into_file(case: Case) -> Clue | None:
     """No expected text is logged or printed, but the program writes to a file."""
     source = case.source
-    writing = _opened(source)
+    writing = next(filter(_writes, source.all(ast.Call)), None)
     if writing is None or not _unseen(case):
         return None
     hint = f"{source.code(writing, 60)}: what goes into a file is not seen by the grader; "
@@ -61,12 +63,8 @@ def _unseen(case: Case) -> bool:
     return bool(values) and values == missing
 
 
-def _opened(source: Source) -> ast.Call | None:
-    """Return the call that opens a file for the output, if any."""
-    return next((call for call in source.all(ast.Call) if _writes(call)), None)
-
-
 def _writes(call: ast.Call) -> bool:
+    """Return whether a call opens a file for output."""
     name = last_name(call.func)
     if name in _HANDLERS or name == "write_text":
         return True
@@ -84,7 +82,7 @@ def _printed(case: Case) -> Clue | None:
     prints = [c for c in _prints(source) if c.args]
     if isinstance(check, LogsReceived):
         item = made_for(source, "subscription", check.topic)
-        inside = set(reached(source, roots(source, item.callback))) if item is not None else set()
+        inside = set(runs(source, item)) if item is not None else set()
         prints = [c for c in prints if c in inside] or prints
     elif len(prints) > 1:
         prints = _most_printed(case, prints)
@@ -169,7 +167,7 @@ def _logged_once(case: Case) -> Clue | None:
     if isinstance(once, ast.Constant) and once.value is True:
         return Clue("once=True lets this log through a single time: take it out", case.source.place(call), key="once")
     few = case.evidence("cause") == "few" or case.evidence("logs") == 1
-    test = next((n for n in case.source.around(call) if isinstance(n, ast.If)), None)
+    test = next(case.source.around(call, ast.If), None)
     if not few or test is None or not _set_inside(test):
         return None
     hint = f"under 'if {case.source.code(test.test, 40)}' this logs a single time: log again and again"
@@ -180,9 +178,8 @@ def _set_inside(test: ast.If) -> bool:
     """Return whether code under a condition changes it."""
     if not is_flag(test.test):
         return False
-    asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
     stored = (t for s in test.body for n in ast.walk(s) if isinstance(n, ast.Assign) for t in n.targets)
-    return any(chain(t) in asked for t in stored)
+    return any(chain(t) in names_in(test.test) for t in stored)
 
 
 @rule(LogPeriod)
@@ -196,7 +193,7 @@ def _log_period(case: Case) -> Clue | None:
     if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
         hint = f"throttle_duration_sec={number(worth.value)} lets a log through every {number(worth.value)} s"
         return Clue(f"{hint}: write {wanted_s}", source.place(worth.origin), key="log_pace")
-    timers = [m for m in made(source, "timer") if call in set(reached(source, roots(source, m.callback)))]
+    timers = [m for m in made(source, "timer") if call in runs(source, m)]
     if timers:
         return _timer_pace(source, timers, average, wanted_s) if len(timers) == 1 else None
     return _message_pace(case, source, call, wanted_s)
@@ -204,10 +201,10 @@ def _log_period(case: Case) -> Clue | None:
 
 def _message_pace(case: Case, source: Source, call: ast.Call, wanted_s: float) -> Clue | None:
     """The log is written in the callback of the subscription, each time or every n-th time."""
-    subscriptions = [m for m in made(source, "subscription") if call in set(reached(source, roots(source, m.callback)))]
+    subscriptions = [m for m in made(source, "subscription") if call in runs(source, m)]
     if not subscriptions or argument(call, 99, "throttle_duration_sec") is not None:
         return None
-    inside = [n for m in subscriptions for n in reached(source, roots(source, m.callback)) if isinstance(n, ast.If)]
+    inside = [n for m in subscriptions for n in runs(source, m) if isinstance(n, ast.If)]
     counted_by = next((n for n in inside if _counts(source, n.test) and call in set(reached(source, [n]))), None)
     if counted_by is not None:
         hint = f"'if {source.code(counted_by.test, 40)}' counts messages, not seconds: log from a timer of {wanted_s} s"

@@ -5,26 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from grader.judging.source import words
+
 #: Message and service packages that are installed where submissions run.
-PACKAGES = (
-    "std_msgs",
-    "geometry_msgs",
-    "nav_msgs",
-    "sensor_msgs",
-    "std_srvs",
-    "builtin_interfaces",
-    "action_msgs",
-    "actionlib_msgs",
-    "diagnostic_msgs",
-    "lifecycle_msgs",
-    "rcl_interfaces",
-    "rosgraph_msgs",
-    "service_msgs",
-    "shape_msgs",
-    "stereo_msgs",
-    "trajectory_msgs",
-    "unique_identifier_msgs",
-    "visualization_msgs",
+PACKAGES = words(
+    "std_msgs geometry_msgs nav_msgs sensor_msgs std_srvs builtin_interfaces action_msgs actionlib_msgs "
+    "diagnostic_msgs lifecycle_msgs rcl_interfaces rosgraph_msgs service_msgs shape_msgs stereo_msgs "
+    "trajectory_msgs unique_identifier_msgs visualization_msgs"
 )
 #: Names that exist only in ROS 1, with their replacement.
 ROS_1 = {
@@ -48,56 +35,19 @@ ROS_1_CALLS = {
     "get_param": "self.get_parameter",
 }
 #: Read-only properties of Node.
-NODE_PROPERTIES = (
-    "publishers",
-    "subscriptions",
-    "clients",
-    "services",
-    "timers",
-    "guards",
-    "waitables",
-    "executor",
-    "context",
-    "handle",
-    "default_callback_group",
+NODE_PROPERTIES = words(
+    "publishers subscriptions clients services timers guards waitables executor context handle default_callback_group"
 )
 #: Methods of Node that students call.
-NODE_METHODS = (
-    "create_publisher",
-    "create_subscription",
-    "create_timer",
-    "create_rate",
-    "create_client",
-    "create_service",
-    "create_guard_condition",
-    "destroy_node",
-    "destroy_timer",
-    "destroy_publisher",
-    "destroy_subscription",
-    "get_logger",
-    "get_clock",
-    "get_name",
-    "get_namespace",
-    "get_parameter",
-    "declare_parameter",
-    "declare_parameters",
-    "set_parameters",
-    "add_on_set_parameters_callback",
-    "count_publishers",
-    "count_subscribers",
-    "get_topic_names_and_types",
+NODE_METHODS = words(
+    "create_publisher create_subscription create_timer create_rate create_client create_service "
+    "create_guard_condition destroy_node destroy_timer destroy_publisher destroy_subscription get_logger get_clock "
+    "get_name get_namespace get_parameter declare_parameter declare_parameters set_parameters "
+    "add_on_set_parameters_callback count_publishers count_subscribers get_topic_names_and_types"
 )
-RCLPY = (
-    "init",
-    "spin",
-    "spin_once",
-    "spin_until_future_complete",
-    "shutdown",
-    "try_shutdown",
-    "ok",
-    "create_node",
-    "get_default_context",
-    "get_global_executor",
+RCLPY = words(
+    "init spin spin_once spin_until_future_complete shutdown try_shutdown ok create_node get_default_context "
+    "get_global_executor"
 )
 PUBLISHER = ("publish", "get_subscription_count", "wait_for_all_acked", "destroy", "assert_liveliness")
 #: Functions that run callbacks.
@@ -106,25 +56,33 @@ SPINS = ("spin", "spin_once", "spin_until_future_complete", "spin_once_until_fut
 LOG_METHODS = ("debug", "info", "warn", "warning", "error", "fatal")
 LOGGER = (*LOG_METHODS, "set_level", "get_child", "log", "get_effective_level")
 
-_STD = "Bool Byte Char Empty Float32 Float64 Header Int8 Int16 Int32 Int64 UInt8 UInt16 UInt32 UInt64 String ColorRGBA "
-_STD += "Float32MultiArray Float64MultiArray Int32MultiArray"
-_GEOMETRY = "Accel Point Point32 PointStamped Polygon Pose Pose2D PoseArray PoseStamped PoseWithCovariance Quaternion "
-_GEOMETRY += "PoseWithCovarianceStamped Transform TransformStamped Twist TwistStamped TwistWithCovariance Vector3 "
-_GEOMETRY += "Vector3Stamped Wrench QuaternionStamped"
-_SENSOR = "BatteryState CameraInfo CompressedImage FluidPressure Illuminance Image Imu JointState Joy LaserScan "
-_SENSOR += "MagneticField NavSatFix PointCloud2 Range RelativeHumidity Temperature"
-_QOS = "QoSProfile ReliabilityPolicy DurabilityPolicy HistoryPolicy LivelinessPolicy QoSReliabilityPolicy "
-_QOS += "QoSDurabilityPolicy QoSHistoryPolicy qos_profile_sensor_data qos_profile_system_default"
+_STD = words(
+    "Bool Byte Char Empty Float32 Float64 Header Int8 Int16 Int32 Int64 UInt8 UInt16 UInt32 UInt64 String ColorRGBA "
+    "Float32MultiArray Float64MultiArray Int32MultiArray"
+)
+_GEOMETRY = words(
+    "Accel Point Point32 PointStamped Polygon Pose Pose2D PoseArray PoseStamped PoseWithCovariance Quaternion "
+    "PoseWithCovarianceStamped Transform TransformStamped Twist TwistStamped TwistWithCovariance Vector3 "
+    "Vector3Stamped Wrench QuaternionStamped"
+)
+_SENSOR = words(
+    "BatteryState CameraInfo CompressedImage FluidPressure Illuminance Image Imu JointState Joy LaserScan "
+    "MagneticField NavSatFix PointCloud2 Range RelativeHumidity Temperature"
+)
+_QOS = words(
+    "QoSProfile ReliabilityPolicy DurabilityPolicy HistoryPolicy LivelinessPolicy QoSReliabilityPolicy "
+    "QoSDurabilityPolicy QoSHistoryPolicy qos_profile_sensor_data qos_profile_system_default"
+)
 #: Module -> names that it provides.
 MODULES = {
-    "std_msgs.msg": tuple(_STD.split()),
-    "geometry_msgs.msg": tuple(_GEOMETRY.split()),
+    "std_msgs.msg": _STD,
+    "geometry_msgs.msg": _GEOMETRY,
     "nav_msgs.msg": ("Odometry", "Path", "OccupancyGrid", "MapMetaData", "GridCells"),
-    "sensor_msgs.msg": tuple(_SENSOR.split()),
+    "sensor_msgs.msg": _SENSOR,
     "std_srvs.srv": ("SetBool", "Trigger"),
     "builtin_interfaces.msg": ("Time", "Duration"),
     "rclpy.node": ("Node",),
-    "rclpy.qos": tuple(_QOS.split()),
+    "rclpy.qos": _QOS,
     "rclpy.executors": ("SingleThreadedExecutor", "MultiThreadedExecutor", "ExternalShutdownException"),
     "rclpy.callback_groups": ("ReentrantCallbackGroup", "MutuallyExclusiveCallbackGroup"),
     "rclpy.duration": ("Duration",),

@@ -8,7 +8,7 @@ from grader.core.exercise import Outcome
 from grader.judging.checks.odometry import LogsPosition
 from grader.judging.diagnosis.logs import position_log
 from grader.judging.diagnosis.rules import Case, Clue, Maker, rule
-from grader.judging.diagnosis.wiring import is_flag, made, number_at, reached, roots
+from grader.judging.diagnosis.wiring import is_flag, made, names_in, number_at, reached, roots, runs
 from grader.judging.source import Source, argument, chain, first_line, last_name, parameters, subtree
 
 _POSITION = "msg.pose.pose.position"
@@ -134,7 +134,7 @@ def _kept_first(case: Case) -> Clue | None:
     """The callback stores a position only once."""
     source = case.source
     for item in made(source, "subscription"):
-        for node in reached(source, roots(source, item.callback)):
+        for node in runs(source, item):
             if isinstance(node, ast.If) and is_flag(node.test) and _stores(source, node):
                 hint = f"under 'if {source.code(node.test, 40)}' only the first message is stored: store each one"
                 return Clue(hint, source.place(node))
@@ -190,7 +190,7 @@ def _old_messages(case: Case) -> Clue | None:
     if oldest is not None:
         return oldest
     for item in made(source, "subscription"):
-        for node in reached(source, roots(source, item.callback)):
+        for node in runs(source, item):
             if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
                 hint = f"{source.code(node)} in the callback makes messages wait in the queue: take it out"
                 return Clue(hint, source.place(node))
@@ -218,7 +218,7 @@ def _stores(source: Source, node: ast.If) -> bool:
     """Return whether a condition without `else` guards storing what it tests from the message."""
     function = source.function_of(node)
     message = set(parameters(function)) - {"self"} if function is not None else set()
-    asked = {chain(n) for n in ast.walk(node.test) if isinstance(n, (ast.Attribute, ast.Name))} - {"self", ""}
+    asked = names_in(node.test)
     assigned = [n for s in node.body for n in ast.walk(s) if isinstance(n, ast.Assign)]
     kept = [s for s in assigned if message & {last_name(n) for n in ast.walk(s.value)}]
     return not node.orelse and any(chain(t) in asked for s in kept for t in s.targets)

@@ -23,6 +23,7 @@ from grader.judging.diagnosis.wiring import (
     publish_calls,
     reached,
     roots,
+    runs,
     timer_code,
 )
 from grader.judging.source import Loop, Source, argument, chain, first_line, last_name
@@ -50,11 +51,7 @@ class _Paced:
 
     def timers(self) -> list[Made]:
         """Return the timers whose callbacks publish."""
-        return [
-            item
-            for item in made(self.source, "timer")
-            if set(self.calls) & set(reached(self.source, roots(self.source, item.callback)))
-        ]
+        return [item for item in made(self.source, "timer") if set(self.calls) & set(runs(self.source, item))]
 
 
 def _paced(case: Case) -> _Paced | None:
@@ -107,22 +104,18 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
     if not paced.found_hz < paced.wanted_hz:
         return None
     for timer in paced.timers():
-        for node in reached(paced.source, roots(paced.source, timer.callback)):
+        for node in runs(paced.source, timer):
             if isinstance(node, ast.While) and _pause(paced.source, node):
-                hint = f"the loop '{head_of(paced.source, node)}' keeps {_name(paced.source, node)} from returning"
+                name = paced.source.function_name(node) or "the callback"
+                hint = f"the loop '{head_of(paced.source, node)}' keeps {name} from returning"
                 return Clue(f"{hint}: let the timer call it again instead", paced.source.place(node))
-        sleeps = _sleeps(paced.source, reached(paced.source, roots(paced.source, timer.callback)))
+        sleeps = _sleeps(paced.source, runs(paced.source, timer))
         total = sum(s.value for s in sleeps)
         if sleeps and total > paced.period_s and _same(1 / total, paced.found_hz):
             call = sleeps[0].origin
             hint = f"{paced.source.code(call)} holds up the callback: take it out, the timer sets the pace"
             return Clue(hint, paced.source.place(call))
     return None
-
-
-def _name(source: Source, node: ast.AST) -> str:
-    function = source.function_of(node)
-    return function.name if function is not None else "the callback"
 
 
 def _sleeps(source: Source, nodes: Iterable[ast.AST]) -> list[Constant]:
@@ -154,7 +147,7 @@ def _published_several_times(paced: _Paced) -> Clue | None:
     if len(inside) > 1:
         hint = f"publish is called {len(inside)} times a round, in {lines_of(inside[0], *inside[1:])}"
         return Clue(f"{hint}: once is enough", source.place(max(inside, key=first_line)))
-    loop = next((n for c in inside for n in source.around(c) if isinstance(n, ast.For)), None)
+    loop = next((n for c in inside for n in source.around(c, ast.For)), None)
     if loop is None:
         return None
     hint = f"the loop '{head_of(source, loop)}' publishes several messages at once"
@@ -168,17 +161,14 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
         return None
     source = paced.source
     for timer in paced.timers():
-        inside = list(reached(source, roots(source, timer.callback)))
+        inside = runs(source, timer)
+        advice = "ends the publishing: it has to go on until the node is stopped"
         for node in inside:
             if isinstance(node, ast.Call) and last_name(node.func) in ("destroy_node", "destroy_timer", "cancel"):
-                hint = f"{source.code(node)} ends the publishing: it has to go on until the node is stopped"
-                return Clue(hint, source.place(node))
+                return Clue(f"{source.code(node)} {advice}", source.place(node))
         tests = [n for c in inside if c in paced.calls for n in conditions(source, c) if changes(source, n.test)]
         if len(tests) == 1:
-            hint = (
-                f"'if {source.code(tests[0].test, 40)}' ends the publishing: it has to go on until the node is stopped"
-            )
-            return Clue(hint, source.place(tests[0]))
+            return Clue(f"'if {source.code(tests[0].test, 40)}' {advice}", source.place(tests[0]))
     return None
 
 
@@ -219,10 +209,8 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
         return _no_pause(paced, loop)
     call = pauses[0].origin
     if len(pauses) == 1 and _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
-        hint = (
-            f"{source.code(call)} makes {number(1 / total)} Hz; {number(paced.wanted_hz)} Hz is a pause of {wanted} s"
-        )
-        return Clue(hint, source.place(call))
+        hint = f"{source.code(call)} makes {number(1 / total)} Hz"
+        return Clue(f"{hint}; {number(paced.wanted_hz)} Hz is a pause of {wanted} s", source.place(call))
     if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
         hint = f"{source.code(call)} comes on top of the time that the rest of the loop takes: a timer keeps the pace"
         return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))
@@ -251,11 +239,7 @@ def _published_once(paced: _Paced) -> Clue | None:
         return None
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
     timers = list(source.calls("create_timer", "Timer"))
-    if loops or timers or any(set(paced.calls) & set(_heard(source, s)) for s in made(source, "subscription")):
+    if loops or timers or any(set(paced.calls) & set(runs(source, s)) for s in made(source, "subscription")):
         return None
     hint = f"{source.code(paced.calls[0])} runs once only: let a timer call it"
     return Clue(f"{hint}, create_timer({number(paced.period_s)}, ...)", source.place(paced.calls[0]))
-
-
-def _heard(source: Source, item: Made) -> list[ast.AST]:
-    return list(reached(source, roots(source, item.callback)))

@@ -33,7 +33,6 @@ class Clue:
     """The very likely cause.
 
     Attributes:
-        hint: One thing to do, referring to the student's code.
         location: The line to look at; None keeps the one from the check.
         key: Clues with equal keys have the same cause; by default the rule and the location.
     """
@@ -48,11 +47,7 @@ class Case:
     """A verdict that lost points, with everything that may explain it.
 
     Attributes:
-        criterion: The criterion.
-        verdict: Its verdict.
-        trace: The trace.
         sources: Wanted file name -> source, for the submitted files of the scenario.
-        fault: The fault that the verdict rests on, if any.
         siblings: The checks of the exercise's other criteria.
     """
 
@@ -100,8 +95,6 @@ class Crash:
     """A fault that a verdict rests on, prepared for a rule.
 
     Attributes:
-        case: The verdict.
-        fault: The fault.
         source: The file in which it arose; an empty one if it was not submitted.
         found: The match of the rule's pattern in its text.
     """
@@ -131,9 +124,7 @@ class Rule:
     """A common mistake.
 
     Attributes:
-        id: Unique id for evidence and tests: the name of its function.
         find: Returns the clue if this mistake is very likely, else None; called only if all other conditions hold.
-        checks: Checks that it explains; any if empty.
         problem: Problem that the check must have found; any or none if None.
         outcome: Outcome that it explains; any if None.
         fault: Whether the verdict must rest on a fault (True) or on none (False); either if None.
@@ -192,13 +183,7 @@ def rule(
 
 
 def crash_rule(text: str = "", *kinds: FaultKind, in_file: bool = True) -> Maker[Crash]:
-    """Turn a function into a rule that explains a fault.
-
-    Args:
-        text: Pattern to search in the text of the fault.
-        kinds: Kinds of faults; exceptions if there are none.
-        in_file: Whether it must have arisen in a submitted file.
-    """
+    """Turn a function into a rule for faults of some kinds, exceptions if none are given, whose text has a pattern."""
     return rule(fault=True, given=partial(_crash, text, kinds or (FaultKind.EXCEPTION,), in_file))
 
 

@@ -32,6 +32,7 @@ from grader.judging.diagnosis.wiring import (
     publish_calls,
     reached,
     roots,
+    runs,
     short,
     spins,
     timer_code,
@@ -183,14 +184,10 @@ def _graph_topic(case: Case) -> Clue | None:
             if any(e.topic == topic for e in ends):
                 continue
             items = made(source, kind)
-            found = [e.topic for e in ends if items and _same_made(made_for(source, kind, e.topic), items[0])]
+            found = [e.topic for e in ends if made_for(source, kind, e.topic) in items]
             if len(items) == 1 and len(found) == 1:
                 return _elsewhere(source, items[0], found[0], topic)
     return None
-
-
-def _same_made(one: Made | None, other: Made) -> bool:
-    return one is not None and one.call is other.call
 
 
 @rule()
@@ -258,8 +255,7 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
         if function.name == "__init__":
             hint = f"{code} in the constructor does not return: what stands after it is never reached"
             return Clue(hint, source.place(call), key="nested_spin")
-        callbacks = [m for kind in ("timer", "subscription") for m in made(source, kind)]
-        if any(call in set(reached(source, roots(source, m.callback))) for m in callbacks):
+        if any(call in runs(source, m) for m in made(source, "timer", "subscription")):
             hint = f"{code} inside a callback waits for something that can only come after the callback has returned"
             return Clue(hint, source.place(call), key="nested_spin")
     return None
@@ -310,8 +306,7 @@ def _held_up(unseen: _Unseen) -> Clue | None:
     source = unseen.source
     for call in source.calls("sleep"):
         worth = constant(source, argument(call, 0, "secs"))
-        function = source.function_of(call)
-        early = function is None or function.name in ("__init__", "main")
+        early = source.function_name(call) in ("", "__init__", "main")
         if early and worth is not None and worth.value >= _LONG_SLEEP_S:
             return Clue(f"{source.code(call)} holds everything up: the node does nothing meanwhile", source.place(call))
     return _waits_in_constructor(source)
@@ -322,11 +317,10 @@ def _waits_in_constructor(source: Source) -> Clue | None:
     callbacks = [f for m in made(source, "subscription") for f in roots(source, m.callback)]
     brought = {chain(n) for n in reached(source, callbacks) if isinstance(n, ast.Attribute) and last_name(n)}
     for loop in source.all(ast.While):
-        function = source.function_of(loop)
         inside = {last_name(n.func) for n in reached(source, [loop]) if isinstance(n, ast.Call)}
         idle = not inside & {"spin_once", "spin", "publish", "wait_for_service"}
         asked = {chain(n) for n in ast.walk(loop.test) if isinstance(n, ast.Attribute)}
-        if function is not None and function.name == "__init__" and idle and asked & brought:
+        if source.function_name(loop) == "__init__" and idle and asked & brought:
             hint = f"the loop '{head_of(source, loop)}' waits in the constructor for a callback"
             return Clue(f"{hint} that can only come once the node spins", source.place(loop))
     return None
@@ -364,7 +358,7 @@ def _late_timer(unseen: _Unseen) -> Clue | None:
     source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
     for item in made(source, "timer"):
         worth = constant(source, item.period)
-        inside = set(reached(source, roots(source, item.callback)))
+        inside = set(runs(source, item))
         if worth is not None and worth.value > latest_s and any(c in inside for c in unseen.calls):
             hint = f"{timer_code(source, item)} waits {worth.value:g} s before the first call: the period is in seconds"
             return Clue(hint, source.place(worth.origin), key=f"period:{item.call.lineno}")
@@ -376,10 +370,10 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
     """Everything is published in the callback of a topic without a publisher."""
     source, calls = unseen.source, unseen.calls
     for item in made(source, "subscription"):
-        inside = set(reached(source, roots(source, item.callback)))
+        inside = set(runs(source, item))
         if item.topic is None or not calls or not all(c in inside for c in calls):
             continue
-        timed = [n for t in made(source, "timer") for n in reached(source, roots(source, t.callback))]
+        timed = [n for t in made(source, "timer") for n in runs(source, t)]
         if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
             hint = f"this runs only when a message comes on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
@@ -409,22 +403,15 @@ def _heard(case: Case, written: str) -> bool:
 
 def _held_back(source: Source, call: ast.Call, item: Made) -> ast.If | None:
     """Return the condition by which a call waits for a value from the callback of a subscription."""
-    brought = {
-        chain(n)
-        for n in reached(source, roots(source, item.callback))
-        if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
-    }
+    inside = runs(source, item)
+    brought = {chain(n) for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     for test in conditions(source, call):
         asked = {chain(n) for n in ast.walk(test.test) if isinstance(n, ast.Attribute)}
-        others = [s for name in asked & brought for s in source.stores(name) if not _from(source, s, item)]
-        early = all((f := source.function_of(s)) is not None and f.name == "__init__" for s in others)
+        others = [s for name in asked & brought for s in source.stores(name) if s not in inside]
+        early = all(source.function_name(s) == "__init__" for s in others)
         if is_flag(test.test) and asked & brought and early:
             return test
     return None
-
-
-def _from(source: Source, store: ast.AST, item: Made) -> bool:
-    return store in set(reached(source, roots(source, item.callback)))
 
 
 @rule(CallsOfClient, ReactsToResponses)
@@ -432,16 +419,11 @@ def _shared_callback_group(case: Case) -> Clue | None:
     """A callback awaits the response of a client in the same callback group, whose callbacks run one at a time."""
     source = case.source
     grouped = any(k.arg == "callback_group" for k in source.all(ast.keyword))
-    clients, waits = list(source.calls("create_client")), _waits(source)
+    clients = list(source.calls("create_client"))
+    answers = source.calls("call_async")
+    waits = [source.parents[call] for call in answers if isinstance(source.parents.get(call), ast.Await)]
     if grouped or not waits or len(clients) != 1:
         return None
     hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
     hint += "no answer is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
     return Clue(hint, source.place(clients[0]), key="shared_group")
-
-
-def _waits(source: Source) -> list[ast.AST]:
-    """Return the places where a function awaits a service response."""
-    return [
-        n for n in source.all(ast.Await) if isinstance(n.value, ast.Call) and last_name(n.value.func) == "call_async"
-    ]

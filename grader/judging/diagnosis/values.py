@@ -13,14 +13,24 @@ from grader.judging.checks.fields import FieldFunction, RandomInRange
 from grader.judging.checks.together import AnswersTogether
 from grader.judging.checks.topics import FieldValues
 from grader.judging.diagnosis.rules import Case, Clue, rule
-from grader.judging.diagnosis.wiring import Constant, constant, given_leaf, made, made_for, number_at, reached, roots
-from grader.judging.source import Source, chain, first_line, last_name
+from grader.judging.diagnosis.wiring import (
+    Constant,
+    constant,
+    given_leaf,
+    made,
+    made_for,
+    number_at,
+    runs,
+    variable_of,
+)
+from grader.judging.source import Source, chain, first_line, last_name, words
 from grader.judging.values import field, leaves, published, published_numbers
 from grader.judging.wording import moment, number
 
-_DRAWS: tuple[str, ...] = ("uniform", "randint", "random", "randrange", "gauss", "normalvariate", "choice", "choices")
-_DRAWS += ("normal", "rand", "randn", "triangular", "integers", "sample", "betavariate", "random_sample", "randbelow")
-_DRAWS += ("urandom", "getrandom", "randbytes", "token_bytes", "getrandbits", "randbits", "standard_normal")
+_DRAWS = words(
+    "uniform randint random randrange gauss normalvariate choice choices normal rand randn triangular integers sample "
+    "betavariate random_sample randbelow urandom getrandom randbytes token_bytes getrandbits randbits standard_normal"
+)
 #: How many levels of an expression around a random draw are followed.
 _DEEPEST = 12
 
@@ -105,9 +115,8 @@ def _misplaced_field(wrong: _Wrong) -> Clue | None:
     numbers = leaves(wrong.message.value)
     for path, value in wrong.found.items():
         want = wrong.wanted[path]
-        there = [
-            p for p, v in numbers.items() if p != path and _is(v, want) and not _is(wrong.wanted.get(p, 0.0), want)
-        ]
+        alike = [p for p, v in numbers.items() if p != path and _is(v, want)]
+        there = [p for p in alike if not _is(wrong.wanted.get(p, 0.0), want)]
         if _is(want, 0.0) or len(there) != 1:
             continue
         places = [g for g in _given_values(wrong.source, there[0]) if g.worth is None or _is(g.worth.value, want)]
@@ -163,9 +172,9 @@ def _not_every_message(wrong: _Wrong) -> Clue | None:
         ):
             continue
         code = source.code(places[0].node)
-        test = next((n for n in source.around(places[0].node) if isinstance(n, ast.If)), None)
+        test = next(source.around(places[0].node, ast.If), None)
         sends = list(source.calls("publish"))
-        beyond = any(test not in set(source.around(c)) for c in sends)
+        beyond = any(test not in list(source.around(c, ast.If)) for c in sends)
         if test is not None and source.function_of(test) is not None and beyond:
             hint = f"{code} runs only under 'if {source.code(test.test, 40)}': every message needs it"
             return Clue(hint, source.place(places[0].node), key=f"sometimes:{first_line(test)}")
@@ -187,7 +196,7 @@ def _field_never_set(wrong: _Wrong) -> Clue | None:
         item = made_for(wrong.source, "publisher", wrong.case.check.topic)
         makers = list(wrong.source.calls(item.type)) if item is not None and item.type else []
         if len(makers) == 1:
-            name = _message_name(wrong.source, makers[0])
+            name = variable_of(wrong.source, makers[0], "msg")
             hint = f"{path} is never set and stays 0.0: add {name}.{path} = {number(want)}"
             return Clue(hint, wrong.source.place(makers[0]))
     return None
@@ -200,12 +209,6 @@ def _touched(source: Source, path: str) -> bool:
     aliases = any(last_name(s.value) == group for s in source.all(ast.Assign))
     keywords = any(k.arg in (group, leaf) for k in source.all(ast.keyword))
     return wholes or aliases or keywords or bool(list(source.calls("setattr", "deepcopy", "copy")))
-
-
-def _message_name(source: Source, call: ast.Call) -> str:
-    statement = source.parents.get(call)
-    targets = statement.targets if isinstance(statement, ast.Assign) else []
-    return (chain(targets[0]) if len(targets) == 1 else "") or "msg"
 
 
 @rule(FieldValues, given=_wrong)
@@ -272,8 +275,7 @@ def _counter_never_changes(case: Case) -> Clue | None:
     if len(values) < 2 or len(set(map(repr, values))) > 1:
         return None
     for counter in _counters(case):
-        stores = [s for s in case.source.stores(counter) if _name_of(case.source.function_of(s)) != "__init__"]
-        if not stores:
+        if all(case.source.function_name(s) == "__init__" for s in case.source.stores(counter)):
             return Clue(f"{counter} never changes: write {counter} += 1 after each message")
     return None
 
@@ -324,10 +326,6 @@ def _attributes(value: ast.expr) -> Iterator[str]:
             yield chain(node)
 
 
-def _name_of(function: object) -> str:
-    return str(getattr(function, "name", ""))
-
-
 @rule(RandomInRange)
 def _draw_limits(case: Case) -> Clue | None:
     """The limits of the random draw are wrong."""
@@ -338,9 +336,8 @@ def _draw_limits(case: Case) -> Clue | None:
     call, low, high = calls[0], number(check.low), number(check.high)
     right = f"random.uniform({float(check.low)}, {float(check.high)})"
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
-        return Clue(
-            f"{source.code(call)} has no limits, some values lie far out: {right}", source.place(call), key="draw"
-        )
+        hint = f"{source.code(call)} has no limits, some values lie far out: {right}"
+        return Clue(hint, source.place(call), key="draw")
     limits = [number_at(source, a) for a in call.args]
     if last_name(call.func) in ("uniform", "randint") and len(limits) == 2 and None not in limits:
         if limits == [check.low, check.high]:
@@ -387,23 +384,19 @@ def _drawn_once(case: Case) -> Clue | None:
     """The value is drawn only once at the start, or the seed is set each time."""
     source = case.source
     for timer in made(source, "timer"):
-        inside = list(reached(source, roots(source, timer.callback)))
+        inside = runs(source, timer)
         seeds = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "seed"]
         if seeds:
             hint = f"{source.code(seeds[0])} in the callback starts the same draw each time: take it out"
             return Clue(hint, source.place(seeds[0]), key="draw")
         drawn = [c for c in draws(source) if c in inside]
-        early = [c for c in draws(source) if c not in inside and _at_start(source, c)]
+        outside = (c for c in draws(source) if c not in inside)
+        early = [c for c in outside if source.function_name(c) in ("", "__init__", "main")]
         if not drawn and len(early) == 1 and len(made(source, "timer")) == 1:
             name = last_name(timer.callback) or "the callback"
             hint = f"{source.code(early[0])} is drawn once, when the node starts: draw it in {name}"
             return Clue(hint, source.place(early[0]), key="draw")
     return None
-
-
-def _at_start(source: Source, call: ast.AST) -> bool:
-    function = source.function_of(call)
-    return function is None or function.name in ("__init__", "main")
 
 
 @rule(RandomInRange)

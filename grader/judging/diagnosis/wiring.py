@@ -46,12 +46,7 @@ _NAMED = {"math.pi": math.pi, "np.pi": math.pi, "numpy.pi": math.pi}
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number, and the expression in the text that determines it.
-
-    Attributes:
-        value: The number.
-        origin: The expression to change for another number.
-    """
+    """A number, and the expression in the text to change for another number."""
 
     value: float
     origin: ast.AST
@@ -72,8 +67,10 @@ def constant(source: Source, node: ast.AST | None, depth: int = 0) -> Constant |
 
 def _literal(node: ast.Constant) -> Constant | None:
     plain = isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
-    value = _as_float(node.value) if plain else None
-    return None if value is None else Constant(value, node)
+    try:
+        return Constant(float(node.value), node) if plain else None  # type: ignore[arg-type]
+    except OverflowError:
+        return None
 
 
 def _named(source: Source, node: ast.Name | ast.Attribute, depth: int) -> Constant | None:
@@ -90,13 +87,6 @@ def number_at(source: Source, node: ast.AST | None) -> float | None:
     """Return the value of an expression, or None."""
     found = constant(source, node)
     return None if found is None else found.value
-
-
-def _as_float(value: object) -> float | None:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (OverflowError, ValueError, TypeError):
-        return None
 
 
 def _arithmetic(source: Source, node: ast.UnaryOp | ast.BinOp, depth: int) -> Constant | None:
@@ -119,15 +109,14 @@ def _arithmetic(source: Source, node: ast.UnaryOp | ast.BinOp, depth: int) -> Co
 
 
 def _called(source: Source, call: ast.Call, depth: int) -> Constant | None:
-    if chain(call.func) in _FUNCTIONS and len(call.args) == 1 and not call.keywords:
-        inner = constant(source, call.args[0], depth + 1)
-        if inner is None:
-            return None
-        try:
-            return Constant(_FUNCTIONS[chain(call.func)](inner.value), call)
-        except (ArithmeticError, ValueError):
-            return None
-    return None
+    apply = _FUNCTIONS.get(chain(call.func))
+    if apply is None or len(call.args) != 1 or call.keywords:
+        return None
+    inner = constant(source, call.args[0], depth + 1)
+    try:
+        return None if inner is None else Constant(apply(inner.value), call)
+    except (ArithmeticError, ValueError):
+        return None
 
 
 def _parameter(source: Source, call: ast.AST, depth: int) -> Constant | None:
@@ -214,11 +203,8 @@ class Made:
 
     Attributes:
         kind: `publisher`, `subscription` or `timer`.
-        call: The call that creates it.
         type: Last part of the message type's name; empty if unknown.
         topic: Topic as written; None if it cannot be read from the text.
-        callback: The callback argument.
-        period: The period argument of a timer.
         qos: The depth or profile argument.
     """
 
@@ -231,19 +217,19 @@ class Made:
     qos: ast.expr | None = None
 
 
-def made(source: Source, kind: str) -> list[Made]:
-    """Return the publishers, subscriptions or timers of a file, in the order of the text."""
-    found = []
-    for call in islice(source.calls(f"create_{kind}"), MOST_MADE):
-        if kind == "timer":
-            period, callback = argument(call, 0, "timer_period_sec"), argument(call, 1, "callback")
-            found.append(Made(kind, call, period=period, callback=callback))
-            continue
-        type_, topic = argument(call, 0, "msg_type"), text(source, argument(call, 1, "topic"))
-        callback = argument(call, 2, "callback") if kind == "subscription" else None
-        qos = argument(call, 3 if kind == "subscription" else 2, "qos_profile")
-        found.append(Made(kind, call, last_name(type_), topic, callback, qos=qos))
-    return found
+def made(source: Source, *kinds: str) -> list[Made]:
+    """Return the publishers, subscriptions or timers of a file, those of a kind in the order of the text."""
+    return [_made(source, k, call) for k in kinds for call in islice(source.calls(f"create_{k}"), MOST_MADE)]
+
+
+def _made(source: Source, kind: str, call: ast.Call) -> Made:
+    if kind == "timer":
+        period, callback = argument(call, 0, "timer_period_sec"), argument(call, 1, "callback")
+        return Made(kind, call, period=period, callback=callback)
+    type_, topic = argument(call, 0, "msg_type"), text(source, argument(call, 1, "topic"))
+    callback = argument(call, 2, "callback") if kind == "subscription" else None
+    qos = argument(call, 3 if kind == "subscription" else 2, "qos_profile")
+    return Made(kind, call, last_name(type_), topic, callback, qos=qos)
 
 
 def text(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
@@ -319,6 +305,16 @@ def reached(source: Source, start: Sequence[ast.AST]) -> Iterator[ast.AST]:
                 waiting.extend(roots(source, node.func))
 
 
+def runs(source: Source, item: Made) -> list[ast.AST]:
+    """Return every node that may run in the callback of a subscription or timer."""
+    return list(reached(source, roots(source, item.callback)))
+
+
+def names_in(node: ast.AST) -> set[str]:
+    """Return the dotted names in a node, without `self` itself."""
+    return {chain(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
+
+
 def is_log(source: Source, node: ast.AST) -> bool:
     """Return whether a node is a call of an rclpy logger, as far as the text shows."""
     if not isinstance(node, ast.Call) or last_name(node.func) not in LOG_METHODS:
@@ -354,17 +350,15 @@ def used(source: Source, function: Function) -> bool:
 def conditions(source: Source, call: ast.AST) -> list[ast.If]:
     """Return the conditions of a call: those around it, and earlier ones that return."""
     function = source.function_of(call)
-    around = [n for n in source.around(call) if isinstance(n, ast.If)]
+    around = list(source.around(call, ast.If))
     returns = (r for r in source.all(ast.Return) if source.function_of(r) is function)
-    early = [n for r in returns if first_line(r) < first_line(call) for n in source.around(r) if isinstance(n, ast.If)]
-    return [*around, *early]
+    return [*around, *(n for r in returns if first_line(r) < first_line(call) for n in source.around(r, ast.If))]
 
 
 def changes(source: Source, test: ast.expr) -> bool:
     """Return whether a condition uses a name that functions other than `__init__` and `main` assign."""
-    names = {chain(n) for n in ast.walk(test) if isinstance(n, (ast.Name, ast.Attribute))} - {"self", ""}
-    stores = (s for name in names for s in source.stored.get(name, ()))
-    return any((f := source.function_of(s)) is not None and f.name not in ("__init__", "main") for s in stores)
+    stores = (s for name in names_in(test) for s in source.stored.get(name, ()))
+    return any(source.function_name(s) not in ("", "__init__", "main") for s in stores)
 
 
 def is_flag(test: ast.expr) -> bool:
@@ -403,11 +397,9 @@ def node_made(source: Source) -> ast.Call | None:
     return next((c for c in calls if not isinstance(source.parents.get(c), ast.ClassDef)), None)
 
 
-def variable_of(source: Source, call: ast.AST) -> str:
-    """Return the variable that a new node is assigned to; `node` if there is none."""
-    statement = source.parents.get(call)
-    named = isinstance(statement, ast.Assign) and len(statement.targets) == 1
-    return chain(statement.targets[0]) or "node" if named and isinstance(statement, ast.Assign) else "node"
+def variable_of(source: Source, call: ast.AST, otherwise: str = "node") -> str:
+    """Return the variable that a new object is assigned to, without an annotation; `otherwise` if there is none."""
+    return target_of(source, call) or otherwise if isinstance(source.parents.get(call), ast.Assign) else otherwise
 
 
 def timer_code(source: Source, item: Made) -> str:

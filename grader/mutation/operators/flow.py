@@ -55,6 +55,7 @@ def alone(program: Program, node: cst.CSTNode) -> bool:
 
 #: Statements that people repeat by accident, and where this changes the behaviour.
 _REPEATED = ("publish", "call_async", "call", *LEVELS)
+_ENTITIES = ("create_timer", "create_subscription")
 
 
 def missing_call(program: Program) -> Iterator[Mutation]:
@@ -140,9 +141,7 @@ def repeated_call(program: Program) -> Iterator[Mutation]:
 def repeated_entity(program: Program) -> Iterator[Mutation]:
     """A second timer or subscription beside the first, with the same callback."""
     for line in program.all(cst.SimpleStatementLine):
-        calls = [
-            call for call in program.all(cst.Call, line) if called(call) in ("create_timer", "create_subscription")
-        ]
+        calls = [call for call in program.all(cst.Call, line) if called(call) in _ENTITIES]
         if calls:
             twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
             yield Mutation(line, f"two of {short(program.code(calls[0]))}", ((line, twice),))
@@ -181,20 +180,17 @@ LATER = 10
 
 def exits_later(program: Program) -> Iterator[Mutation]:
     """A program that ends after a while."""
-    for function in program.callbacks:
-        yield _after(function, LATER, "raise SystemExit", "exits")
+    return (_after(function, LATER, "raise SystemExit", "exits") for function in program.callbacks)
 
 
 def crashes_on_third(program: Program) -> Iterator[Mutation]:
     """An error at the third call of a callback."""
-    for function in program.callbacks:
-        yield _after(function, 2, "raise RuntimeError('the third time')", "raises")
+    return (_after(function, 2, "raise RuntimeError('the third time')", "raises") for function in program.callbacks)
 
 
 def stops_later(program: Program) -> Iterator[Mutation]:
     """A callback that stops working after a while."""
-    for function in program.callbacks:
-        yield _after(function, LATER, "return", "does nothing")
+    return (_after(function, LATER, "return", "does nothing") for function in program.callbacks)
 
 
 def frozen_value(program: Program) -> Iterator[Mutation]:
@@ -213,22 +209,23 @@ def frozen_value(program: Program) -> Iterator[Mutation]:
 
 def first_message_only(program: Program) -> Iterator[Mutation]:
     """A received message that is kept forever: only the first one counts."""
-    for function in program.handed_to("create_subscription"):
-        parameter = function.params.params[-1].name.value if function.params.params else ""
-        if parameter and parameter != "self":
-            place = f"{owner(function)}.first_heard"
-            text = f"{place} = {parameter} = getattr({owner(function)}, 'first_heard', {parameter})"
-            yield Mutation(function, f"{function.name.value} keeps the first {parameter}", at_top(function, text))
+    kept = "{own}.first_heard = {message} = getattr({own}, 'first_heard', {message})"
+    return _hearing(program, "keeps the first {message}", kept)
 
 
 def one_behind(program: Program) -> Iterator[Mutation]:
     """A message that is used only when the next one arrives: always one behind."""
+    put_off = "{own}.heard, {message} = {message}, getattr({own}, 'heard', {message})"
+    return _hearing(program, "uses the {message} before", put_off)
+
+
+def _hearing(program: Program, detail: str, text: str) -> Iterator[Mutation]:
+    """Yield the mutations that begin the callback of each subscription with a statement about its message."""
     for function in program.handed_to("create_subscription"):
-        parameter = function.params.params[-1].name.value if function.params.params else ""
-        if parameter and parameter != "self":
-            own = owner(function)
-            text = f"{own}.heard, {parameter} = {parameter}, getattr({own}, 'heard', {parameter})"
-            yield Mutation(function, f"{function.name.value} uses the {parameter} before", at_top(function, text))
+        message = (parameters(function) or ["self"])[-1]
+        if message != "self":
+            said = f"{function.name.value} {detail.format(message=message)}"
+            yield Mutation(function, said, at_top(function, text.format(own=owner(function), message=message)))
 
 
 def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutation:
@@ -319,7 +316,7 @@ def boolean(program: Program) -> Iterator[Mutation]:
 def loop_once(program: Program) -> Iterator[Mutation]:
     """A loop that runs only once: `if` for `while`."""
     for loop in program.all(cst.While):
-        if loop.orelse is None and not _breaks(program, loop):
+        if loop.orelse is None and not any((program.all(cst.Break, loop), program.all(cst.Continue, loop))):
             after = cst.If(test=loop.test, body=loop.body, whitespace_before_test=cst.SimpleWhitespace(" "))
             yield Mutation(loop, f"while -> if {program.code(loop.test)}", ((loop, after),))
 
@@ -330,10 +327,6 @@ def unhandled(program: Program) -> Iterator[Mutation]:
         body = cst.IndentedBlock([cst.parse_statement("raise")])
         named = program.code(handler.type) if handler.type is not None else "everything"
         yield Mutation(handler, f"except {' '.join(named.split())}: raise", ((handler.body, body),))
-
-
-def _breaks(program: Program, loop: cst.While) -> bool:
-    return bool(program.all(cst.Break, loop) or program.all(cst.Continue, loop))
 
 
 def _is_guard(program: Program, node: cst.CSTNode) -> bool:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 from grader.mutation.operators import flow, values, words
-from grader.mutation.operators.program import Mutation, Program, short
+from grader.mutation.operators.program import Candidate, Mutation, Program, short
 
 Operator = Callable[[Program], Iterator[Mutation]]
 #: Operator name -> operator; its docstring describes the mistake that it imitates.
@@ -76,46 +76,14 @@ OPERATORS: Mapping[str, Operator] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Mutant:
-    """A program with one mistake.
-
-    Attributes:
-        file: Name of the file.
-        line: Line of the original that was changed, from 1.
-        operator: Key of `OPERATORS`.
-        detail: The change.
-        source: The complete changed program.
-        number: Distinguishes mutants with the same file, line, operator and detail, starting at 1.
-    """
-
-    file: str
-    line: int
-    operator: str
-    detail: str
-    source: str
-    number: int = 1
-
-    @property
-    def id(self) -> str:
-        """An id that stays the same as long as the reference solution does."""
-        again = f" #{self.number}" if self.number > 1 else ""
-        return f"{self.file}:{self.line}:{self.operator}:{self.detail}{again}"
-
-
-def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERATORS) -> tuple[Mutant, ...]:
+def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERATORS) -> tuple[Candidate, ...]:
     """Return the mutants of a program, in the order of operators and lines.
 
     Mutants that are equivalent to the original or to an earlier mutant are skipped, and so are invalid programs.
-
-    Args:
-        source: The program.
-        file: Its name, for the ids.
-        operators: The operators to apply.
     """
     program = Program(source)
     seen = {meaning(source)}
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     found = []
     for name, operator in operators.items():
         for change in operator(program):
@@ -124,9 +92,11 @@ def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERA
             if means is None or means in seen:
                 continue
             seen.add(means)
-            mutant = Mutant(file, program.line(change.at), name, short(change.detail, 90), changed)
-            counts[mutant.id] = counts.get(mutant.id, 0) + 1
-            found.append(Mutant(file, mutant.line, name, mutant.detail, changed, counts[mutant.id]))
+            detail = short(change.detail, 90)
+            id_ = f"{file}:{program.line(change.at)}:{name}:{detail}"
+            counts[id_] += 1
+            again = f" #{counts[id_]}" if counts[id_] > 1 else ""
+            found.append(Candidate(f"{id_}{again}", file, name, changed, detail))
     return tuple(found)
 
 

@@ -33,28 +33,34 @@ LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
 
 @dataclass(frozen=True, slots=True)
 class Mutation:
-    """One way to change a program.
-
-    Attributes:
-        at: The node that gives the line.
-        detail: The change, in one line.
-        edits: Nodes of the program and their replacements.
-    """
+    """One way to change a program: the node that gives the line, the change in one line, and its edits."""
 
     at: cst.CSTNode
     detail: str
     edits: tuple[Edit, ...]
 
 
-class Program:
-    """A parsed program.
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A changed program: a mutant or a correct variant.
 
-    Args:
-        source: Its text.
-
-    Raises:
-        libcst.ParserSyntaxError: The source is not valid Python.
+    Attributes:
+        id: Stays the same as long as the reference solution does.
+        file: Name of the file.
+        operator: Key of `OPERATORS` or of `VARIANTS`.
+        source: The whole program.
+        detail: The change of a mutant, in one line.
     """
+
+    id: str
+    file: str
+    operator: str
+    source: str
+    detail: str = ""
+
+
+class Program:
+    """A parsed program; raises libcst.ParserSyntaxError for one that is not valid Python."""
 
     def __init__(self, source: str) -> None:
         wrapper = MetadataWrapper(cst.parse_module(source))

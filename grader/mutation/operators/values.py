@@ -100,15 +100,17 @@ _OPERATORS: dict[type[cst.BaseBinaryOp], type[cst.BaseBinaryOp]] = {
 
 def constant(program: Program) -> Iterator[Mutation]:
     """A number that is off: by a tenth, or by one if it is an integer."""
-    for node, value in _numbers(program):
-        off = value + 1 if isinstance(value, int) else value * 1.1 or 0.1
-        yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
+    return _off(program, 1)
 
 
 def constant_less(program: Program) -> Iterator[Mutation]:
     """A number that is off in the other direction."""
+    return _off(program, -1)
+
+
+def _off(program: Program, side: int) -> Iterator[Mutation]:
     for node, value in _numbers(program):
-        off = value - 1 if isinstance(value, int) else value * 0.9 or -0.1
+        off = value + side if isinstance(value, int) else value * (1 + 0.1 * side) or 0.1 * side
         yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
 
 
@@ -209,23 +211,17 @@ def _sent(program: Program) -> list[cst.BaseExpression]:
         arg.value
         for call in program.all(cst.Call)
         for arg in call.args
-        if arg.keyword is not None and _is_message(called(call))
+        if arg.keyword is not None and called(call)[:1].isupper()
     ]
     for assign in program.all(cst.Assign):
         target = assign.targets[0].target
-        if isinstance(target, cst.Attribute) and not (
-            isinstance(target.value, cst.Name) and target.value.value == "self"
-        ):
+        if isinstance(target, cst.Attribute) and not _is_own(target):
             values.append(assign.value)
     return [
         value
         for value in values
         if isinstance(program.constant(value), (cst.Name, cst.Attribute, cst.Call, cst.BinaryOperation))
     ]
-
-
-def _is_message(name: str) -> bool:
-    return name[:1].isupper()
 
 
 _SENSOR = ("qos_profile_sensor_data", "from rclpy.qos import qos_profile_sensor_data")

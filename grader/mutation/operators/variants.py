@@ -11,6 +11,7 @@ import libcst as cst
 from grader.mutation.operators.mutants import meaning
 from grader.mutation.operators.program import (
     CREATORS,
+    Candidate,
     Edit,
     Program,
     argument,
@@ -156,12 +157,12 @@ def keyword_arguments(program: Program) -> str:
 
 def percent_format(program: Program) -> str:
     """Texts are formatted with `%` instead of f-strings."""
-    return _formatted(program, _Style(_percent_field, _percent_text, _percent))
+    return _formatted(program, _Style(lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)".format))
 
 
 def format_method(program: Program) -> str:
     """Texts are formatted with `.format` instead of f-strings."""
-    return _formatted(program, _Style(_format_field, str, _format))
+    return _formatted(program, _Style(lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})".format))
 
 
 def qos_object(program: Program) -> str:
@@ -171,9 +172,8 @@ def qos_object(program: Program) -> str:
         arg = argument(call, "qos_profile")
         if arg is not None and isinstance(arg.value, cst.Integer):
             edits.append((arg.value, expression(f"QoSProfile(depth={arg.value.value})")))
-    return (
-        program.changed([*edits, *program.importing("from rclpy.qos import QoSProfile")]) if edits else _same(program)
-    )
+    imported = program.importing("from rclpy.qos import QoSProfile")
+    return program.changed([*edits, *imported]) if edits else _same(program)
 
 
 def lambda_callbacks(program: Program) -> str:
@@ -265,9 +265,8 @@ def _formatted(program: Program, style: _Style) -> str:
 
 def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
     """Whether every style can format a field."""
-    return (
-        part.conversion is None and part.equal is None and _PLAIN.fullmatch(_specification(program, part)) is not None
-    )
+    bare = part.conversion is None and part.equal is None
+    return bare and _PLAIN.fullmatch(_specification(program, part)) is not None
 
 
 def _specification(program: Program, part: cst.BaseFormattedStringContent) -> str:
@@ -275,24 +274,8 @@ def _specification(program: Program, part: cst.BaseFormattedStringContent) -> st
     return "".join(program.code(piece) for piece in pieces or ())
 
 
-def _percent_field(specification: str) -> str:
-    return f"%{specification or 's'}"
-
-
 def _percent_text(text: str) -> str:
     return text.replace("%", "%%").replace("{{", "{").replace("}}", "}")
-
-
-def _format_field(specification: str) -> str:
-    return f"{{:{specification}}}" if specification else "{}"
-
-
-def _percent(text: str, values: str) -> str:
-    return f"{text} % ({values},)"
-
-
-def _format(text: str, values: str) -> str:
-    return f"{text}.format({values})"
 
 
 def _equal() -> cst.AssignEqual:
@@ -332,36 +315,12 @@ VARIANTS: Mapping[str, Rewriter] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ProgramVariant:
-    """A correct program beside the reference solution.
-
-    Attributes:
-        file: Name of the file.
-        name: Key of `VARIANTS`.
-        source: The whole program.
-    """
-
-    file: str
-    name: str
-    source: str
-
-    @property
-    def id(self) -> str:
-        """An id that stays the same as long as the reference solution does."""
-        return f"{self.file}:{self.name}"
-
-
-def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[ProgramVariant, ...]:
-    """Return the variants that differ from a program, in the order of the table.
-
-    Args:
-        source: The program.
-        file: Its name, for the ids.
-        rewriters: What makes them.
-    """
+def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[Candidate, ...]:
+    """Return the variants that differ from a program, in the order of the table."""
     program = Program(source)
     written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
     return tuple(
-        ProgramVariant(file, name, text) for name, text in written if text != source and meaning(text) is not None
+        Candidate(f"{file}:{name}", file, name, text)
+        for name, text in written
+        if text != source and meaning(text) is not None
     )

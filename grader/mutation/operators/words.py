@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from itertools import combinations
 
 import libcst as cst
@@ -61,7 +61,9 @@ def text(program: Program) -> Iterator[Mutation]:
     """A misspelt word in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
         old = text_of(node)
-        if old is not None and not is_docstring(program, node) and _is_prose(old) and (word := _WORD.search(old)):
+        # names of topics, nodes and files have no spaces
+        prose = old is not None and " " in old.strip() and not is_docstring(program, node)
+        if old is not None and prose and (word := _WORD.search(old)):
             after = old[: word.start()] + word[0][:-1] + old[word.end() :]
             yield Mutation(node, into(old, after), ((node, string(after)),))
     for part in program.all(cst.FormattedStringText):
@@ -100,11 +102,6 @@ def _plain(arg: cst.Arg) -> cst.Arg:
     return arg.with_changes(comma=cst.MaybeSentinel.DEFAULT, keyword=None, equal=cst.MaybeSentinel.DEFAULT)
 
 
-def _is_prose(text: str) -> bool:
-    """Whether a text is for people: names of topics, nodes and files have no spaces."""
-    return " " in text.strip()
-
-
 _NAMED = {
     "create_publisher": "topic",
     "create_subscription": "topic",
@@ -138,20 +135,17 @@ _STAMPED: Mapping[str, tuple[str, tuple[str, ...]]] = {
 
 def topic_typo(program: Program) -> Iterator[Mutation]:
     """A misspelt topic or service: its last letter is missing."""
-    for node, name in names(program):
-        yield _renamed(node, name, name[:-1] if len(name) > 2 else f"{name}s")
+    return _renamed(program, lambda name: name[:-1] if len(name) > 2 else f"{name}s")
 
 
 def topic_namespace(program: Program) -> Iterator[Mutation]:
     """A topic or service from another tutorial: the right name in a namespace, such as `/turtle1/cmd_vel`."""
-    for node, name in names(program):
-        yield _renamed(node, name, f"/turtle1/{name.lstrip('/')}")
+    return _renamed(program, lambda name: f"/turtle1/{name.lstrip('/')}")
 
 
 def topic_private(program: Program) -> Iterator[Mutation]:
     """A private name, `~/cmd_vel`."""
-    for node, name in names(program):
-        yield _renamed(node, name, f"~/{name.lstrip('/')}")
+    return _renamed(program, lambda name: f"~/{name.lstrip('/')}")
 
 
 def topic_swapped(program: Program) -> Iterator[Mutation]:
@@ -209,8 +203,9 @@ def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
     return list(found.items())
 
 
-def _renamed(node: cst.SimpleString, name: str, other: str) -> Mutation:
-    return Mutation(node, into(name, other), ((node, string(other)),))
+def _renamed(program: Program, rename: Callable[[str], str]) -> Iterator[Mutation]:
+    for node, name in names(program):
+        yield Mutation(node, into(name, rename(name)), ((node, string(rename(name))),))
 
 
 def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[cst.ImportFrom, str]]:
@@ -251,10 +246,8 @@ def rate_as_period(program: Program) -> Iterator[Mutation]:
     """The rate instead of the period, or the other way round."""
     for given in _periods(program):
         before = program.code(given)
-        is_inverse = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
-        after = (
-            program.code(given.right) if is_inverse and isinstance(given, cst.BinaryOperation) else f"1 / ({before})"
-        )
+        quotient = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
+        after = program.code(given.right) if quotient else f"1 / ({before})"  # type: ignore[attr-defined]
         yield Mutation(given, into(before, after), ((given, expression(after)),))
 
 

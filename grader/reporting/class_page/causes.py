@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,94 +11,63 @@ from typing import Any
 from grader.core.exercise import Outcome
 from grader.reporting.class_page.contents import LOST, ReportData
 
-_VARYING = "#"
-# Longest text examined; the kind of a longer text is recognisable from its beginning.
-_MOST = 600
-# The order matters: a quotation may contain anything, a place contains a number, and a call contains names.
-_PATTERNS = (
-    (re.compile(r"(?<!\w)'[^'\n]*'|\"[^\"\n]*\"|`[^`\n]*`"), "'…'"),
-    (re.compile(r"(?<![\w.])[\w./-]+\.pyi?\b(?::\d+){0,2}"), "FILE"),
-    (re.compile(r"\b[A-Za-z_][\w.]*\([^()\n]*(?:\)|…)"), "CALL"),
-    (re.compile(r"(?<![\w/])/[A-Za-z_][\w/]*"), "/NAME"),
-    (re.compile(r"\b[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+\b"), "NAME"),
-    (
-        re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?(?![\w.]*\d)|\b(?:nan|inf)\b", re.IGNORECASE),
-        _VARYING,
-    ),
-    (re.compile(rf"{_VARYING}(?:(?:, | and | to | or ){_VARYING})+"), _VARYING),
-    (re.compile(r"\s+"), " "),
-)
-#: Exceptions whose messages come from Python and describe what happened.
-_OWN_WORDS = frozenset({"AttributeError", "ImportError", "IndexError", "ModuleNotFoundError", "NameError", "TypeError"})
-_EXCEPTION = re.compile(r"(?P<type>[A-Za-z_][\w.]{0,80})(?::\s*(?P<text>.*))?", re.DOTALL)
-
 
 @dataclass(frozen=True, order=True, slots=True)
 class CauseKind:
-    """The kind of a cause.
+    """The kind of a cause: values of a report, never its sentences.
 
     Attributes:
-        source: Where it is known from: `diagnosis`, `missing`, `fault` or `reason`.
-        key: Equal for causes of the same kind.
+        source: Where it is known from: `diagnosis`, `missing`, `fault`, `problem`, or `criterion` if nothing else is.
+        key: Id of the diagnosis, name of the file, or kind of the fault or problem.
+        parts: The type of the exception, or topics and detail of the problem.
     """
 
     source: str
-    key: str
+    key: str = ""
+    parts: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
         """A short description of the kind."""
-        if self.source == "diagnosis":
-            return self.key.replace("_", " ")
-        return {"missing": "file missing", "fault": "fault"}.get(self.source, "as measured")
+        fixed = {"missing": "file missing", "criterion": "as measured"}
+        return fixed.get(self.source) or " ".join((self.key.replace("_", " "), *self.parts))
 
 
 def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
     """Return the kind of cause for which a criterion lost points.
 
-    A diagnosis is the most reliable source; then a missing file, a fault, and finally the text of the reason.
+    A diagnosis is the most reliable source; then a missing file, a fault, and the problem that the check found.
 
     Args:
         criterion: A criterion of a JSON report.
     """
-    evidence = criterion.get("evidence")
-    evidence = evidence if isinstance(evidence, Mapping) else {}
-    named, missing, fault = (evidence.get(key) for key in ("diagnosis", "missing", "fault"))
-    if isinstance(named, str) and named:
-        return CauseKind("diagnosis", named)
-    if isinstance(missing, str) and missing:
-        return CauseKind("missing", missing)
-    if isinstance(fault, Mapping):
-        return CauseKind("fault", f"{fault.get('kind')} {_exception(str(fault.get('text', '')))}")
-    return CauseKind("reason", skeleton(str(criterion.get("reason", "")).split(";", 1)[0]))
+    evidence = _mapping(criterion.get("evidence"))
+    for source in ("diagnosis", "missing"):
+        if isinstance(evidence.get(source), str) and evidence[source]:
+            return CauseKind(source, evidence[source])
+    fault = _mapping(evidence.get("fault"))
+    if fault:
+        exception = str(fault.get("exception") or "")
+        return CauseKind("fault", str(fault.get("kind")), (exception,) if exception else ())
+    return _problem_of(criterion)
 
 
-def skeleton(text: str) -> str:
-    """Return a sentence without the parts that differ between students.
-
-    Placeholders replace numbers, lists of numbers, quotations, file names with lines, calls, attributes and topic
-    names: `10.00 Hz` and `9.98 Hz` become equal, and so do `self.timer` and `self.clock_timer`.
-    """
-    found = text[:_MOST]
-    for pattern, sign in _PATTERNS:
-        found = pattern.sub(sign, found)
-    return found.strip().casefold()
+def _problem_of(criterion: Mapping[str, Any]) -> CauseKind:
+    """Return the problem that the check of a criterion found, if a report names one."""
+    problem = _mapping(criterion.get("problem"))
+    if not problem:
+        return CauseKind("criterion")
+    topics, detail = problem.get("topics"), problem.get("detail")
+    parts = [*(topics if isinstance(topics, list) else ()), *([detail] if detail else ())]
+    return CauseKind("problem", str(problem.get("kind")), tuple(map(str, parts)))
 
 
-def _exception(text: str) -> str:
-    """Return the type of an exception, with the message if Python wrote it: messages of students are too different."""
-    match = _EXCEPTION.fullmatch(text[:_MOST].strip())
-    if match is None:
-        return skeleton(text.split("\n", 1)[0])
-    own = match["type"] in _OWN_WORDS and match["text"]
-    return f"{match['type']}: {skeleton(match['text'].split(chr(10), 1)[0])}" if own else match["type"]
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
 
 
 #: More forms of one cause than this are merged.
 MOST_FORMS = 3
-# Sentences in older reports, which have no `blocked_by` and no `same_cause_as`.
-_SAME = re.compile(r"this has the same cause as (?P<id>\S{1,200}): mend that first")
-_NEEDS = re.compile(r"not judged: needs (?P<what>.{1,400}?)(?: \(.{1,40}\)|, which is missing)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +78,7 @@ class Form:
         student: Index of a student whose report has this form.
         reason: The reason in that report.
         hint: The hint in that report; may be empty.
-        count: Number of students with the same hint, apart from numbers and names.
+        count: Number of students whose check found the same problem.
     """
 
     student: int
@@ -190,18 +158,7 @@ def _roots(by_id: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[Mapping[str
 def _before(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the criterion that must be fixed before another one; None if there is none."""
     known = criterion.get("blocked_by") or criterion.get("same_cause_as")
-    return by_id.get(known) if known else _before_by_text(criterion, by_id)
-
-
-def _before_by_text(criterion: Mapping[str, Any], by_id: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the criterion that an older report names only in its sentences."""
-    if criterion["outcome"] == Outcome.BLOCKED.value:
-        match = _NEEDS.fullmatch(str(criterion["reason"]))
-        what = match["what"] if match else ""
-        missing = (c for c in by_id.values() if (c.get("evidence") or {}).get("missing") == what)
-        return by_id.get(what) or next(missing, None)
-    match = _SAME.fullmatch(str(criterion["hint"] or ""))
-    return by_id.get(match["id"]) if match else None
+    return by_id.get(known) if known else None
 
 
 def _lost(criterion: Mapping[str, Any]) -> Fraction:
@@ -210,10 +167,10 @@ def _lost(criterion: Mapping[str, Any]) -> Fraction:
 
 def _forms(students: Mapping[int, Mapping[str, Any]]) -> tuple[Form, ...]:
     """Return the commonest forms of a cause, each with the first student who has it."""
-    shapes = {student: skeleton(str(root["hint"] or root["reason"])) for student, root in students.items()}
+    problems = {student: _problem_of(root) for student, root in students.items()}
     forms = []
-    for shape, count in Counter(shapes.values()).most_common(MOST_FORMS):
-        student = next(s for s, own in shapes.items() if own == shape)
+    for problem, count in Counter(problems.values()).most_common(MOST_FORMS):
+        student = next(s for s, own in problems.items() if own == problem)
         root = students[student]
         forms.append(Form(student, str(root["reason"]), str(root["hint"] or ""), count))
     return tuple(forms)

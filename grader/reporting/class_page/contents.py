@@ -32,52 +32,31 @@ class RowTone(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class StudentRow:
-    """One submission, or a student without one.
+    """One submission, or a student without one."""
 
-    Attributes:
-        folder: Name of the folder below `students/` with the results; empty if there is none.
-        name: The student, or the name of the submission.
-        also: Further identification: submission name, user name, number, address in the roster.
-        status: The state in a word or two.
-        tone: How to present the status.
-        raw: Points as graded, final or not; None if there are none.
-        max_score: Maximum points; None without a report.
-        final: Points that count in the end; None without a score.
-        adjustments: Decisions that changed the score, one sentence each, e.g. the penalty for late days.
-        remarks: Notes for readers of the row.
-        report: The report; None if there is none.
-        less: Whether students see less than the report.
-        counts: Whether the submission counts.
-    """
-
-    folder: str
-    name: str
-    also: tuple[str, ...] = ()
-    status: str = "graded"
-    tone: RowTone = RowTone.FINE
-    raw: Fraction | None = None
-    max_score: Fraction | None = None
-    final: Fraction | None = None
+    folder: str  # name of the folder below `students/` with the results; empty if there is none
+    name: str  # the student, or the name of the submission
+    also: tuple[str, ...] = ()  # further identification: submission name, user name, number, address in the roster
+    status: str = "graded"  # the state in a word or two
+    tone: RowTone = RowTone.FINE  # how to present the status
+    raw: Fraction | None = None  # points as graded, final or not; None if there are none
+    max_score: Fraction | None = None  # maximum points; None without a report
+    final: Fraction | None = None  # points that count in the end; None without a score
+    # Decisions that changed the score, one sentence each, e.g. the penalty for late days.
     adjustments: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    report: ReportData | None = None
-    less: bool = False
+    remarks: tuple[str, ...] = ()  # notes for readers of the row
+    report: ReportData | None = None  # the report; None if there is none
+    less: bool = False  # whether students see less than the report
     counts: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class PageEntry:
-    """A line of a list.
+    """A line of a list."""
 
-    Attributes:
-        text: The text of the line.
-        student: Index of the student it refers to; None if that is nobody in the table.
-        exercise: Exercise of the report that the line links to; empty for the whole report.
-    """
-
-    text: str
-    student: int | None = None
-    exercise: str = ""
+    text: str  # the text of the line
+    student: int | None = None  # index of the student it refers to; None if that is nobody in the table
+    exercise: str = ""  # exercise of the report that the line links to; empty for the whole report
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,106 +71,63 @@ class Listing:
 
 @dataclass(frozen=True, slots=True)
 class PageLink:
-    """A link to another page in the results folder.
-
-    Attributes:
-        title: Title of the page.
-        path: Path relative to the folder, with `/` as separator, not percent-encoded.
-        note: A short note beside it, such as the number of pairs.
-    """
+    """A link to another page in the results folder."""
 
     title: str
-    path: str
-    note: str = ""
+    path: str  # path relative to the folder, with `/` as separator, not percent-encoded
+    note: str = ""  # a short note beside it, such as the number of pairs
 
 
 @dataclass(frozen=True, slots=True)
 class RunFacts:
-    """Facts about the run that wrote the page; nothing else in the page differs between runs.
+    """Facts about the run that wrote the page; nothing else in the page differs between runs."""
 
-    Attributes:
-        line: One sentence that is always visible.
-        rows: Names and values.
-        warnings: Warnings that apply to the whole page.
-    """
-
-    line: str = ""
+    line: str = ""  # one sentence that is always visible
     rows: tuple[tuple[str, str], ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # warnings that apply to the whole page
 
 
 @dataclass(frozen=True, slots=True)
 class ClassPage:
-    """The data of the page.
+    """The data of the page."""
 
-    Attributes:
-        title: Name of the class.
-        run: Facts about the run.
-        students: Rows in the order of the table.
-        listings: Lists of entries that need attention.
-        links: Other pages of the class.
-    """
-
-    title: str
+    title: str  # name of the class
     run: RunFacts
-    students: tuple[StudentRow, ...]
-    listings: tuple[Listing, ...] = ()
+    students: tuple[StudentRow, ...]  # rows in the order of the table
+    listings: tuple[Listing, ...] = ()  # lists of entries that need attention
     links: tuple[PageLink, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """One bin of the score distribution.
+    """One bin of the score distribution."""
 
-    Attributes:
-        label: In percent of the maximum points.
-        low: Lowest share in it, from 0 to 1.
-        high: Share where the next bin begins; the last bin is open.
-        raw: Number of scores in it as graded.
-        final: Number of scores in it after adjustments.
-    """
-
-    label: str
-    low: float
-    high: float
-    raw: int
-    final: int
+    label: str  # in percent of the maximum points
+    low: float  # lowest share in it, from 0 to 1
+    high: float  # share where the next bin begins; the last bin is open
+    raw: int  # number of scores in it as graded
+    final: int  # number of scores in it after adjustments
 
 
 @dataclass(frozen=True, slots=True)
 class Distribution:
-    """The distribution of scores.
+    """The distribution of scores."""
 
-    Attributes:
-        bins: From zero to the full score.
-        raw: Mean, median, minimum and maximum in percent, as graded; empty without scores.
-        final: The same after adjustments.
-        changed: Whether adjustments changed any score.
-        max_score: Maximum points; 0 without reports.
-    """
-
-    bins: tuple[Bin, ...]
-    raw: tuple[float, ...]
-    final: tuple[float, ...]
-    changed: bool
-    max_score: Fraction
+    bins: tuple[Bin, ...]  # from zero to the full score
+    raw: tuple[float, ...]  # mean, median, minimum and maximum in percent, as graded; empty without scores
+    final: tuple[float, ...]  # the same after adjustments
+    changed: bool  # whether adjustments changed any score
+    max_score: Fraction  # maximum points; 0 without reports
 
 
 @dataclass(frozen=True, slots=True)
 class CriterionCount:
-    """How often a criterion had each outcome.
+    """How often a criterion had each outcome."""
 
-    Attributes:
-        exercise: Id of its exercise.
-        id: Its id.
-        title: Its title.
-        outcomes: Outcome -> number of students; contains every outcome.
-    """
-
-    exercise: str
+    exercise: str  # id of its exercise
     id: str
     title: str
-    outcomes: dict[str, int]
+    outcomes: dict[str, int]  # outcome -> number of students; contains every outcome
 
     @property
     def total(self) -> int:
@@ -214,7 +150,8 @@ def distribution(students: Sequence[StudentRow]) -> Distribution:
     """Return the distribution of the scores that count and are final."""
     counted = [student for student in students if student.counts]
     most = max((s.max_score for s in counted if s.max_score), default=Fraction(0))
-    raw = [s.raw / s.max_score for s in counted if s.raw is not None and s.max_score and _is_final(s)]
+    decided = [s for s in counted if s.report is not None and s.report["final"]]
+    raw = [s.raw / s.max_score for s in decided if s.raw is not None and s.max_score]
     final = [s.final / (s.max_score or most) for s in counted if s.final is not None and (s.max_score or most)]
     in_raw, in_final = Counter(map(_part, raw)), Counter(map(_part, final))
     bins = [_bin(part, in_raw[part], in_final[part]) for part in range(_PARTS + 1)]
@@ -240,10 +177,6 @@ def exercise_counts(reports: Iterable[ReportData]) -> tuple[ExerciseCount, ...]:
         )
         for id_, head in heads.items()
     )
-
-
-def _is_final(student: StudentRow) -> bool:
-    return student.report is not None and bool(student.report["final"])
 
 
 def _part(share: Fraction) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
@@ -27,46 +26,20 @@ from grader.reporting.class_page.contents import (
     exercise_counts,
 )
 from grader.reporting.escape import script_json, shown
-from grader.reporting.html.assets import Bundle, bundle, page_environment, policy_digest, shared_assets
+from grader.reporting.html.assets import Bundle, bundle, page_environment
 
 
 @cache
-def own_script() -> str:
-    """Return the page's own script, which runs after that of the reports."""
-    return _read("assets/class.js")
-
-
-@cache
-def own_style() -> str:
-    """Return the page's own style sheet, which extends that of the reports."""
-    return _read("assets/class.css")
+def own_bundle() -> Bundle:
+    """Return what the page needs besides the bundle of reports, which it extends."""
+    folder = files(__package__) / "assets"
+    script, style = ((folder / name).read_text(encoding="utf-8") for name in ("class.js", "class.css"))
+    return Bundle("class", script, style)
 
 
 def class_assets() -> dict[str, bytes]:
     """Return file name -> content of the files that a page rendered with `assets=...` loads."""
-    return {**shared_assets(), own_name("js"): own_script().encode(), own_name("css"): own_style().encode()}
-
-
-def own_name(ending: str) -> str:
-    """Return the file name of the page's own script or style sheet; it changes with the content."""
-    text = own_script() if ending == "js" else own_style()
-    return f"class-{hashlib.sha256(text.encode()).hexdigest()[:12]}.{ending}"
-
-
-def scripts_policy(*, standalone: bool) -> str:
-    """Return the scripts that the page may run, as a Content-Security-Policy writes them."""
-    if not standalone:
-        return "'self' file:"
-    return f"'{common().script_digest}' '{policy_digest(own_script())}'"
-
-
-def common() -> Bundle:
-    """Return the assets that the page shares with reports."""
-    return bundle()
-
-
-def _read(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return {**bundle().files, **own_bundle().files}
 
 
 #: One letter for each outcome, and one for a criterion that a report lacks.
@@ -78,14 +51,7 @@ _NAME_LIMIT = 100
 def payload(
     page: ClassPage, exercises: Sequence[ExerciseCount], found: Sequence[CommonCause], spread: Distribution
 ) -> dict[str, object]:
-    """Return the data of the page.
-
-    Args:
-        page: The class.
-        exercises: Its exercises and criteria.
-        found: Its causes, in the order shown.
-        spread: Distribution of its scores.
-    """
+    """Return the data of the page."""
     criteria = [(e.id, c.id) for e in exercises for c in e.criteria]
     return {
         "criteria": [f"{exercise}/{criterion}" for exercise, criterion in criteria],
@@ -123,12 +89,9 @@ HANDED_BACK_PAGE = "feedback.html"
 
 
 def render_class(page: ClassPage, *, assets: str | None = None) -> str:
-    """Return the page of a class; it makes no network requests.
+    """Return the page of a class, all of whose text is treated as hostile; it makes no network requests.
 
-    Args:
-        page: The class; all its text is treated as hostile.
-        assets: Where the page finds the files of `class_assets`, relative to itself, e.g. `assets`; None puts them into
-            the page.
+    The files of `class_assets` are found at `assets`, relative to the page; None puts them into the page.
     """
     counted = [(k, s.report) for k, s in enumerate(page.students) if s.report is not None and s.counts]
     exercises = exercise_counts(report for _, report in counted)
@@ -142,20 +105,14 @@ def render_class(page: ClassPage, *, assets: str | None = None) -> str:
         spread=spread,
         tiles=_tiles(page, spread),
         outcomes=wording.OUTCOME_WORDS,
-        common=common(),
+        bundles=(bundle(), own_bundle()),
         assets=assets,
         data=Markup(script_json(payload(page, exercises, found, spread))),  # noqa: S704  safe in a script element
     )
 
 
 def result_link(folder: str, file: str, anchor: str = "") -> str:
-    """Return the link to a file of a student's results, percent-encoded; empty if it would leave the folder.
-
-    Args:
-        folder: Folder name below `students/`.
-        file: File name in it.
-        anchor: Id of an element in the file.
-    """
+    """Return the link to a file below `students/`, percent-encoded; empty if it would leave the results."""
     path = page_link(PageLink("", f"students/{folder}/{file}")) if "/" not in folder and folder else ""
     return f"{path}#{quote(anchor, safe='', errors='replace')}" if path and anchor else path
 
@@ -173,10 +130,6 @@ def _template() -> Template:
     templates.filters |= {"points": _points, "percent": _percent}
     templates.globals |= {
         "embedded": Markup,
-        "own_style": own_style,
-        "own_script": own_script,
-        "own_name": own_name,
-        "scripts_policy": scripts_policy,
         "exercise_name": exercise_name,
         "result_link": result_link,
         "page_link": page_link,
@@ -185,7 +138,6 @@ def _template() -> Template:
         "report_page": REPORT_PAGE,
         "report_data": REPORT_DATA,
         "handed_back_page": HANDED_BACK_PAGE,
-        "cause_anchor": _cause_anchor,
     }
     return templates.get_template("class.html")
 
@@ -203,10 +155,6 @@ def _tiles(page: ClassPage, spread: Distribution) -> list[tuple[str, str]]:
     scores = [("mean", _percent(found[0])), ("median", _percent(found[1]))] if found else []
     full = [("full score", str(spread.bins[-1].final))] if found else []
     return [*scores, *full, *((status, str(count)) for status, count in standing.most_common())]
-
-
-def _cause_anchor(cause: CommonCause) -> str:
-    return f"{cause.exercise}-{cause.criterion}"
 
 
 def _points(value: Fraction | None) -> str:

@@ -35,39 +35,39 @@ _OWN = ("assets/charts.js", "assets/graphs.js", "assets/page.js")
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Everything a page needs besides its content."""
+    """Everything a page needs besides its content; pages that share it find it in two files."""
 
+    name: str  # begins the names of the files, which change with the content
     script: str
     style: str
 
     @property
     def script_digest(self) -> str:
         """Digest of the script, as a Content-Security-Policy writes it."""
-        return policy_digest(self.script)
+        return f"sha256-{base64.b64encode(hashlib.sha256(self.script.encode()).digest()).decode()}"
 
     @property
     def script_name(self) -> str:
-        """File name of the script when reports share it; it changes with the content."""
-        return f"report-{_short(self.script)}.js"
+        """File name of the script."""
+        return f"{self.name}-{_short(self.script)}.js"
 
     @property
     def style_name(self) -> str:
-        """File name of the style sheet when reports share it; it changes with the content."""
-        return f"report-{_short(self.style)}.css"
+        """File name of the style sheet."""
+        return f"{self.name}-{_short(self.style)}.css"
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """File name -> content."""
+        return {self.script_name: self.script.encode(), self.style_name: self.style.encode()}
 
 
 @cache
 def bundle() -> Bundle:
-    """Return the bundle of this version of the grader."""
+    """Return the bundle of reports of this version of the grader."""
     licences = "".join(f"/*\n{_read(name).strip()}\n*/\n" for name in _LICENCES)
     scripts = "".join(f"{_read(name).strip()}\n" for name in (*_LIBRARIES, *_OWN))
-    return Bundle(f"{licences}{scripts}", _read("assets/report.css"))
-
-
-def shared_assets() -> dict[str, bytes]:
-    """Return file name -> content of the files that reports rendered with `assets=...` load."""
-    made = bundle()
-    return {made.script_name: made.script.encode(), made.style_name: made.style.encode()}
+    return Bundle("report", f"{licences}{scripts}", _read("assets/report.css"))
 
 
 def _read(name: str) -> str:
@@ -76,11 +76,6 @@ def _read(name: str) -> str:
     except FileNotFoundError:
         text = f"grader/reporting/html/{name}: expected what installing the grader fetches, found no file"
         raise EnvironmentFault(text, "python3 -m pip install . in the checkout of the grader") from None
-
-
-def policy_digest(text: str) -> str:
-    """Return the digest of an inline script or style sheet, as a Content-Security-Policy writes it."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
 def _short(text: str) -> str:

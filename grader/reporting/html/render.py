@@ -10,7 +10,7 @@ from functools import cache
 from jinja2 import Environment
 from markupsafe import Markup
 
-from grader.core.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Series, Stage
+from grader.core.chart import Excerpt, Figure, GraphFigure, Panel, Series, Stage
 from grader.core.exercise import Location, Outcome, exercise_name
 from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, ReportedFault, Verdict
@@ -27,18 +27,17 @@ _MOST_BOXES = 60
 
 def figure_values(figure: Figure) -> JsonObject:
     """Return a figure as JSON values; numbers that JSON cannot represent become None."""
-    return _graph(figure) if isinstance(figure, GraphFigure) else _chart(figure)
-
-
-def _chart(chart: Chart) -> JsonObject:
+    if isinstance(figure, GraphFigure):
+        return {"kind": "graph", "title": shown(figure.title), "stages": [_stage(stage) for stage in figure.stages]}
     return {
         "kind": "chart",
-        "title": shown(chart.title),
-        "x": {"title": chart.x_title, "unit": chart.x_unit},
-        "square": chart.square,
-        "panels": [_panel(panel) for panel in chart.panels],
+        "title": shown(figure.title),
+        "x": {"title": figure.x_title, "unit": figure.x_unit},
+        "square": figure.square,
+        "panels": [_panel(panel) for panel in figure.panels],
         "moments": [
-            {"x": _number(m.x), "label": shown(m.label, limit=_NAME_LIMIT), "tone": m.tone.value} for m in chart.moments
+            {"x": _number(m.x), "label": shown(m.label, limit=_NAME_LIMIT), "tone": m.tone.value}
+            for m in figure.moments
         ],
     }
 
@@ -65,14 +64,6 @@ def _series(series: Series) -> JsonObject:
         "tone": series.tone.value,
         "points": [[_number(x), _number(y)] for x, y in series.points],
         "texts": [shown(text, limit=_TEXT_LIMIT) for text in series.texts],
-    }
-
-
-def _graph(figure: GraphFigure) -> JsonObject:
-    return {
-        "kind": "graph",
-        "title": shown(figure.title),
-        "stages": [_stage(stage) for stage in figure.stages],
     }
 
 
@@ -115,16 +106,13 @@ def _number(value: float) -> float | int | None:
 
 
 _CIRCUMFERENCE = 100
-_LINE_LIMIT = 160
 
 
 def render_html(report: Report, *, assets: str | None = None) -> str:
-    """Return a report as an HTML page that makes no network requests.
+    """Return a report, all of whose text is treated as hostile, as an HTML page that makes no network requests.
 
-    Args:
-        report: The report; all its text is treated as hostile.
-        assets: Where the page finds the files of `shared_assets`, relative to itself, e.g. `../assets`. None puts them
-            into the page, which then stands alone.
+    The page finds the files of `bundle` at `assets`, relative to itself, e.g. `../assets`. None puts them into
+    the page, which then stands alone.
     """
     page = _templates().get_template("report.html")
     figures = {figure.id: figure_values(figure) for e in report.exercises for figure in e.figures}
@@ -145,20 +133,14 @@ def _templates() -> Environment:
     templates.filters["exercise_name"] = exercise_name
     templates.globals |= {
         "wording": wording,
-        "outcome_word": _outcome_word,
         "open_at_first": _open_at_first,
         "percent": _percent,
         "excerpt_at": _excerpt_at,
         "excerpts_left": _excerpts_left,
         "figures_for": _figures_for,
-        "code_line": _code_line,
         "segments": _segments,
     }
     return templates
-
-
-def _outcome_word(outcome: Outcome) -> str:
-    return wording.OUTCOME_WORDS[outcome]
 
 
 def _open_at_first(verdict: Verdict) -> bool:
@@ -186,10 +168,6 @@ def _excerpts_left(exercise: ExerciseReport, fault: ReportedFault) -> list[Excer
 
 def _figures_for(exercise: ExerciseReport, criterion: str) -> list[Figure]:
     return [figure for figure in exercise.figures if criterion in figure.criteria]
-
-
-def _code_line(line: str) -> str:
-    return shown(line, limit=_LINE_LIMIT)
 
 
 def _segments(verdicts: Iterable[Verdict]) -> list[tuple[float, float, str]]:

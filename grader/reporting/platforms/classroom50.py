@@ -1,9 +1,17 @@
-"""The report as Classroom 50's result.json: whole points, with the exact ones beside them."""
+"""The report as Classroom 50's result.json: whole points, with the exact ones beside them.
+
+What a result needs beside the report, the metadata of the submission, is read from the environment.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from pathlib import Path
 
+from grader.core.errors import GraderError
 from grader.core.exercise import Outcome
 from grader.core.json_values import JsonObject
 from grader.core.report import ExerciseReport, Report, Verdict
@@ -13,35 +21,80 @@ from grader.reporting.json_report import json_text
 from grader.reporting.wording import whole_points
 
 SCHEMA = "classroom50/result/v1"
+#: Environment variables that Classroom 50 sets for its autograders, by the field that each one fills.
+VARIABLES = {
+    "classroom": "CLASSROOM",
+    "assignment": "ASSIGNMENT",
+    "assignment_type": "ASSIGNMENT_TYPE",
+    "owner": "OWNER",
+    "username": "USERNAME",
+    "submission": "SUBMISSION_TAG",
+    "commit": "COMMIT_URL",
+    "release": "RELEASE_URL",
+    "review": "REVIEW_URL",
+}
+#: When the submission was committed, in any form of ISO 8601 with an offset.
+COMMIT_DATETIME = "COMMIT_DATETIME"
+_EVENT = "GITHUB_EVENT_PATH"
+_EVENT_BYTES = 32 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class HandedIn:
-    """Metadata of a submission that only the classroom knows; all fields are required.
-
-    Attributes:
-        classroom: Its name.
-        assignment: Its name.
-        assignment_type: `individual` or `group`.
-        owner: Owner of the repository.
-        username: Who submitted it.
-        submission: Tag that starts with `submit/`.
-        commit: URL of the commit.
-        release: URL of the release.
-        review: URL of the review.
-        datetime: Commit time in UTC, as `2026-01-31T23:59:59Z`.
-    """
+    """Metadata of a submission that only the classroom knows; all fields are required."""
 
     classroom: str
     assignment: str
-    assignment_type: str
-    owner: str
-    username: str
-    submission: str
+    assignment_type: str  # `individual` or `group`
+    owner: str  # owner of the repository
+    username: str  # who submitted it
+    submission: str  # tag that starts with `submit/`
     commit: str
     release: str
     review: str
-    datetime: str
+    datetime: str  # commit time in UTC, as `2026-01-31T23:59:59Z`
+
+
+def handed_in(environment: Mapping[str, str]) -> HandedIn:
+    """Return the metadata of the submission from Classroom 50; raises GraderError if a value is missing."""
+    missing = [name for name in VARIABLES.values() if not environment.get(name)]
+    if missing:
+        text = (
+            f"classroom50: expected {', '.join(VARIABLES.values())} in the environment, found no {', '.join(missing)}"
+        )
+        raise GraderError(text, "a Classroom 50 autograder has them; elsewhere use another format")
+    if not environment["SUBMISSION_TAG"].startswith("submit/"):
+        raise GraderError("classroom50: SUBMISSION_TAG: expected submit/..., found another tag")
+    if environment["ASSIGNMENT_TYPE"] not in ("individual", "group"):
+        raise GraderError("classroom50: ASSIGNMENT_TYPE: expected individual or group, found something else")
+    values = {field: environment[name] for field, name in VARIABLES.items()}
+    return HandedIn(**values, datetime=_committed_at(environment))
+
+
+def _committed_at(environment: Mapping[str, str]) -> str:
+    text = environment.get(COMMIT_DATETIME) or _from_event(environment.get(_EVENT, ""))
+    try:
+        when = datetime.fromisoformat(text.replace("Z", "+00:00"))
+    except ValueError:
+        when = datetime.min  # noqa: DTZ901  it has no offset, like a time that cannot be used
+    if when.tzinfo is None:
+        raise GraderError(
+            f"classroom50: {COMMIT_DATETIME}: expected the commit's time with its offset, found none",
+            f'export {COMMIT_DATETIME}="$(git show -s --format=%cI)"',
+        )
+    return when.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _from_event(path: str) -> str:
+    """Return the commit time from a push event, as GitHub wrote it; empty if it has none."""
+    if not path:
+        return ""
+    try:
+        with Path(path).open("rb") as file:
+            event = json.loads(file.read(_EVENT_BYTES))
+        return str(event["head_commit"]["timestamp"])
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return ""
 
 
 def render_classroom50(report: Report, handed_in: HandedIn) -> str:
@@ -49,27 +102,21 @@ def render_classroom50(report: Report, handed_in: HandedIn) -> str:
 
     The last row has no points: it states whether the result is final, and how to reproduce it.
     """
+    metadata = asdict(handed_in)
+    username = metadata.pop("username")
     rows = [(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts]
     rounded = whole_points([v.score for _, v in rows], [v.max_score for _, v in rows])
     return json_text(
         {
             "schema": SCHEMA,
-            "classroom": handed_in.classroom,
-            "assignment": handed_in.assignment,
-            "assignment_type": handed_in.assignment_type,
-            "owner": handed_in.owner,
-            "submission": handed_in.submission,
-            "commit": handed_in.commit,
-            "release": handed_in.release,
-            "review": handed_in.review,
-            "datetime": handed_in.datetime,
+            **metadata,
             "score": sum(score for score, _ in rounded),
             "max-score": sum(top for _, top in rounded),
             "tests": [
                 *(_row(e, v, *whole) for (e, v), whole in zip(rows, rounded, strict=True)),
                 _about(report),
             ],
-            "submitted_by": {"username": handed_in.username},
+            "submitted_by": {"username": username},
         }
     )
 

@@ -30,10 +30,8 @@ def render_github(report: Report, *, folder: str | None) -> str:
     criteria are left out, because their cause is among the others. Lines without a command repeat the end of the report
     in the log.
 
-    Args:
-        report: The report.
-        folder: The submission's folder in the repository, POSIX form, empty for the root. None if it is elsewhere: then
-            no annotation names a file.
+    The folder is that of the submission in the repository, POSIX form, empty for the root. None if it is elsewhere:
+    then no annotation names a file.
     """
     annotations = [_notice(report), *_warnings(report)]
     annotations += [_annotation(e, v) for e in report.exercises for v in e.verdicts if v.outcome in _KINDS]
@@ -46,8 +44,8 @@ def render_github(report: Report, *, folder: str | None) -> str:
 
 
 def _notice(report: Report) -> _Annotation:
-    notes = [line for line in wording.opening(report) if line.startswith("note: ")]
-    message = "\n".join([wording.headline(report), wording.summary(report), *notes, *wording.ending(report)])
+    lines = [wording.headline(report), wording.summary(report), *wording.notes(report), *wording.ending(report)]
+    message = "\n".join(lines)
     return _Annotation("notice", f"Score: {wording.score_line(report)}", message)
 
 

@@ -17,14 +17,11 @@ _FOR_STAFF = "What was found is in the standard output, which only staff see."
 
 
 def render_gradescope(report: Report, *, day: str | None = None) -> str:
-    """Return the results.json of a report; its texts are plain, so the platform finds no markup in them.
+    """Return the results.json of a whole report; its texts are plain, so the platform finds no markup in them.
 
     Undecided criteria earn nothing yet, and the output starts with that. The score counts every criterion, including
-    those whose tests the platform hides.
-
-    Args:
-        report: The whole report.
-        day: The day on which dates in the rubric are compared; None shows everything to everybody.
+    those whose tests the platform hides. Dates in the rubric are compared with the day; None shows everything to
+    everybody.
     """
     seen = report if day is None else for_student(report, day)
     return json_text(
