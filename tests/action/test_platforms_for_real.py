@@ -177,6 +177,7 @@ def run_classroom50(checkout: Path, folder: Path, **more: str) -> subprocess.Com
 
 
 @pytest.mark.ros
+@pytest.mark.nightly
 def test_the_action_sets_itself_up_from_nothing(checkout: Path, tmp_path: Path) -> None:
     """With the system's Python, the pinned versions, and a submission that passes."""
     solve(checkout)

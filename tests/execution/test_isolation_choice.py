@@ -443,7 +443,9 @@ def graded(start: tuple[str, ...], tmp_path: Path, *options: str) -> subprocess.
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", ISOLATING)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n == "landlock" else pytest.mark.nightly) for n in ISOLATING]
+)
 def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_path: Path, name: str) -> None:
     """In virtual time, with the same verdicts; the report names the tier and what it contains."""
     found = walls(name, ros, tmp_path)
@@ -457,7 +459,7 @@ def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_p
     assert [found["name"] for found in whole["environment"]["containment"]] == list(PROPERTIES)
 
 
-@pytest.fixture(params=[None, USER], ids=["root", "user"])
+@pytest.fixture(params=[pytest.param(None, marks=pytest.mark.nightly), USER], ids=["root", "user"])
 def container(request: pytest.FixtureRequest, ros: RosInstallation) -> Callable[..., tuple[str, ...]]:
     """Return what starts a program in the stand-in for a container, by the options of its network."""
     if os.geteuid() != 0 or shutil.which("unshare") is None:

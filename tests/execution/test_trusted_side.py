@@ -369,7 +369,7 @@ ledger.Ledger.claims = lambda it: [
 """
 
 
-@pytest.mark.parametrize("kind", ["publisher", "client"])
+@pytest.mark.parametrize("kind", ["publisher", pytest.param("client", marks=pytest.mark.nightly)])
 def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Callable[..., Trace], kind: str) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
     ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.ledger.changed = True")
