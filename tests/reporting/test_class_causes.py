@@ -94,8 +94,8 @@ def test_problems_tell_causes_apart() -> None:
         "other name",
         "too few",
         "silent",
-        "exception ValueError",
-        "exception KeyError",
+        "exception: ValueError",
+        "exception: KeyError",
         "exited",
         "absent",
     ]
@@ -116,7 +116,7 @@ def test_a_problem_of_another_topic_is_another_one() -> None:
         {"kind": "wrong_value", "topics": [], "detail": "swapped"},
     ]
     labels = [kind_of(criterion(problem=problem)).label for problem in problems]
-    assert labels == ["stopped /a_b", "stopped /c", "wrong value swapped"]
+    assert labels == ["stopped: /a_b", "stopped: /c", "wrong value: swapped"]
 
 
 def test_what_the_diagnosis_named_goes_before_everything() -> None:

@@ -30,7 +30,8 @@ class CauseKind:
     def label(self) -> str:
         """A short description of the kind."""
         fixed = {"missing": "file missing", "criterion": "as measured"}
-        return fixed.get(self.source) or " ".join((self.key.replace("_", " "), *self.parts))
+        named = self.key.replace("_", " ")
+        return fixed.get(self.source) or (f"{named}: {', '.join(self.parts)}" if self.parts else named)
 
 
 def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
