@@ -220,7 +220,11 @@ class Discovery:
         found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        return exchanging <= offered and all(found[key] >= count for key, count in wanted.items())
+        # The middleware tells the services of one node of a name, and a process that left may stay for its lease.
+        namesakes = any(
+            kind == "node" and found[kind, name, rest] > count for (kind, name, rest), count in wanted.items()
+        )
+        return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:
         """Count the removed endpoints that are still in the graph, except known strangers."""

@@ -455,6 +455,21 @@ def test_notes_are_few_and_short() -> None:
     assert all(len(note) < 500 for note in notes)
 
 
+def test_a_node_is_found_beside_a_namesake_that_has_not_left_the_graph(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The middleware knows the services of only one node of a name; a process that left may stay for its lease."""
+    monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.05))
+
+    def asker(me: ScriptedStudent, world: World) -> Program:
+        world.claims["gone.py"] = [claim("node", "/asker")] if namesake else []
+        yield idle(
+            500, endpoints=world.have(me.name, claim("node", "/asker"), claim("client", "/ask", "std_srvs/srv/Trigger"))
+        )
+        yield idle()
+
+    for namesake in (False, True):
+        assert any("was not seen in the graph" in note for note in Run(asker).trace.notes) is not namesake
+
+
 @pytest.mark.parametrize("comes", [True, False])
 def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes: bool) -> None:
     """A counterpart that was discovered late still belongs to the instant; one that never comes holds up nothing."""
