@@ -220,10 +220,9 @@ class Discovery:
         found = self._found(graph)
         offered = {(e.kind, e.service, e.type) for e in graph.services}
         exchanging = {(c["kind"], c["name"], c["type"]) for c in claims if c["kind"] in ("service", "client")}
-        # The middleware tells the services of one node of a name, and a process that left may stay for its lease.
-        namesakes = any(
-            kind == "node" and found[kind, name, rest] > count for (kind, name, rest), count in wanted.items()
-        )
+        # The middleware tells the services of one node of a name. A node lives on until it is collected, and a process
+        # that left may stay in the graph for its lease.
+        namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())
         return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, now_ns: int, claims: list[dict[str, Any]]) -> Counter[Key]:

@@ -455,15 +455,16 @@ def test_notes_are_few_and_short() -> None:
     assert all(len(note) < 500 for note in notes)
 
 
-def test_a_node_is_found_beside_a_namesake_that_has_not_left_the_graph(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The middleware knows the services of only one node of a name; a process that left may stay for its lease."""
+@pytest.mark.parametrize("whose", ["gone.py", "a.py"])
+def test_a_node_is_found_beside_a_namesake(monkeypatch: pytest.MonkeyPatch, whose: str) -> None:
+    """The middleware tells the services of one of them; a process that left may stay, and a node until it is freed."""
     monkeypatch.setattr(discovery, "Patience", lambda *_: machine.Patience(0.05))
 
     def asker(me: ScriptedStudent, world: World) -> Program:
-        world.claims["gone.py"] = [claim("node", "/asker")] if namesake else []
-        yield idle(
-            500, endpoints=world.have(me.name, claim("node", "/asker"), claim("client", "/ask", "std_srvs/srv/Trigger"))
-        )
+        others = [claim("node", "/asker")] if namesake else []
+        mine = [claim("node", "/asker"), claim("client", "/ask", "std_srvs/srv/Trigger")]
+        world.have("gone.py", *(others if whose == "gone.py" else []))
+        yield idle(500, endpoints=world.have(me.name, *mine, *(others if whose == me.name else [])))
         yield idle()
 
     for namesake in (False, True):
