@@ -121,6 +121,7 @@ class Discovery:
         streams: The topics that stimuli publish on now, with their types.
         fixed: The streams whose type a rubric has fixed.
         published: How many messages each stimulus has published.
+        kept: How many messages each process has published on a topic of a latched publisher of its own.
         patience: The timeout for anything that was announced.
     """
 
@@ -139,12 +140,13 @@ class Discovery:
         self._mark_dead = mark_dead
         self.patience = Patience()
         self._departures = Patience(DEPARTURE_S)
-        self._served: set[tuple[str, str]] = set()
+        self._served: set[tuple[str, str, str]] = set()
         self._known: set[Key] = set()
         self._strangers: Counter[Key] = Counter()
         self.streams: dict[str, str] = {}
         self.fixed: dict[str, PlannedMessages] = {}
         self.published: Counter[str] = Counter()
+        self.kept: Counter[tuple[str, str]] = Counter()
 
     def match(self, now_ns: int) -> None:
         """Wait until the graph shows exactly the endpoints that exist, and all of them are matched."""
@@ -164,12 +166,22 @@ class Discovery:
 
     def _announce_kept(self) -> None:
         """Announce the messages that latched publishers resend to new transient-local subscriptions."""
-        for topic, stream in self.fixed.items():
-            for student in self._students:
-                asks = any(c["latched"] and compatible(offered(stream), c) for c in readers_of(student, topic))
-                if asks and self.published[topic] and (student.name, topic) not in self._served:
-                    self._served.add((student.name, topic))
-                    announce(student.arrivals, f"topic {topic}", self.published[topic])
+        writers = [("", offered(stream), self.published[topic]) for topic, stream in self.fixed.items()]
+        for talker in self._students:
+            latched = [c for c in talker.claims if c["kind"] == "publisher" and c["latched"]]
+            # how many a student's publisher keeps is not known, but that one comes is certain
+            writers += [(talker.name, c, min(1, self.kept[talker.name, c["name"]])) for c in latched]
+        served = {
+            (student.name, writer["name"], sender): count
+            for sender, writer, count in writers
+            for student in self._students
+            if any(c["latched"] and compatible(writer, c) for c in readers_of(student, writer["name"]))
+        }
+        arrivals = {student.name: student.arrivals for student in self._students}
+        for (reader, topic, sender), count in served.items():
+            if count and (reader, topic, sender) not in self._served:
+                announce(arrivals[reader], f"topic {topic}", count)
+        self._served = set(served)
 
     def is_heard(self, topic: str) -> bool:
         """Return whether the publisher of a stimulus is matched with every compatible subscription."""

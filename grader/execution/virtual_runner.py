@@ -263,6 +263,7 @@ class VirtualRunner(Runner):
             kind, _, name = channel.partition(" ")
             if kind == "topic":
                 writers = [c for c in sender.claims if c["kind"] == "publisher" and c["name"] == name]
+                self._discovery.kept[sender.name, name] += count if any(w["latched"] for w in writers) else 0
                 for student in self._students:
                     if any(compatible(w, r) for w in writers for r in readers_of(student, name)):
                         announce(student.arrivals, channel, count)

@@ -455,6 +455,29 @@ def test_notes_are_few_and_short() -> None:
     assert all(len(note) < 500 for note in notes)
 
 
+def test_what_a_latched_publisher_of_another_process_keeps_is_announced_once() -> None:
+    """A subscription that comes later gets it at that instant, and not again when other endpoints change."""
+
+    def talker(me: ScriptedStudent, world: World) -> Program:
+        latched = world.have(me.name, claim("publisher", "/x", latched=True))
+        yield idle(0, endpoints=latched)
+        world.publish("/x", 7)
+        yield from wait(600, sent={"topic /x": 1})
+        yield idle(endpoints=[*latched, claim("publisher", "/y")])
+
+    def listener(me: ScriptedStudent, world: World) -> Program:
+        yield idle(300)
+        yield from wait(500, endpoints=world.have(me.name, claim("subscription", "/x", latched=True)))
+        yield idle()
+
+    heard = [
+        ((a["now_ns"] - EPOCH_NS) // MS, a["arrivals"])
+        for a in Run(talker, listener).students[1].heard
+        if a.get("arrivals")
+    ]
+    assert heard == [(300, {"topic /x": 1})]
+
+
 @pytest.mark.parametrize("whose", ["gone.py", "a.py"])
 def test_a_node_is_found_beside_a_namesake(monkeypatch: pytest.MonkeyPatch, whose: str) -> None:
     """The middleware tells the services of one of them; a process that left may stay, and a node until it is freed."""
