@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sandboxes import HOST, Sandbox, close, finish, make_submission, start, walls
+from sandboxes import DOMAIN, HOST, Sandbox, close, finish, make_submission, start, walls
 
 import grader
 from grader.core.errors import EnvironmentFault, HarnessError
@@ -247,7 +247,7 @@ def test_the_environment_of_a_student_is_exact(sandbox: Sandbox) -> None:
         "PYTHONUTF8": "1",
         "PYTHONDONTWRITEBYTECODE": "1",
         "ROS_PYTHON_CHECK_FIELDS": "1",
-        "ROS_DOMAIN_ID": "71",
+        "ROS_DOMAIN_ID": DOMAIN,
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
         "SKIP_DEFAULT_XML_FILE": "1",
@@ -769,6 +769,6 @@ def test_nodes_on_both_sides_of_the_walls_talk(any_tier: Sandbox) -> None:
     logs = str(any_tier.submission / "logs")
     Path(logs).mkdir()
     Path(logs).chmod(0o777)
-    done = finish(any_tier.worker(argv, pass_fds=student.pass_fds, ROS_DOMAIN_ID="71", ROS_LOG_DIR=logs))
+    done = finish(any_tier.worker(argv, pass_fds=student.pass_fds, ROS_DOMAIN_ID=DOMAIN, ROS_LOG_DIR=logs))
     close(student)
     assert said(done) == [f"message {number}" for number in range(20)]
