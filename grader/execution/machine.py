@@ -16,9 +16,9 @@ from pathlib import Path
 import grader
 from grader.core.checkup import Fact
 from grader.core.quantities import GIB, MIB
-from grader.execution.observer import wait_until
 from grader.execution.ros_installation import RosInstallation
 from grader.execution.sandbox.properties import confined, install_command, setting_command
+from grader.student_host.originals import wait_until
 
 #: How long to wait for an endpoint or a message that was announced.
 SETTLE_S = 5.0

@@ -30,6 +30,7 @@ from grader.execution.console import TEXT_CHARACTERS, Logged
 from grader.execution.interfaces import message_class, plain_fields
 from grader.execution.padding import without_padding
 from grader.execution.service_ends import BACKGROUND_TYPES, ServiceEnds
+from grader.student_host.originals import wait_until
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -43,8 +44,6 @@ MOST_TOPICS, NAME_CHARACTERS = 20, 200
 INFINITE_NS = 9_000_000_000_000_000_000
 #: How long, in real time, to wait for messages of a process that died, and how many polls in a row must find nothing.
 REST_S, QUIET_LOOKS, QUIET_PAUSE_S = 0.5, 4, 0.005
-#: The most real time that one iteration of a wait counts for; on an idle machine each is shorter.
-ITERATION_S = 0.02
 #: rclpy's name for a node whose endpoints are known, but whose name is not known yet or no longer.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: The most participants of the grader, and how long to wait for the name of a new one.
@@ -357,23 +356,6 @@ def other_threads_run() -> bool:
 def size_of(message: Any) -> int:
     """Return the serialized size of a message in bytes."""
     return len(serialize_message(message))
-
-
-def wait_until(condition: Callable[[], bool], seconds: float, *, pause_s: float = 0.0003) -> bool:
-    """Wait, in real time, until a condition holds; return whether it did before the time-out.
-
-    An iteration counts for at most `ITERATION_S`: if it took longer, this process had no processor, and the one that
-    it waits for may have had none either.
-    """
-    left_s, before = seconds, time.monotonic()
-    while not condition():
-        if left_s < 0:
-            return False
-        time.sleep(pause_s)
-        now = time.monotonic()
-        left_s -= min(now - before, ITERATION_S)
-        before = now
-    return True
 
 
 def _finite_ns(duration: Any) -> int:

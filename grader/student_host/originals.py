@@ -1,4 +1,4 @@
-"""The real clock and thread functions, saved before anything is replaced, and waits on them, for the host's own use."""
+"""The real clock and thread functions, saved before anything is replaced, and waits on them, for host and worker."""
 
 import _thread
 import os
