@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing import Any
 
 from grader.core.exercise import Outcome
-from grader.reporting.class_page.contents import LOST, ReportData
+from grader.reporting.class_page.contents import LOST
+from grader.reporting.json_report import ReportData
 
 
 @dataclass(frozen=True, order=True, slots=True)

@@ -10,10 +10,7 @@ from enum import Enum
 from fractions import Fraction
 
 from grader.core.exercise import Outcome
-from grader.reporting import json_report
-
-#: A report as JSON values, version 1.
-ReportData = json_report.ReportData
+from grader.reporting.json_report import ReportData
 
 LOST = (Outcome.NOT_MET.value, Outcome.PARTLY.value)
 

@@ -20,13 +20,13 @@ from grader.reporting.class_page.contents import (
     Distribution,
     ExerciseCount,
     PageLink,
-    ReportData,
     StudentRow,
     distribution,
     exercise_counts,
 )
 from grader.reporting.escape import script_json, shown
 from grader.reporting.html.assets import Bundle, bundle, page_environment
+from grader.reporting.json_report import ReportData
 
 
 @cache
