@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from grader.core.limits import Limits
 from grader.core.quantities import MIB, size
-from grader.core.trace import Trace
+from grader.core.trace import ClockKind, Trace
 from grader.execution.student_process import NodeProcess
 from grader.execution.usage import Usage, families, scratch_names, starved_ns, usage
 
@@ -67,7 +67,7 @@ class ResourceMonitor:
         self._over = threading.Event()
         self._starved = False
         self._ending = False
-        self._used_ns = self._waited_ns = 0
+        self._used_ns = self._waited_ns = self._longest_wait_ns = 0
         self._thread = threading.Thread(target=self._watch, name="guard", daemon=True)
 
     def __enter__(self) -> ResourceMonitor:
@@ -79,7 +79,10 @@ class ResourceMonitor:
         self._thread.join()
 
     def reviewed(self, trace: Trace) -> Trace:
-        """Return a trace, with a harness problem added if its time ran out because the machine was too busy."""
+        """Add what the machine did to a trace: the longest wait, and a harness problem if that used up the time."""
+        if trace.clock is ClockKind.WALL and self.starved_ns:
+            self._look_for_waiting()
+            trace = replace(trace, starved_ns=self._longest_wait_ns)
         if not self._starved or trace.harness_problem:
             return trace
         problem = "the machine was too busy: the nodes waited for a processor until their time was over"
@@ -137,7 +140,9 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, usage(pids).processor_ns)
-        self._waited_ns = max(self._waited_ns, starved_ns(pids))
+        waits_ns = starved_ns(pids)
+        self._waited_ns = max(self._waited_ns, sum(waits_ns))
+        self._longest_wait_ns = max(self._longest_wait_ns, *waits_ns, 0)
 
     def _look_for_names(self) -> None:
         for student in self._students:

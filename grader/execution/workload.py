@@ -158,7 +158,7 @@ class Workload:
 
     def _starved(self) -> int:
         """Return how long the process's threads and this thread were ready to run but waited for a processor."""
-        return starved_ns([self._pid]) + thread_starved_ns(os.getpid(), threading.get_native_id())
+        return sum(starved_ns([self._pid])) + thread_starved_ns(os.getpid(), threading.get_native_id())
 
 
 def _processor_clock(pid: int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -15,7 +15,12 @@ from grader.core.trace import Fault, FaultKind, Request, Response, Trace
 from grader.judging.checks import CHECKS
 from grader.judging.findings import faulted, first_fault
 from grader.judging.values import student_endpoints
-from grader.judging.wording import quote
+from grader.judging.wording import quote, span
+
+#: On the wall clock, a program that pauses after its work loses the time that it waits for a processor. If it waited
+#: for more than this share of the time, what is not met is judged again at so many higher speeds, up to that of a
+#: program that did not wait. Longer waits count as the longest.
+_ORDINARY_WAIT, _LONGEST_WAIT, _SPEEDS = 0.03, 0.5, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +66,26 @@ def run_check(
     if trace.harness_problem:
         return Answer(problem=trace.harness_problem)
     answer = _judged(criterion, scenario, trace, sources)
+    if answer.finding is not None and answer.finding.credit < 1:
+        faster = (_judged(criterion, scenario, one, sources).finding for one in _without_waiting(trace))
+        if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
+            waited = f"{span(trace.starved_ns)} of {span(trace.stop_ns)}"
+            return Answer(
+                problem=f"the machine was too busy: the nodes waited {waited} for a processor, which can be why"
+            )
     if answer.finding is None or not isinstance(criterion.check, SourceCheck):
         return answer
     return replace(answer, finding=_placed(answer.finding, submission))
+
+
+def _without_waiting(trace: Trace) -> Iterator[Trace]:
+    """Yield what an idle machine may have recorded: the trace at a higher speed, in steps up to no waiting at all."""
+    if trace.starved_ns <= _ORDINARY_WAIT * trace.stop_ns:
+        return
+    for step in range(1, _SPEEDS + 1):
+        left = 1 - min(trace.starved_ns / trace.stop_ns, _LONGEST_WAIT) * step / _SPEEDS
+        observations = tuple(replace(one, t_ns=round(one.t_ns * left)) for one in trace.observations)
+        yield replace(trace, stop_ns=round(trace.stop_ns * left), observations=observations)
 
 
 def _placed(finding: Finding, submission: Submission) -> Finding:

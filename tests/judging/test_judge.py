@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -169,6 +169,23 @@ def test_a_failed_recording_leaves_everything_undecided() -> None:
     report = judge_exercise(exercise(criterion("a", Says())), {}, handed_in(FILE))
     assert outcomes(report) == {"a": "undecided"}
     assert "alone was not recorded" in report.verdicts[0].reason
+
+
+@pytest.mark.parametrize(
+    ("rate", "starved_s", "outcome"),
+    [(18.8, 0, "not_met"), (18.8, 0.2, "not_met"), (18.8, 1.2, "undecided"), (10, 1.2, "not_met"), (20, 1.2, "met")],
+    ids=["idle machine", "ordinary wait", "slowed by the machine", "too slow anyway", "right anyway"],
+)
+def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, starved_s: float, outcome: str) -> None:
+    """A loop that pauses after its work is slower by the time that it waits for a processor."""
+    trace = replace(velocity(rate, 10.0).trace(starved_ns=round(starved_s * SECOND)), clock=ClockKind.WALL)
+    asked = criterion("rate", CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0))
+    given = judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))
+    assert outcomes(given) == {"rate": outcome}
+    if outcome == "undecided":
+        assert given.verdicts[0].reason == (
+            "the machine was too busy: the nodes waited 1.2 s of 10.0 s for a processor, which can be why"
+        )
 
 
 def test_what_cannot_be_asked_waits_for_the_criterion_that_it_needs() -> None:
