@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 #: The markers of tests that `-m fast` leaves out.
-NOT_FAST = ("ros", "browser", "sandbox", "slow", "nightly")
+NOT_FAST = ("ros", "browser", "sandbox", "slow", "long", "nightly")
 
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=30)
 settings.register_profile("nightly", settings.get_profile("default"), max_examples=200)
@@ -40,8 +40,9 @@ def strict_log(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option of the nightly run."""
-    parser.addoption("--everything", action="store_true", help="run the tests that are left to the nightly run as well")
+    """Add the options for the tests that the default run leaves out."""
+    parser.addoption("--long", action="store_true", help="run the tests marked long as well")
+    parser.addoption("--everything", action="store_true", help="run the tests marked long or nightly as well")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -51,7 +52,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the fast tests, leave out the nightly ones unless everything is asked for, and put those with nodes first.
+    """Mark the fast tests, leave out the long and nightly ones unless asked for, and put those with nodes first.
 
     Real nodes wait more than they compute: beside each other they leave the processor to each other. The tests that
     compute come last and fill what is left.
@@ -59,8 +60,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if not any(item.get_closest_marker(kind) for kind in NOT_FAST):
             item.add_marker("fast")
-    nightly = [item for item in items if item.get_closest_marker("nightly")]
-    if nightly and not config.getoption("--everything"):
-        config.hook.pytest_deselected(items=nightly)
-        items[:] = [item for item in items if not item.get_closest_marker("nightly")]
+    everything, long = config.getoption("--everything"), config.getoption("--long")
+    left_out = {name for name, asked in (("nightly", everything), ("long", everything or long)) if not asked}
+    chosen: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    for item in items:
+        chosen[not any(item.get_closest_marker(name) for name in left_out)].append(item)
+    config.hook.pytest_deselected(items=chosen[False])
+    items[:] = chosen[True]
     items.sort(key=lambda item: item.get_closest_marker("ros") is None)

@@ -205,6 +205,7 @@ def test_defining_classes_is_no_reason_for_a_check(tmp_path: Path) -> None:
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_a_checked_process_holds_nothing_of_the_grader(tmp_path: Path) -> None:
     """Neither a module, a path, a variable, an argument nor a descriptor; nothing is replaced, and chance is real."""
     (exercise,) = graded(tmp_path, HERE / "looks_around.py").exercises

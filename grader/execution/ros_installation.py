@@ -43,6 +43,8 @@ MIDDLEWARE = "librmw_fastrtps_cpp.so"
 DEFAULT_DISTRO = DEFAULT.name
 INSTALLED_HERE = Path("/opt/ros")
 
+#: Sandboxes bind paths by name, so none may contain `..`, as in `../.venv/bin/python`. Links are kept.
+EXECUTABLE = Path(os.path.normpath(sys.executable))
 # What every program needs from the system: the C library, the loader and its cache, and libraries set by alternatives.
 SYSTEM_PATHS = tuple(
     map(Path, ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/alternatives", "/etc/ld.so.cache", "/etc/ld.so.conf"))
@@ -115,7 +117,7 @@ def _find_sourced(environment: Mapping[str, str]) -> RosInstallation | None:
     )
     python_paths = tuple(path for other in siblings for path in _python_folders(other, searched))
     runtime = PythonRuntime(
-        executable=Path(sys.executable),
+        executable=EXECUTABLE,
         read_paths=_existing((*_interpreter_paths(), *SYSTEM_PATHS, *siblings)),
         library_paths=libraries,
         python_paths=_once(python_paths),
@@ -149,7 +151,7 @@ def _find_wheels() -> RosInstallation | None:
     index = prefix / "share" / "ament_index"
     parts = (prefix / "lib", folder, *((index.parent,) if index.is_dir() else ()))
     runtime = PythonRuntime(
-        executable=Path(sys.executable),
+        executable=EXECUTABLE,
         read_paths=_existing((*_interpreter_paths(), *SYSTEM_PATHS, *parts)),
         library_paths=(prefix / "lib", *sorted(path for path in folder.glob("ros_*.libs") if path.is_dir())),
         python_paths=() if str(folder) in _isolated_path() else (folder,),
@@ -203,7 +205,7 @@ def _interpreter_paths() -> tuple[Path, ...]:
     prefix, base = Path(sys.prefix), Path(sys.base_prefix)
     folders = [Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")]
     return (
-        Path(sys.executable),
+        EXECUTABLE,
         prefix / "pyvenv.cfg",
         *(root / name for root in (prefix, base) for name in ("lib", "lib64")),
         *folders,
@@ -218,7 +220,7 @@ def _site_packages() -> tuple[Path, ...]:
 
 def _isolated_path() -> tuple[str, ...]:
     """Return where `python -I` finds packages, which excludes the user's site-packages."""
-    return tuple(sysconfig.get_path(name) for name in ("purelib", "platlib"))
+    return tuple(os.path.normpath(sysconfig.get_path(name)) for name in ("purelib", "platlib"))
 
 
 def _python_folders(prefix: Path, searched: Iterable[Path]) -> tuple[Path, ...]:
@@ -257,4 +259,5 @@ def _existing(paths: Iterable[Path]) -> tuple[Path, ...]:
 
 
 def _once(paths: Iterable[Path]) -> tuple[Path, ...]:
-    return tuple(dict.fromkeys(paths))
+    """Return each path once, in order, without `..`."""
+    return tuple(dict.fromkeys(Path(os.path.normpath(path)) for path in paths))

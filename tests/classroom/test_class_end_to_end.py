@@ -37,6 +37,7 @@ def points(results: Path) -> dict[str, str]:
     return {row["submission"]: row["score"] for row in rows}
 
 
+@pytest.mark.long
 def test_a_killed_class_is_finished_by_the_same_command(class_: Path, tmp_path: Path) -> None:
     """What was done is not run again, the scores are those of an undisturbed run, and no process is left."""
     results = tmp_path / "out"

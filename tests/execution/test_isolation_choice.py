@@ -459,7 +459,10 @@ def test_right_solutions_score_full_under_every_tier(ros: RosInstallation, tmp_p
     assert [found["name"] for found in whole["environment"]["containment"]] == list(PROPERTIES)
 
 
-@pytest.fixture(params=[pytest.param(None, marks=pytest.mark.nightly), USER], ids=["root", "user"])
+@pytest.fixture(
+    params=[pytest.param(None, marks=pytest.mark.nightly), pytest.param(USER, marks=pytest.mark.long)],
+    ids=["root", "user"],
+)
 def container(request: pytest.FixtureRequest, ros: RosInstallation) -> Callable[..., tuple[str, ...]]:
     """Return what starts a program in the stand-in for a container, by the options of its network."""
     if os.geteuid() != 0 or shutil.which("unshare") is None:

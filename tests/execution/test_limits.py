@@ -176,6 +176,7 @@ def test_a_hundred_and_fifty_participants_are_ended_by_their_threads(run: Callab
     assert "(the limit is 64 processes and threads)" in words(trace)
 
 
+@pytest.mark.long
 def test_endpoints_without_end_are_told(run: Callable[..., Trace]) -> None:
     """The grader's node would have to subscribe to every one of them."""
     trace = run("self.many = [self.create_publisher(Twist, f'/t{n}', 10) for n in range(1500)]")

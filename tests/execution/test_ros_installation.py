@@ -53,6 +53,15 @@ def wheels() -> RosInstallation:
         pytest.skip(fault.message)
 
 
+def test_an_interpreter_may_be_started_by_a_relative_path(wheels: RosInstallation) -> None:
+    """As `../.venv/bin/python`: the paths of a sandbox are the same."""
+    folder = Path(sys.executable).parent
+    name = f"../{folder.name}/python"
+    code = "from grader.execution.ros_installation import find_ros; print(find_ros({}))"
+    done = subprocess.run([name, "-c", code], capture_output=True, text=True, check=True, env={}, cwd=folder)
+    assert done.stdout.strip() == str(wheels)
+
+
 def test_a_sourced_installation_is_used_and_nothing_of_the_wheels(tmp_path: Path) -> None:
     """Children get its Python folders and its libraries, and no library beside this interpreter."""
     folder = install(tmp_path / "jazzy")

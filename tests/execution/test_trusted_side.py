@@ -257,6 +257,7 @@ for info in self.get_publishers_info_by_topic("/temperature"):
     assert [d.value["data"] for d in trace.deliveries("/temperature")] == [21.0, 26.0] * 5
 
 
+@pytest.mark.long
 def test_a_forged_farewell_of_the_grader_ends_no_grading(run: Callable[..., Trace]) -> None:
     """A student who has other nodes believe that the grader left loses what they would have been heard to say."""
     farewell = listener("""
@@ -369,6 +370,7 @@ ledger.Ledger.claims = lambda it: [
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["publisher", pytest.param("client", marks=pytest.mark.nightly)])
 def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Callable[..., Trace], kind: str) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
@@ -448,6 +450,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
     assert trace.observations == ()
 
 
+@pytest.mark.long
 def test_scenarios_leave_no_descriptor_and_no_process(run: Callable[..., Trace], studio: RecordingSession) -> None:
     """After ten more, this process and its workers hold what they held before."""
     hogs = [hostile(), hostile(later="if self.count == 9: os.kill(os.getpid(), 9)")]
