@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import libcst as cst
 
 from grader.mutation.operators.mutants import meaning
-from grader.mutation.operators.program import (
-    CREATORS,
-    Candidate,
-    Edit,
-    Program,
-    argument,
-    called,
-    expression,
-    statement,
-    string,
-    text_of,
-)
+from grader.mutation.operators.program import CREATORS, Candidate, Edit, Program, argument, called, string, text_of
 from grader.mutation.operators.words import names
 
 
@@ -168,22 +157,20 @@ def format_method(program: Program) -> str:
 def qos_object(program: Program) -> str:
     """The queue depth is given in a QoSProfile."""
     edits: list[Edit] = []
-    for call in program.calls("create_publisher", "create_subscription"):
-        arg = argument(call, "qos_profile")
-        if arg is not None and isinstance(arg.value, cst.Integer):
-            edits.append((arg.value, expression(f"QoSProfile(depth={arg.value.value})")))
-    imported = program.importing("from rclpy.qos import QoSProfile")
-    return program.changed([*edits, *imported]) if edits else _same(program)
+    for _, depth in program.arguments("qos_profile", "create_publisher", "create_subscription"):
+        if isinstance(depth, cst.Integer):
+            edits.append((depth, cst.parse_expression(f"QoSProfile(depth={depth.value})")))
+    return _with_import(program, edits, "from rclpy.qos import QoSProfile")
 
 
 def lambda_callbacks(program: Program) -> str:
     """Callbacks of timers and subscriptions are lambdas."""
     edits: list[Edit] = []
-    for call in program.calls("create_timer", "create_subscription"):
-        arg = argument(call, "callback")
-        if arg is not None and isinstance(arg.value, (cst.Name, cst.Attribute)):
-            given = "msg" if called(call) == "create_subscription" else ""
-            edits.append((arg.value, expression(f"lambda{given and ' '}{given}: {program.code(arg.value)}({given})")))
+    for call, callback in program.arguments("callback", "create_timer", "create_subscription"):
+        if isinstance(callback, (cst.Name, cst.Attribute)):
+            given = " msg" if called(call) == "create_subscription" else ""
+            after = f"lambda{given}: {program.code(callback)}({given.strip()})"
+            edits.append((callback, cst.parse_expression(after)))
     return program.changed(edits)
 
 
@@ -195,29 +182,28 @@ def executor(program: Program) -> str:
         if node:
             text = f"executor = SingleThreadedExecutor()\nexecutor.add_node({node})\nexecutor.spin()\n"
             edits.append((line, cst.FlattenSentinel(cst.parse_module(text).body)))
-    imported = program.importing("from rclpy.executors import SingleThreadedExecutor")
-    return program.changed([*edits, *imported]) if edits else _same(program)
+    return _with_import(program, edits, "from rclpy.executors import SingleThreadedExecutor")
 
 
 def loop_in_thread(program: Program) -> str:
     """A loop with a sleep replaces the timer; a thread spins the node."""
     timers = program.calls("create_timer")
-    timer = timers[0] if len(timers) == 1 else None
     lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
-    callback = argument(timer, "callback") if timer is not None else None
-    pause = argument(timer, "timer_period_sec") if timer is not None else None
-    if timer is None or callback is None or pause is None or len(lines) != 1 or "self" in program.code(pause.value):
+    if len(timers) != 1 or len(lines) != 1:
+        return _same(program)
+    timer, callback, pause = timers[0], argument(timers[0], "callback"), argument(timers[0], "timer_period_sec")
+    if callback is None or pause is None or "self" in program.code(pause):
         return _same(program)
     made = program.enclosing(timer, cst.SimpleStatementLine)
-    name = program.code(callback.value)
+    name = program.code(callback)
     if made is None or not name.startswith("self.") or program.code(made).strip() != program.code(timer):
         return _same(program)
     node = _spun(program, lines[0])
     thread = f"threading.Thread(target=rclpy.spin, args=({node},), daemon=True).start()"
-    body = f"    {node}{name.removeprefix('self')}()\n    time.sleep({program.code(pause.value)})\n"
-    loop = cst.FlattenSentinel([statement(thread), statement(f"while rclpy.ok():\n{body}")])
+    body = f"    {node}{name.removeprefix('self')}()\n    time.sleep({program.code(pause)})\n"
+    loop = cst.FlattenSentinel([cst.parse_statement(thread), cst.parse_statement(f"while rclpy.ok():\n{body}")])
     imports = (*program.importing("import threading"), *program.importing("import time"))
-    return program.changed([(made, statement("pass")), (lines[0], loop), *imports])
+    return program.changed([(made, cst.parse_statement("pass")), (lines[0], loop), *imports])
 
 
 def without_guard(program: Program) -> str:
@@ -259,7 +245,7 @@ def _formatted(program: Program, style: _Style) -> str:
                 for part in node.parts
             )
             given = ", ".join(program.code(part.expression) for part in values)
-            edits.append((node, expression(style.whole(f"{node.end}{text}{node.end}", given))))
+            edits.append((node, cst.parse_expression(style.whole(f"{node.end}{text}{node.end}", given))))
     return program.changed(edits)
 
 
@@ -280,6 +266,11 @@ def _percent_text(text: str) -> str:
 
 def _equal() -> cst.AssignEqual:
     return cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
+
+
+def _with_import(program: Program, edits: Sequence[Edit], line: str) -> str:
+    """Return the source after edits that need an import; the unchanged source if there are none."""
+    return program.changed([*edits, *program.importing(line)]) if edits else _same(program)
 
 
 def _same(program: Program) -> str:
