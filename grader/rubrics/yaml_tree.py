@@ -79,9 +79,6 @@ class YamlSyntaxError(Exception):
 def read_yaml(text: str) -> YamlTree:
     """Parse one YAML 1.2 document, whose size the caller limits; the data of an empty document is None.
 
-    Returns:
-        The tree; `data` is None for an empty document.
-
     Raises:
         YamlSyntaxError: Not valid YAML, several documents, or nested or expanded beyond the limits.
     """
