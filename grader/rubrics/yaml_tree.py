@@ -67,6 +67,14 @@ class YamlTree:
     keys: dict[TreePath, Position] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
 
+    def at(self, path: TreePath) -> Position:
+        """Return the position of a value; the top of the file if it is not there."""
+        return self.values.get(path, TOP)
+
+    def at_key(self, path: TreePath) -> Position:
+        """Return the position of the key of a value; the top of the file if it is not there."""
+        return self.keys.get(path, TOP)
+
 
 class YamlSyntaxError(Exception):
     """The text is not a YAML document."""

@@ -171,9 +171,10 @@ def _places(data: bytes, most: int) -> set[tuple[int, int]]:
         size = _size(block)
         if at + size > len(data):
             raise _damaged("tar")
-        if block[156:157] in _EXTENDED:
-            _check_extended(data[at : at + size], pax=block[156:157] in _PAX)
-        else:
+        kind = block[156:157]
+        if kind in _PAX:
+            _check_pax(data[at : at + size])
+        elif kind not in _EXTENDED:
             places.add((at, size))
         at += -(-size // BLOCK) * BLOCK
 
@@ -191,10 +192,8 @@ def _size(block: bytes) -> int:
     return info.size if carries else 0
 
 
-def _check_extended(header: bytes, *, pax: bool) -> None:
+def _check_pax(header: bytes) -> None:
     """Reject records that are not exactly `LENGTH KEY=VALUE` and a line break, and those about sparse files."""
-    if not pax:
-        return
     if b"GNU.sparse" in header or _MANY_DIGITS.search(header):
         raise _unusual()
     at = 0

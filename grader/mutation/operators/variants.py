@@ -283,33 +283,18 @@ Rewriter = Callable[[Program], str]
 VARIANTS: Mapping[str, Rewriter] = {
     rewriter.__name__: rewriter
     for rewriter in (
-        renamed_classes,
-        renamed_functions,
-        renamed_methods,
-        renamed_attributes,
-        renamed_variables,
-        renamed_nodes,
-        reordered_methods,
-        reordered_constants,
-        single_quotes,
-        windows_lines,
-        other_topic_form,
-        keyword_arguments,
-        percent_format,
-        format_method,
-        qos_object,
-        lambda_callbacks,
-        executor,
-        loop_in_thread,
-        without_guard,
+        *(renamed_classes, renamed_functions, renamed_methods, renamed_attributes, renamed_variables, renamed_nodes),
+        *(reordered_methods, reordered_constants),
+        *(single_quotes, windows_lines, other_topic_form, keyword_arguments, percent_format, format_method),
+        *(qos_object, lambda_callbacks, executor, loop_in_thread, without_guard),
     )
 }
 
 
-def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[Candidate, ...]:
+def variants_of(source: str, file: str) -> tuple[Candidate, ...]:
     """Return the variants that differ from a program, in the order of the table."""
     program = Program(source)
-    written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
+    written = ((name, rewriter(program)) for name, rewriter in VARIANTS.items())
     return tuple(
         Candidate(f"{file}:{name}", file, name, text)
         for name, text in written
