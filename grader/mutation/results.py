@@ -43,11 +43,6 @@ class TrialResult:
         return all(outcome is Outcome.MET for outcome in self.outcomes.values())
 
     @property
-    def decided(self) -> bool:
-        """Whether no criterion is undecided."""
-        return Outcome.UNDECIDED not in self.outcomes.values()
-
-    @property
     def turned(self) -> tuple[str, ...]:
         """The criteria that are not met or partly met, without blocked ones."""
         return tuple(id_ for id_, outcome in self.outcomes.items() if outcome in _TURNED)
@@ -57,7 +52,7 @@ class TrialResult:
         """The fate of a mutant with this result."""
         if any(outcome in (*_TURNED, Outcome.BLOCKED) for outcome in self.outcomes.values()):
             return Fate.KILLED
-        return Fate.SURVIVED if self.decided else Fate.UNDECIDED
+        return Fate.UNDECIDED if Outcome.UNDECIDED in self.outcomes.values() else Fate.SURVIVED
 
 
 def result_of(report: ExerciseReport) -> TrialResult:

@@ -12,7 +12,7 @@ from typing import NoReturn, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from grader.core.errors import RubricError
-from grader.core.exercise import Check, Criterion, Exercise, Feedback, Variant
+from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.scenario import (
@@ -327,22 +327,18 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
             where = tree.keys[("criteria", index, "check", name)]
             mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
             continue
-        yield _criterion(shape, check, feedback_of(shape.feedback, feedback_of(rubric.feedback)))
-
-
-def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Criterion:
-    return Criterion(
-        id=shape.id,
-        title=shape.title,
-        points=shape.points,
-        scenario=shape.scenario,
-        check=check,
-        needs=shape.needs,
-        hint=" ".join((shape.hint or "").split()),
-        chapter=" ".join((shape.chapter or "").split()),
-        feedback=feedback,
-        check_name=shape.check.chosen[0],
-    )
+        yield Criterion(
+            id=shape.id,
+            title=shape.title,
+            points=shape.points,
+            scenario=shape.scenario,
+            check=check,
+            needs=shape.needs,
+            hint=" ".join((shape.hint or "").split()),
+            chapter=" ".join((shape.chapter or "").split()),
+            feedback=feedback_of(shape.feedback, feedback_of(rubric.feedback)),
+            check_name=name,
+        )
 
 
 def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:

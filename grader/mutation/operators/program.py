@@ -70,6 +70,11 @@ class Program:
         """Return the text of a node."""
         return self.module.code_for_node(node)
 
+    def specification(self, part: cst.BaseFormattedStringContent) -> str:
+        """Return how an f-string formats a value, such as `.2f`; empty if it does not say, and for text."""
+        pieces = part.format_spec if isinstance(part, cst.FormattedStringExpression) else None
+        return "".join(map(self.code, pieces or ()))
+
     def line(self, node: cst.CSTNode) -> int:
         """Return the first line of a node, starting at 1."""
         return self._places[node].start.line

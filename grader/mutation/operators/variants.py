@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import libcst as cst
 
@@ -135,23 +134,24 @@ def other_topic_form(program: Program) -> str:
 def keyword_arguments(program: Program) -> str:
     """Publishers, timers and so on are created with keyword arguments."""
     edits: list[Edit] = []
+    equal = cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
     for call in program.calls(*CREATORS):
         args = []
         for arg, name in zip(call.args, CREATORS[called(call)], strict=False):
             named = arg.keyword is not None or arg.star
-            args.append(arg if named else arg.with_changes(keyword=cst.Name(name), equal=_equal()))
+            args.append(arg if named else arg.with_changes(keyword=cst.Name(name), equal=equal))
         edits.append((call, call.with_changes(args=[*args, *call.args[len(args) :]])))
     return program.changed(edits)
 
 
 def percent_format(program: Program) -> str:
     """Texts are formatted with `%` instead of f-strings."""
-    return _formatted(program, _Style(lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)".format))
+    return _formatted(program, lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)")
 
 
 def format_method(program: Program) -> str:
     """Texts are formatted with `.format` instead of f-strings."""
-    return _formatted(program, _Style(lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})".format))
+    return _formatted(program, lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})")
 
 
 def qos_object(program: Program) -> str:
@@ -223,49 +223,29 @@ def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
     return program.code(call.args[0].value) if plain else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Style:
-    """How a style formats a field with its specification, the text between fields, and the complete expression."""
-
-    field: Callable[[str], str]
-    text: Callable[[str], str]
-    whole: Callable[[str, str], str]
-
-
-def _formatted(program: Program, style: _Style) -> str:
-    """Rewrite f-strings in another style where possible."""
+def _formatted(program: Program, field: Callable[[str], str], text: Callable[[str], str], whole: str) -> str:
+    """Rewrite f-strings where possible: `field` writes a specification, `text` what is between, `whole` everything."""
     edits: list[Edit] = []
     for node in program.all(cst.FormattedString):
         values = [part for part in node.parts if isinstance(part, cst.FormattedStringExpression)]
         if values and len(node.start) == 2 and all(_is_plain(program, part) for part in values):
-            text = "".join(
-                style.text(part.value)
-                if isinstance(part, cst.FormattedStringText)
-                else style.field(_specification(program, part))
+            written = "".join(
+                text(part.value) if isinstance(part, cst.FormattedStringText) else field(program.specification(part))
                 for part in node.parts
             )
             given = ", ".join(program.code(part.expression) for part in values)
-            edits.append((node, cst.parse_expression(style.whole(f"{node.end}{text}{node.end}", given))))
+            edits.append((node, cst.parse_expression(whole.format(f"{node.end}{written}{node.end}", given))))
     return program.changed(edits)
 
 
 def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
     """Whether every style can format a field."""
     bare = part.conversion is None and part.equal is None
-    return bare and _PLAIN.fullmatch(_specification(program, part)) is not None
-
-
-def _specification(program: Program, part: cst.BaseFormattedStringContent) -> str:
-    pieces = part.format_spec if isinstance(part, cst.FormattedStringExpression) else None
-    return "".join(program.code(piece) for piece in pieces or ())
+    return bare and _PLAIN.fullmatch(program.specification(part)) is not None
 
 
 def _percent_text(text: str) -> str:
     return text.replace("%", "%%").replace("{{", "{").replace("}}", "}")
-
-
-def _equal() -> cst.AssignEqual:
-    return cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
 
 
 def _with_import(program: Program, edits: Sequence[Edit], line: str) -> str:

@@ -77,7 +77,7 @@ def _misspelt(old: str) -> str:
 def rounding(program: Program) -> Iterator[Mutation]:
     """Too few digits in a text: `.0f` for `.3f`."""
     for part in program.all(cst.FormattedStringExpression):
-        spec = "".join(program.code(piece) for piece in part.format_spec or ())
+        spec = program.specification(part)
         if spec.endswith("f") and spec != ".0f":
             yield program.replacing(part, part.with_changes(format_spec=[cst.FormattedStringText(".0f")]))
     for node in program.all(cst.SimpleString):
