@@ -112,18 +112,12 @@ _MOST_FIELDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """The observed behaviour of a reference solution.
+    """The observed behaviour of a reference solution."""
 
-    Attributes:
-        alone: Trace of the nodes without stimuli.
-        driven: Trace of the nodes with the stimuli of the draft; the same as `alone` if there are none.
-        window_s: Longest time that every topic was observed after its first message.
-    """
-
-    alone: Trace
-    driven: Trace
+    alone: Trace  # trace of the nodes without stimuli
+    driven: Trace  # trace of the nodes with the stimuli of the draft; the same as `alone` if there are none
     files: tuple[str, ...]
-    window_s: float
+    window_s: float  # longest time that every topic was observed after its first message
 
 
 def questions(seen: Seen) -> tuple[DraftCriterion, ...]:

@@ -42,19 +42,13 @@ class DraftCriterion:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """The contents of a skeleton.
-
-    Attributes:
-        files: Files of the reference; each runs in its own process.
-        after: Topic whose first message starts the observation; empty for the start of the nodes.
-        may_exit: Files that end by themselves.
-    """
+    """The contents of a skeleton."""
 
     id: str
-    files: tuple[str, ...]
+    files: tuple[str, ...]  # files of the reference; each runs in its own process
     duration_s: float
-    after: str = ""
-    may_exit: tuple[str, ...] = ()
+    after: str = ""  # topic whose first message starts the observation; empty for the start of the nodes
+    may_exit: tuple[str, ...] = ()  # files that end by themselves
     stimuli: tuple[DraftStimulus, ...] = ()
     criteria: tuple[DraftCriterion, ...] = ()
     remarks: tuple[str, ...] = ()

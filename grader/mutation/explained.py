@@ -25,18 +25,12 @@ _Line = Annotated[_Text, AfterValidator(lambda text: " ".join(text.split()))]
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """An author's note on some mutants or variants.
-
-    Attributes:
-        because: The explanation; empty if the note names criteria.
-        criteria: Criteria that should detect such a mutant; empty if the note has an explanation.
-        where: Position in the file, for messages.
-    """
+    """An author's note on some mutants or variants."""
 
     pattern: str
-    because: str = ""
-    criteria: tuple[str, ...] = ()
-    where: str = ""
+    because: str = ""  # the explanation; empty if the note names criteria
+    criteria: tuple[str, ...] = ()  # criteria that should detect such a mutant; empty if the note has an explanation
+    where: str = ""  # position in the file, for messages
 
     def fits(self, id_: str) -> bool:
         """Whether the pattern matches a mutant or variant."""

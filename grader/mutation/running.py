@@ -104,22 +104,15 @@ _MUTANTS_A_VARIANT = 4
 
 @dataclass(frozen=True, slots=True)
 class SelftestOptions:
-    """How to test rubrics.
+    """How to test rubrics."""
 
-    Attributes:
-        reference: Folder of reference solutions; None for the one in the notes beside a rubric.
-        template: Folder of templates; None for the one in the notes.
-        jobs: Scenarios recorded in parallel; None for a number that suits the machine.
-        only: Pattern for the ids to run, with `*` for anything; empty for all.
-        sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
-        seed: Seed of the sample and of all drawn values; None derives the values from the reference solution.
-    """
-
-    reference: Path | None = None
-    template: Path | None = None
-    jobs: int | None = None
-    only: str = ""
+    reference: Path | None = None  # folder of reference solutions; None for the one in the notes beside a rubric
+    template: Path | None = None  # folder of templates; None for the one in the notes
+    jobs: int | None = None  # scenarios recorded in parallel; None for a number that suits the machine
+    only: str = ""  # pattern for the ids to run, with `*` for anything; empty for all
+    # Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all
     sample: int | None = None
+    # Seed of the sample and of all drawn values; None derives the values from the reference solution
     seed: int | None = None
     clock: str = "auto"
     isolation: str = "auto"

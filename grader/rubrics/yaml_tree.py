@@ -54,17 +54,12 @@ def end_of(text: str) -> Position:
 
 @dataclass(slots=True)
 class YamlTree:
-    """A parsed document.
-
-    Attributes:
-        values: Position of each value.
-        keys: Position of the key of each value in a mapping.
-        mistakes: Invalid parts: duplicate keys, keys that are not text, unknown tags.
-    """
+    """A parsed document."""
 
     data: object = None
-    values: dict[TreePath, Position] = field(default_factory=dict)
-    keys: dict[TreePath, Position] = field(default_factory=dict)
+    values: dict[TreePath, Position] = field(default_factory=dict)  # position of each value
+    keys: dict[TreePath, Position] = field(default_factory=dict)  # position of the key of each value in a mapping
+    # Invalid parts: duplicate keys, keys that are not text, unknown tags
     mistakes: list[Mistake] = field(default_factory=list)
 
     def at(self, path: TreePath) -> Position:

@@ -42,15 +42,10 @@ FEWER = "pack only your own .py files"
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A member of an archive, not yet unpacked.
+    """A member of an archive, not yet unpacked."""
 
-    Attributes:
-        name: Name in the archive, with `/` between the parts and none at the end; may be hostile.
-        kind: `FILE`, `FOLDER`, or words for anything else, such as `a link`.
-    """
-
-    name: str
-    kind: str
+    name: str  # name in the archive, with `/` between the parts and none at the end; may be hostile
+    kind: str  # `FILE`, `FOLDER`, or words for anything else, such as `a link`
     size: int
     read: Callable[[int], bytes]
 

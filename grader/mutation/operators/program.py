@@ -40,21 +40,13 @@ class Mutation:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A changed program: a mutant or a correct variant.
+    """A changed program: a mutant or a correct variant."""
 
-    Attributes:
-        id: Stays the same as long as the reference solution does.
-        file: Name of the file.
-        operator: Key of `OPERATORS` or of `VARIANTS`.
-        source: The whole program.
-        detail: The change of a mutant, in one line.
-    """
-
-    id: str
-    file: str
-    operator: str
-    source: str
-    detail: str = ""
+    id: str  # stays the same as long as the reference solution does
+    file: str  # name of the file
+    operator: str  # key of `OPERATORS` or of `VARIANTS`
+    source: str  # the whole program
+    detail: str = ""  # the change of a mutant, in one line
 
 
 class Program:
