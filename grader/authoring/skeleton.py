@@ -18,6 +18,11 @@ class DraftQuantity:
     text: str
 
 
+def in_seconds(duration_s: float) -> DraftQuantity:
+    """Return a duration as rubrics write it."""
+    return DraftQuantity(f"{duration_s:g} s")
+
+
 @dataclass(frozen=True, slots=True)
 class DraftStimulus:
     """A stimulus of the draft, with a comment on what is left for the author to decide."""
@@ -108,9 +113,9 @@ def scenario_id(draft: Draft) -> str:
 
 
 def _scenario(draft: Draft) -> Iterator[str]:
-    observe: dict[str, object] = {"duration": DraftQuantity(f"{draft.duration_s:g} s")}
+    observe: dict[str, object] = {"duration": in_seconds(draft.duration_s)}
     if draft.after:
-        observe |= {"after_first_message_on": draft.after, "wait_at_most": DraftQuantity("60 s")}
+        observe |= {"after_first_message_on": draft.after, "wait_at_most": in_seconds(60)}
     yield from ("scenarios:", f"  - id: {scenario_id(draft)}", f"    processes: {_value(list(draft.files))}")
     if draft.may_exit:
         yield f"    may_exit: {_value(list(draft.may_exit))}"

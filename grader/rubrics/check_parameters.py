@@ -133,12 +133,8 @@ def _parameters(cls: type) -> type[Shape]:
 def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:
     """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
-    Args:
-        cls: The dataclass.
-        name: Name of the model in the JSON Schema.
-        aliases: Rubric names of fields, where they differ.
-        usual: Defaults shown in the JSON Schema, where they differ from those of the dataclass; a required field gets
-            this default.
+    `aliases` holds rubric names of fields, where they differ, and `usual` the defaults that the JSON Schema shows,
+    where they differ from those of the dataclass; a required field gets this default.
     """
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}

@@ -187,9 +187,6 @@ def read_rubric(
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
 
-    Returns:
-        The exercise.
-
     Raises:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
     """

@@ -40,13 +40,9 @@ class OwnFile:
 def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
     """Return the check files that a rubric names, without running them.
 
-    Args:
-        rubric: The rubric; the files must be in its folder or below.
-        names: As written in the rubric.
-        never_in: Folders that students write to: files there are never run as checks.
-
     Raises:
-        RubricError: A file is missing, too large, outside the rubric's folder, or where students write.
+        RubricError: A file is missing, too large, neither in the rubric's folder nor below, or in one of the folders
+            `never_in`, which students write to.
     """
     return tuple(_own_file(rubric, name, never_in) for name in dict.fromkeys(names))
 

@@ -77,11 +77,7 @@ _QUANTITY = re.compile(rf"(?P<sign>[-+\N{{MINUS SIGN}}]?)(?P<number>{_NUMBER})\s
 
 
 def parse_quantity(text: str, unit: Unit) -> int | float:
-    """Parse a quantity with its unit.
-
-    Args:
-        text: Number and unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
-        unit: The expected dimension, named by its base unit.
+    """Parse a quantity with its unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
 
     Returns:
         Whole nanoseconds for `Unit("s")`, whole bytes for `Unit("B")`, a float in hertz for `Unit("Hz")`; at least 0.

@@ -105,10 +105,9 @@ def is_tar(head: bytes) -> bool:
 
 
 def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
-    """Return the decompressed data; nothing is decompressed beyond `most` bytes, which is `limit` in words.
+    """Return the decompressed data; raises UnusableArchiveError if it is damaged, cut off or too large.
 
-    Raises:
-        UnusableArchiveError: The data is damaged or cut off, or its content is larger than `most`.
+    Nothing is decompressed beyond `most` bytes, which is `limit` in words.
     """
     whole = bytearray()
     for _ in range(MAX_STREAMS):
@@ -301,15 +300,12 @@ _MAGIC = {
     b"\x28\xb5\x2f\xfd": "zstd",
     b"LZIP": "lzip",
 }
+#: The kinds that can be read.
 _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 
 def archive_kind(head: bytes) -> str | None:
-    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None.
-
-    Returns:
-        `zip`, `tar`, `gzip`, `bzip2` or `xz`, which can be read, or the name of another kind, which cannot.
-    """
+    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None."""
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
             return kind
@@ -317,9 +313,7 @@ def archive_kind(head: bytes) -> str | None:
 
 
 def collect_archive(data: bytes, *, where: str) -> Collected:
-    """Return the files of an archive.
-
-    The same files are skipped as in a folder, so a submission gives the same result packed or not.
+    """Return the files of an archive; the same files are skipped as in a folder, so packing changes no result.
 
     Raises:
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could

@@ -30,14 +30,10 @@ _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
-    """Read the files of a student's folder; `into`, the destination of the copy, is not part of the submission.
+    """Read the files of a student's folder, in the order of their names' bytes.
 
-    Returns:
-        The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out
-        with a note.
-
-    Raises:
-        SubmissionError: The folder cannot be listed, or a limit is exceeded.
+    Links, devices, sockets, pipes and unreadable files are left out with a note. `into`, the destination of the copy,
+    is not part of the submission. Raises SubmissionError if the folder cannot be listed, or a limit is exceeded.
     """
     left = LeftOut()
     walk = _Walk(where=where, left=left, own=into.stat())
@@ -74,11 +70,7 @@ def read_start(file: Path, most: int, *, where: str) -> bytes:
 def write_files(collected: Collected, into: Path) -> str:
     """Write the files that were read into an empty folder, readable by everybody, in the same layout.
 
-    Returns:
-        The digest: `sha256:` and 64 hex digits over names and contents.
-
-    Raises:
-        HarnessError: A file cannot be written.
+    Returns their digest: `sha256:` and 64 hex digits over names and contents. Raises HarnessError.
     """
     digest = hashlib.sha256()
     for relative, content in sorted(collected.files, key=lambda file: os.fsencode(file[0])):
