@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.rubrics.loader import NOTES
 from grader.rubrics.mistakes import mistakes_of, nearest
 from grader.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
 from grader.submissions.collected import listed, shown
@@ -44,9 +45,9 @@ class Explained:
     reference: Path | None = None
     template: Path | None = None
     template_score: Fraction | None = None
-    survivors: Sequence[Explanation] = field(default_factory=tuple)
-    expected: Sequence[Explanation] = field(default_factory=tuple)
-    variants: Sequence[Explanation] = field(default_factory=tuple)
+    survivors: Sequence[Explanation] = ()
+    expected: Sequence[Explanation] = ()
+    variants: Sequence[Explanation] = ()
     criteria: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -87,7 +88,7 @@ class _File(_Shape):
 
 def beside(rubric: Path) -> Path:
     """Return the path of the notes on a rubric: `NAME.selftest.yaml` beside `NAME.yaml`."""
-    return rubric.with_name(f"{rubric.stem}.selftest.yaml")
+    return rubric.with_suffix(NOTES)
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:

@@ -96,7 +96,7 @@ class SelftestResult:
     mutants: tuple[Trial, ...]
     variants: tuple[Trial, ...]
     whole: bool = True  # whether all mutants were run
-    idle: tuple[str, ...] = field(default_factory=tuple)  # unused patterns of the notes, with their positions
+    idle: tuple[str, ...] = ()  # unused patterns of the notes, with their positions
     # Criterion id -> why it detects no mutant, according to the notes
     unturned: Mapping[str, str] = field(default_factory=dict)
     recordings: int = 0

@@ -218,9 +218,8 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
     """Run the selected mutants."""
     made = (mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name))
     for trial in _trials(bench, made, "mutant", options, options.sample):
-        because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
-        expected = _first(explained.expected, trial.id)
-        yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
+        because = _first(explained.survivors, trial.id).because if trial.fate is Fate.SURVIVED else ""
+        yield replace(trial, because=because, expected=_first(explained.expected, trial.id).criteria)
 
 
 def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
@@ -228,8 +227,8 @@ def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions
     made = (variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name))
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
     for trial in _trials(bench, made, "variant", options, most):
-        because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
-        yield replace(trial, because=because.because if because else "")
+        because = _first(explained.variants, trial.id).because if trial.fate is Fate.KILLED else ""
+        yield replace(trial, because=because)
 
 
 def _trials(
@@ -257,8 +256,9 @@ def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> li
     return [candidate for candidate in candidates if candidate.id in kept]
 
 
-def _first(explanations: Iterable[Explanation], id_: str) -> Explanation | None:
-    return next((explanation for explanation in explanations if explanation.fits(id_)), None)
+def _first(explanations: Iterable[Explanation], id_: str) -> Explanation:
+    """Return the first note that fits; an empty one if none does."""
+    return next((explanation for explanation in explanations if explanation.fits(id_)), Explanation(""))
 
 
 def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Trial]) -> tuple[str, ...]:
