@@ -66,9 +66,8 @@ def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree
     for field in fields(check):
         asked = getattr(check, field.name)
         if field.name in _STRETCHES and isinstance(asked, int) and asked > observed:
-            (name,) = (p[-1] for p in tree.keys if len(p) == len(path) + 2 and p[: len(path) + 1] == (*path, "check"))
             text = f"{field.name} is {duration(asked)}, but {scenario.id} is observed for {duration(observed)} only"
-            yield tree.at((*path, "check", name, field.name)).mistake(text)
+            yield tree.at((*path, "check", criterion.check_name, field.name)).mistake(text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -240,9 +240,8 @@ def _subscribed(topic: TopicSummary) -> Iterator[DraftCriterion]:
     if own:
         asked = {"topic": topic.name, "type": own[0].type}
         hint = f"create a subscription for {own[0].type} on {topic.name} with an ordinary queue depth such as 10"
-        yield DraftCriterion(
-            f"subscribes_{as_id(topic.name)}", f"Subscribes to {topic.name}", "subscribes", asked, hint
-        )
+        id_, title = f"subscribes_{as_id(topic.name)}", f"Subscribes to {topic.name}"
+        yield DraftCriterion(id_, title, "subscribes", asked, hint)
 
 
 def _services(seen: Seen) -> Iterator[DraftCriterion]:
@@ -263,9 +262,8 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
             wanted: dict[str, object] = {"service": service, "calls": calls}
             comment = f"seen: {counted(calls, 'call')}; decide: how many, and how long between two of them?"
             hint = f"call {service} once it is there"
-            yield DraftCriterion(
-                f"calls_{as_id(service)}", f"Calls {service}", "service_calls", wanted, hint, "", comment
-            )
+            id_, title = f"calls_{as_id(service)}", f"Calls {service}"
+            yield DraftCriterion(id_, title, "service_calls", wanted, hint, "", comment)
 
 
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:

@@ -169,11 +169,8 @@ def _problems(file: OwnFile, table: Mapping[str, object], taken: Mapping[str, ty
         elif name in taken:
             yield f"{where}:{line}: expected a name of its own, found `{name}`, which is taken"
         elif wrong := _no_check(kind):
-            yield f"{where}:{lines.get(f'class {_class_name(kind)}', line)}: `{name}`: {wrong}"
-
-
-def _class_name(kind: object) -> str:
-    return kind.__name__ if isinstance(kind, type) else ""
+            class_line = lines.get(f"class {kind.__name__}", line) if isinstance(kind, type) else line
+            yield f"{where}:{class_line}: `{name}`: {wrong}"
 
 
 def _no_check(kind: object) -> str:
