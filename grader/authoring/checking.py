@@ -16,7 +16,7 @@ from grader.judging.checks import CHECKS
 from grader.rubrics.check_parameters import manual_of
 from grader.rubrics.loader import RubricMistakes, read_rubric
 from grader.rubrics.variants import First
-from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree, read_yaml
+from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree, read_yaml
 from grader.submissions.collected import shown
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.
@@ -37,20 +37,20 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     total = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
     if total % ROUND:
         text = f"the points add up to {float(total):g}, which is no multiple of {ROUND}"
-        yield tree.keys.get(("criteria",), TOP).mistake(text)
+        yield tree.at_key(("criteria",)).mistake(text)
     judged = {criterion.scenario for criterion in exercise.criteria}
     for index, scenario in enumerate(exercise.scenarios):
         if scenario.id not in judged:
-            where = tree.values.get(("scenarios", index, "id"), TOP)
-            yield where.mistake(f"the scenario {scenario.id} is recorded, but no criterion looks at it")
+            text = f"the scenario {scenario.id} is recorded, but no criterion looks at it"
+            yield tree.at(("scenarios", index, "id")).mistake(text)
     run = {process for scenario in exercise.scenarios for process in scenario.processes}
     for index, name in enumerate(exercise.files):
         if name not in run:
-            yield tree.values.get(("files", index), TOP).mistake(f"{name} is asked for, but no scenario runs it")
+            yield tree.at(("files", index)).mistake(f"{name} is asked for, but no scenario runs it")
 
 
 def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
-    where = tree.values.get((*path, "id"), TOP)
+    where = tree.at((*path, "id"))
     kind = type(criterion.check)
     if not criterion.hint:
         yield where.mistake(f"{criterion.id} has no hint: a student who misses it may not be told what to do")
@@ -66,10 +66,8 @@ def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree
     for field in fields(check):
         asked = getattr(check, field.name)
         if field.name in _STRETCHES and isinstance(asked, int) and asked > observed:
-            (name,) = (p[-1] for p in tree.keys if len(p) == len(path) + 2 and p[: len(path) + 1] == (*path, "check"))
-            where = tree.values.get((*path, "check", name, field.name), TOP)
             text = f"{field.name} is {duration(asked)}, but {scenario.id} is observed for {duration(observed)} only"
-            yield where.mistake(text)
+            yield tree.at((*path, "check", criterion.check_name, field.name)).mistake(text)
 
 
 @dataclass(frozen=True, slots=True)

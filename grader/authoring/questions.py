@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id
+from grader.authoring.skeleton import DraftCriterion, DraftQuantity, as_id, in_seconds
 from grader.core.quantities import NS_PER_S, seconds
 from grader.core.report import TopicSummary
 from grader.core.trace import Delivery, Message, Offer, Trace
@@ -112,18 +112,12 @@ _MOST_FIELDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """The observed behaviour of a reference solution.
+    """The observed behaviour of a reference solution."""
 
-    Attributes:
-        alone: Trace of the nodes without stimuli.
-        driven: Trace of the nodes with the stimuli of the draft; the same as `alone` if there are none.
-        window_s: Longest time that every topic was observed after its first message.
-    """
-
-    alone: Trace
-    driven: Trace
+    alone: Trace  # trace of the nodes without stimuli
+    driven: Trace  # trace of the nodes with the stimuli of the draft; the same as `alone` if there are none
     files: tuple[str, ...]
-    window_s: float
+    window_s: float  # longest time that every topic was observed after its first message
 
 
 def questions(seen: Seen) -> tuple[DraftCriterion, ...]:
@@ -165,7 +159,7 @@ def _rate(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterio
         "rate": _hertz(rate),
         "tolerance": _hertz(rate * _TOLERANCE),
         "partly_tolerance": _hertz(rate * _PARTLY),
-        "window": DraftQuantity(f"{seen.window_s:g} s"),
+        "window": in_seconds(seen.window_s),
     }
     comment = f"seen: {pace.rate_hz:.3f} Hz; decide: how far off may it be, for all and for half of the points?"
     hint = "a timer takes its period in seconds, which is 1 divided by the rate"
@@ -177,7 +171,7 @@ def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
     """Propose a criterion for a topic with messages only in response to inputs."""
     given = next((delivery.topic for delivery in seen.driven.of(Delivery)), topic.name)
     cases = cases_seen(seen.driven, given, topic.name)
-    asked = {"input": given, "output": topic.name, "within": DraftQuantity("1 s"), "cases": cases}
+    asked = {"input": given, "output": topic.name, "within": in_seconds(1), "cases": cases}
     comment = "seen: nothing is published until something comes in; decide: what follows from what, and how soon?"
     hint = f"publish on {topic.name} in the callback of the subscription"
     title = f"Answers on {topic.name}"
@@ -246,9 +240,8 @@ def _subscribed(topic: TopicSummary) -> Iterator[DraftCriterion]:
     if own:
         asked = {"topic": topic.name, "type": own[0].type}
         hint = f"create a subscription for {own[0].type} on {topic.name} with an ordinary queue depth such as 10"
-        yield DraftCriterion(
-            f"subscribes_{as_id(topic.name)}", f"Subscribes to {topic.name}", "subscribes", asked, hint
-        )
+        id_, title = f"subscribes_{as_id(topic.name)}", f"Subscribes to {topic.name}"
+        yield DraftCriterion(id_, title, "subscribes", asked, hint)
 
 
 def _services(seen: Seen) -> Iterator[DraftCriterion]:
@@ -259,7 +252,7 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
         hint = f"create a service of the type {type_} with the name {service}"
         yield DraftCriterion(first, f"Offers {service}", "service_available", asked, hint)
         comment = "decide: how long may an answer take?"
-        within = {"service": service, "within": DraftQuantity("1 s")}
+        within = {"service": service, "within": in_seconds(1)}
         hint = f"the callback of {service} returns the response"
         title = f"Answers on {service}"
         yield DraftCriterion(f"{name}_answers", title, "service_answers_all", within, hint, first, comment)
@@ -269,9 +262,8 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
             wanted: dict[str, object] = {"service": service, "calls": calls}
             comment = f"seen: {counted(calls, 'call')}; decide: how many, and how long between two of them?"
             hint = f"call {service} once it is there"
-            yield DraftCriterion(
-                f"calls_{as_id(service)}", f"Calls {service}", "service_calls", wanted, hint, "", comment
-            )
+            id_, title = f"calls_{as_id(service)}", f"Calls {service}"
+            yield DraftCriterion(id_, title, "service_calls", wanted, hint, "", comment)
 
 
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:

@@ -18,6 +18,11 @@ class DraftQuantity:
     text: str
 
 
+def in_seconds(duration_s: float) -> DraftQuantity:
+    """Return a duration as rubrics write it."""
+    return DraftQuantity(f"{duration_s:g} s")
+
+
 @dataclass(frozen=True, slots=True)
 class DraftStimulus:
     """A stimulus of the draft, with a comment on what is left for the author to decide."""
@@ -42,19 +47,13 @@ class DraftCriterion:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """The contents of a skeleton.
-
-    Attributes:
-        files: Files of the reference; each runs in its own process.
-        after: Topic whose first message starts the observation; empty for the start of the nodes.
-        may_exit: Files that end by themselves.
-    """
+    """The contents of a skeleton."""
 
     id: str
-    files: tuple[str, ...]
+    files: tuple[str, ...]  # files of the reference; each runs in its own process
     duration_s: float
-    after: str = ""
-    may_exit: tuple[str, ...] = ()
+    after: str = ""  # topic whose first message starts the observation; empty for the start of the nodes
+    may_exit: tuple[str, ...] = ()  # files that end by themselves
     stimuli: tuple[DraftStimulus, ...] = ()
     criteria: tuple[DraftCriterion, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -88,21 +87,18 @@ def _lines(draft: Draft, left_out: Sequence[tuple[DraftCriterion, str]]) -> Iter
     for remark in draft.remarks:
         yield from _comment(f"{remark[:1].upper()}{remark[1:]}.")
     yield from ("schema: grader/rubric/v1", "", "exercise:", f"  id: {draft.id}")
-    yield from ('  number: "1"  # decide: what is its number in the course?', f"  title: {_title(draft.id)}")
+    title = draft.id.replace("_", " ").capitalize()
+    yield from ('  number: "1"  # decide: what is its number in the course?', f"  title: {_scalar(title)}")
     yield from ("  required: true", "", f"files: {_value(list(draft.files))}", "")
     yield from _scenario(draft)
-    yield from (
-        "",
-        "criteria:",
-        *_comment(f"decide: what is each of these worth? All have {POINTS} points so far.", "  "),
-    )
+    yield from ("", "criteria:")
+    yield from _comment(f"decide: what is each of these worth? All have {POINTS} points so far.", "  ")
     for criterion in draft.criteria:
         yield from _criterion(criterion, scenario_id(draft))
         yield ""
     if left_out:
-        yield from _comment(
-            "decide: what of this is asked as well? The reference does not meet it as it stands here.", "  "
-        )
+        asked = "decide: what of this is asked as well? The reference does not meet it as it stands here."
+        yield from _comment(asked, "  ")
     for criterion, reason in left_out:
         yield from _comment(reason, "  ")
         yield from (f"  # {line}" for line in _criterion(criterion, scenario_id(draft)))
@@ -114,9 +110,9 @@ def scenario_id(draft: Draft) -> str:
 
 
 def _scenario(draft: Draft) -> Iterator[str]:
-    observe: dict[str, object] = {"duration": DraftQuantity(f"{draft.duration_s:g} s")}
+    observe: dict[str, object] = {"duration": in_seconds(draft.duration_s)}
     if draft.after:
-        observe |= {"after_first_message_on": draft.after, "wait_at_most": DraftQuantity("60 s")}
+        observe |= {"after_first_message_on": draft.after, "wait_at_most": in_seconds(60)}
     yield from ("scenarios:", f"  - id: {scenario_id(draft)}", f"    processes: {_value(list(draft.files))}")
     if draft.may_exit:
         yield f"    may_exit: {_value(list(draft.may_exit))}"
@@ -124,13 +120,8 @@ def _scenario(draft: Draft) -> Iterator[str]:
     if draft.stimuli:
         yield "    stimuli:"
     for stimulus in draft.stimuli:
-        yield from _stimulus(stimulus)
-
-
-def _stimulus(stimulus: DraftStimulus) -> Iterator[str]:
-    if stimulus.comment:
         yield from _comment(stimulus.comment, "      ")
-    yield from _mapping(f"      - {stimulus.kind}:", stimulus.parameters, " " * 10)
+        yield from _mapping(f"      - {stimulus.kind}:", stimulus.parameters, " " * 10)
 
 
 def _criterion(criterion: DraftCriterion, scenario: str) -> Iterator[str]:
@@ -139,8 +130,7 @@ def _criterion(criterion: DraftCriterion, scenario: str) -> Iterator[str]:
     yield f"    points: {POINTS}"
     yield f"    scenario: {scenario}"
     yield "    check:"
-    if criterion.comment:
-        yield from _comment(criterion.comment, "      ")
+    yield from _comment(criterion.comment, "      ")
     yield from _mapping(f"      {criterion.check}:", criterion.parameters, " " * 8)
     if criterion.needs:
         yield f"    needs: [{criterion.needs}]"
@@ -198,7 +188,3 @@ def _scalar(text: str) -> str:
     """Format a sentence as a YAML value on one line."""
     risky = re.search(r"[\"'#:{}\[\]&*!|>%@`\\]|^[-?\s]", text) is not None or not text.isprintable()
     return json.dumps(text, ensure_ascii=False) if risky else text
-
-
-def _title(id_: str) -> str:
-    return _scalar(id_.replace("_", " ").capitalize())

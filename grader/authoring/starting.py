@@ -12,7 +12,15 @@ from types import MappingProxyType
 from grader.app.grade import Progress
 from grader.app.observe import ObserveRequest, watch
 from grader.authoring.questions import Seen, parameters, questions
-from grader.authoring.skeleton import Draft, DraftCriterion, DraftQuantity, DraftStimulus, as_id, rubric_text
+from grader.authoring.skeleton import (
+    Draft,
+    DraftCriterion,
+    DraftQuantity,
+    DraftStimulus,
+    as_id,
+    in_seconds,
+    rubric_text,
+)
 from grader.core.errors import GraderError, RubricError, SubmissionError
 from grader.core.exercise import Exercise
 from grader.core.quantities import NS_PER_S, seconds
@@ -51,48 +59,42 @@ def _topics(trace: Trace, duration_s: float, given: SentMessages) -> Iterator[Dr
 
 
 def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
-    start = DraftQuantity(f"{FIRST_S:g} s")
+    start = in_seconds(FIRST_S)
     left_s = duration_s - FIRST_S
     if type_ == ODOMETRY:
-        played = {"topic": topic, "start": start, "duration": DraftQuantity(f"{max(1.0, left_s - 1):g} s")}
+        played = {"topic": topic, "start": start, "duration": in_seconds(max(1.0, left_s - 1))}
         return DraftStimulus("odometry", played, "decide: how long is nobody to publish before and after?")
     if carries_number(type_):
-        hold = DraftQuantity(f"{max(0.5, left_s // len(_VALUES)):g} s")
-        numbers = {
-            "topic": topic,
-            "type": type_,
-            "values": list(_VALUES),
-            "period": DraftQuantity("200 ms"),
-            "hold": hold,
-        }
-        return DraftStimulus("numbers", {**numbers, "start": start}, "decide: which values tell right from wrong?")
-    repeats = max(1, int(left_s) - 1)
-    given = {"topic": topic, "type": type_, "values": [{}], "period": DraftQuantity("1 s"), "repeats": repeats}
-    return DraftStimulus("messages", {**given, "start": start}, "decide: which fields? {} leaves all at their defaults")
+        times = {"period": DraftQuantity("200 ms"), "hold": in_seconds(max(0.5, left_s // len(_VALUES)))}
+        numbers = {"topic": topic, "type": type_, "values": list(_VALUES), **times, "start": start}
+        return DraftStimulus("numbers", numbers, "decide: which values tell right from wrong?")
+    repeated = {"period": in_seconds(1), "repeats": max(1, int(left_s) - 1)}
+    messages = {"topic": topic, "type": type_, "values": [{}], **repeated, "start": start}
+    return DraftStimulus("messages", messages, "decide: which fields? {} leaves all at their defaults")
 
 
 def _named(topic: str, type_: str, duration_s: float, values: Sequence[Mapping[str, object]]) -> DraftStimulus:
     """Spread the author's messages over the available time."""
     period_s = max(0.1, math.floor(10 * (duration_s - FIRST_S) / (len(values) + 1)) / 10)
-    period, start = DraftQuantity(f"{min(2.0, period_s):g} s"), DraftQuantity(f"{FIRST_S:g} s")
-    sent = {"topic": topic, "type": type_, "values": list(values), "period": period, "start": start}
+    times = {"period": in_seconds(min(2.0, period_s)), "start": in_seconds(FIRST_S)}
+    sent = {"topic": topic, "type": type_, "values": list(values), **times}
     return DraftStimulus("messages", sent, "decide: what else tells right from wrong?")
 
 
 def _services(trace: Trace) -> Iterator[DraftStimulus]:
     servers = {end.service for end in trace.service_ends("service")}
     for service, type_ in dict.fromkeys((e.service, e.type) for e in trace.service_ends("service")):
-        asked = {"service": service, "type": type_, "requests": [{}], "calls": _CALLS, "start": DraftQuantity("1 s")}
+        asked = {"service": service, "type": type_, "requests": [{}], "calls": _CALLS, "start": in_seconds(1)}
         yield DraftStimulus("calls", asked, "decide: which requests? {} leaves all fields at their defaults")
     for service, type_ in dict.fromkeys((e.service, e.type) for e in trace.service_ends("client")):
         if service not in servers:
-            given = {"service": service, "type": type_, "responses": [{}], "start": DraftQuantity("1 s")}
+            given = {"service": service, "type": type_, "responses": [{}], "start": in_seconds(1)}
             yield DraftStimulus("server", given, "decide: which responses? {} leaves all fields at their defaults")
 
 
 def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
     for node, name, _ in parameters(trace):
-        asked = {"name": name, **({"node": node} if node else {}), "start": DraftQuantity("1 s")}
+        asked = {"name": name, **({"node": node} if node else {}), "start": in_seconds(1)}
         yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: is it to be set as well?")
 
 

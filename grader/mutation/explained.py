@@ -2,40 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from grader.core.errors import RubricError
 from grader.core.exercise import Exercise
+from grader.rubrics.loader import NOTES
 from grader.rubrics.mistakes import mistakes_of, nearest
-from grader.rubrics.yaml_tree import Mistake, Position, TreePath, YamlSyntaxError, YamlTree, read_yaml
+from grader.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, read_yaml
 from grader.submissions.collected import listed, shown
 
 SCHEMA = "grader/selftest-notes/v1"
 MAX_BYTES = 256 * 1024
 _Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
+_Line = Annotated[_Text, AfterValidator(lambda text: " ".join(text.split()))]
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """An author's note on some mutants or variants.
-
-    Attributes:
-        because: The explanation; empty if the note names criteria.
-        criteria: Criteria that should detect such a mutant; empty if the note has an explanation.
-        where: Position in the file, for messages.
-    """
+    """An author's note on some mutants or variants."""
 
     pattern: str
-    because: str = ""
-    criteria: tuple[str, ...] = ()
-    where: str = ""
+    because: str = ""  # the explanation; empty if the note names criteria
+    criteria: tuple[str, ...] = ()  # criteria that should detect such a mutant; empty if the note has an explanation
+    where: str = ""  # position in the file, for messages
 
     def fits(self, id_: str) -> bool:
         """Whether the pattern matches a mutant or variant."""
@@ -49,50 +45,50 @@ class Explained:
     reference: Path | None = None
     template: Path | None = None
     template_score: Fraction | None = None
-    survivors: Sequence[Explanation] = field(default_factory=tuple)
-    expected: Sequence[Explanation] = field(default_factory=tuple)
-    variants: Sequence[Explanation] = field(default_factory=tuple)
+    survivors: Sequence[Explanation] = ()
+    expected: Sequence[Explanation] = ()
+    variants: Sequence[Explanation] = ()
     criteria: Mapping[str, str] = field(default_factory=dict)
 
 
 class _Shape(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid")
 
 
 class _Survivor(_Shape):
     mutants: _Text
-    because: _Text
+    because: _Line
 
 
 class _Expected(_Shape):
     mutants: _Text
-    killed_by: Annotated[tuple[_Text, ...], Field(min_length=1, strict=False)]
+    killed_by: tuple[_Text, ...] = Field(min_length=1)
 
 
 class _Variant(_Shape):
     variants: _Text
-    because: _Text
+    because: _Line
 
 
 class _Criterion(_Shape):
     criterion: _Text
-    because: _Text
+    because: _Line
 
 
 class _File(_Shape):
     schema_: Literal["grader/selftest-notes/v1"] = Field(alias="schema")
     reference: _Text | None = None
     template: _Text | None = None
-    template_score: Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False, strict=False)] | None = None
-    survivors: Annotated[tuple[_Survivor, ...], Field(strict=False)] = ()
-    expected: Annotated[tuple[_Expected, ...], Field(strict=False)] = ()
-    variants: Annotated[tuple[_Variant, ...], Field(strict=False)] = ()
-    criteria: Annotated[tuple[_Criterion, ...], Field(strict=False)] = ()
+    template_score: float | None = Field(default=None, ge=0, le=1_000_000, allow_inf_nan=False)
+    survivors: tuple[_Survivor, ...] = ()
+    expected: tuple[_Expected, ...] = ()
+    variants: tuple[_Variant, ...] = ()
+    criteria: tuple[_Criterion, ...] = ()
 
 
 def beside(rubric: Path) -> Path:
     """Return the path of the notes on a rubric: `NAME.selftest.yaml` beside `NAME.yaml`."""
-    return rubric.with_name(f"{rubric.stem}.selftest.yaml")
+    return rubric.with_suffix(NOTES)
 
 
 def read_explained(path: Path, exercise: Exercise) -> Explained:
@@ -107,32 +103,22 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
     mistakes = [*tree.mistakes, *_unknown_criteria(read, tree, exercise)]
     if mistakes:
         _refuse(path, mistakes)
-    return _explained(path, read, tree)
 
+    def where(*at: str | int) -> str:
+        place = tree.values[at]
+        return f"{shown(str(path), 500)}:{place.line}:{place.column}"
 
-def idle(explanations: Iterable[Explanation], needed: Callable[[Explanation], bool]) -> tuple[str, ...]:
-    """Return the unused patterns with their positions."""
-    return tuple(f"{e.where}: `{shown(e.pattern)}` explains nothing" for e in explanations if not needed(e))
-
-
-def _explained(path: Path, read: _File, tree: YamlTree) -> Explained:
+    survivors = (Explanation(s.mutants, s.because, (), where("survivors", n)) for n, s in enumerate(read.survivors))
+    expected = (Explanation(e.mutants, "", e.killed_by, where("expected", n)) for n, e in enumerate(read.expected))
+    variants = (Explanation(v.variants, v.because, (), where("variants", n)) for n, v in enumerate(read.variants))
     return Explained(
         reference=None if read.reference is None else path.parent / read.reference,
         template=None if read.template is None else path.parent / read.template,
         template_score=None if read.template_score is None else Fraction(str(read.template_score)),
-        survivors=tuple(
-            Explanation(one.mutants, _line(one.because), where=_where(path, tree, ("survivors", n)))
-            for n, one in enumerate(read.survivors)
-        ),
-        expected=tuple(
-            Explanation(one.mutants, criteria=one.killed_by, where=_where(path, tree, ("expected", n)))
-            for n, one in enumerate(read.expected)
-        ),
-        variants=tuple(
-            Explanation(one.variants, because=_line(one.because), where=_where(path, tree, ("variants", n)))
-            for n, one in enumerate(read.variants)
-        ),
-        criteria={one.criterion: _line(one.because) for one in read.criteria},
+        survivors=tuple(survivors),
+        expected=tuple(expected),
+        variants=tuple(variants),
+        criteria={one.criterion: one.because for one in read.criteria},
     )
 
 
@@ -157,29 +143,12 @@ def _refuse(path: Path, mistakes: Sequence[Mistake]) -> NoReturn:
     raise RubricError("\n".join(lines), next((m.hint for m in ordered if m.hint), ""))
 
 
-def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> list[Mistake]:
+def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> Iterator[Mistake]:
     known = [criterion.id for criterion in exercise.criteria]
-    named: list[tuple[str, TreePath]] = [
-        *(
-            (id_, ("expected", n, "killed_by", k))
-            for n, e in enumerate(read.expected)
-            for k, id_ in enumerate(e.killed_by)
-        ),
-        *((one.criterion, ("criteria", n, "criterion")) for n, one in enumerate(read.criteria)),
-    ]
-    return [
-        tree.values[at].mistake(
-            f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`", nearest(id_, known)
-        )
-        for id_, at in named
-        if id_ not in known
-    ]
-
-
-def _where(path: Path, tree: YamlTree, at: TreePath) -> str:
-    place: Position = tree.values[at]
-    return f"{shown(str(path), 500)}:{place.line}:{place.column}"
-
-
-def _line(text: str) -> str:
-    return " ".join(text.split())
+    named: dict[TreePath, str] = {("criteria", n, "criterion"): one.criterion for n, one in enumerate(read.criteria)}
+    for n, one in enumerate(read.expected):
+        named |= {("expected", n, "killed_by", k): id_ for k, id_ in enumerate(one.killed_by)}
+    for at, id_ in named.items():
+        if id_ not in known:
+            text = f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`"
+            yield tree.values[at].mistake(text, nearest(id_, known))

@@ -25,27 +25,17 @@ class Fate(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """The result of grading a program by a rubric.
-
-    Attributes:
-        outcomes: Criterion id -> outcome, in rubric order.
-        reasons: Criterion id -> reason, of criteria that are not fully met.
-    """
+    """The result of grading a program by a rubric."""
 
     score: Fraction
     max_score: Fraction
-    outcomes: Mapping[str, Outcome]
-    reasons: Mapping[str, str]
+    outcomes: Mapping[str, Outcome]  # criterion id -> outcome, in rubric order
+    reasons: Mapping[str, str]  # criterion id -> reason, of criteria that are not fully met
 
     @property
     def full(self) -> bool:
         """Whether every criterion is met."""
         return all(outcome is Outcome.MET for outcome in self.outcomes.values())
-
-    @property
-    def decided(self) -> bool:
-        """Whether no criterion is undecided."""
-        return Outcome.UNDECIDED not in self.outcomes.values()
 
     @property
     def turned(self) -> tuple[str, ...]:
@@ -57,7 +47,7 @@ class TrialResult:
         """The fate of a mutant with this result."""
         if any(outcome in (*_TURNED, Outcome.BLOCKED) for outcome in self.outcomes.values()):
             return Fate.KILLED
-        return Fate.SURVIVED if self.decided else Fate.UNDECIDED
+        return Fate.UNDECIDED if Outcome.UNDECIDED in self.outcomes.values() else Fate.SURVIVED
 
 
 def result_of(report: ExerciseReport) -> TrialResult:
@@ -72,21 +62,15 @@ def result_of(report: ExerciseReport) -> TrialResult:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A mutant or correct variant that was run.
+    """A mutant or correct variant that was run."""
 
-    Attributes:
-        id: Stable, readable id: `FILE:LINE:operator:detail`, or `FILE:variant` for a variant.
-        expected: Criteria one of which should detect it, according to the notes; empty if not given.
-        because: The explanation in the notes of why a mutant survives or a variant loses points.
-    """
-
-    id: str
+    id: str  # stable, readable id: `FILE:LINE:operator:detail`, or `FILE:variant` for a variant
     file: str
     operator: str
     change: str
     result: TrialResult
-    expected: tuple[str, ...] = ()
-    because: str = ""
+    expected: tuple[str, ...] = ()  # criteria one of which should detect it, according to the notes; empty if not given
+    because: str = ""  # the explanation in the notes of why a mutant survives or a variant loses points
 
     @property
     def fate(self) -> Fate:
@@ -101,13 +85,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class SelftestResult:
-    """The result of testing one rubric.
-
-    Attributes:
-        whole: Whether all mutants were run.
-        idle: Unused patterns of the notes, with their positions.
-        unturned: Criterion id -> why it detects no mutant, according to the notes.
-    """
+    """The result of testing one rubric."""
 
     rubric: str
     exercise: str
@@ -117,8 +95,9 @@ class SelftestResult:
     baseline: Fraction | None
     mutants: tuple[Trial, ...]
     variants: tuple[Trial, ...]
-    whole: bool = True
-    idle: tuple[str, ...] = field(default_factory=tuple)
+    whole: bool = True  # whether all mutants were run
+    idle: tuple[str, ...] = ()  # unused patterns of the notes, with their positions
+    # Criterion id -> why it detects no mutant, according to the notes
     unturned: Mapping[str, str] = field(default_factory=dict)
     recordings: int = 0
     duration_s: float = 0.0

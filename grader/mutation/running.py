@@ -25,11 +25,12 @@ from grader.execution.bag import Odometry
 from grader.execution.recording_session import RecordingSession, open_session
 from grader.execution.supervisor import Job
 from grader.judging.judge_run import judge_exercise
-from grader.mutation.explained import Explained, Explanation, beside, idle, read_explained
+from grader.mutation.explained import Explained, Explanation, beside, read_explained
 from grader.mutation.operators.mutants import mutants_of
 from grader.mutation.operators.program import Candidate, Program
 from grader.mutation.operators.variants import variants_of
 from grader.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, result_of
+from grader.submissions.collected import shown
 from grader.submissions.sources import read_sources
 from grader.submissions.submission import stage_submission
 
@@ -53,22 +54,13 @@ class TrialRunner:
     traces: dict[str, Trace] = field(default_factory=dict)
     recordings: int = 0
 
-    def measure_reference(self) -> TrialResult:
-        """Grade the reference solution, and keep its traces."""
-        result, self.traces = self._recorded(self.reference)
-        return result
-
-    def grade(self, submission: Submission) -> TrialResult:
-        """Grade a complete submission."""
-        return self._recorded(submission)[0]
-
-    def _recorded(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
+    def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
+        """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs(self.request, [self.exercise], submission, self.odometry, self.seed)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         self.recordings += len(recorded)
         traces = {scenario: trace for (_, scenario), trace in recorded.items()}
-        sources = read_sources(submission)
-        return result_of(judge_exercise(self.exercise, traces, submission, sources)), traces
+        return result_of(judge_exercise(self.exercise, traces, submission, read_sources(submission))), traces
 
     def grade_changed(self, candidates: Sequence[Candidate], label: str) -> Iterator[tuple[Candidate, TrialResult]]:
         """Grade changed programs; scenarios without the changed file reuse the traces of the reference."""
@@ -112,22 +104,15 @@ _MUTANTS_A_VARIANT = 4
 
 @dataclass(frozen=True, slots=True)
 class SelftestOptions:
-    """How to test rubrics.
+    """How to test rubrics."""
 
-    Attributes:
-        reference: Folder of reference solutions; None for the one in the notes beside a rubric.
-        template: Folder of templates; None for the one in the notes.
-        jobs: Scenarios recorded in parallel; None for a number that suits the machine.
-        only: Pattern for the ids to run, with `*` for anything; empty for all.
-        sample: Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all.
-        seed: Seed of the sample and of all drawn values; None derives the values from the reference solution.
-    """
-
-    reference: Path | None = None
-    template: Path | None = None
-    jobs: int | None = None
-    only: str = ""
+    reference: Path | None = None  # folder of reference solutions; None for the one in the notes beside a rubric
+    template: Path | None = None  # folder of templates; None for the one in the notes
+    jobs: int | None = None  # scenarios recorded in parallel; None for a number that suits the machine
+    only: str = ""  # pattern for the ids to run, with `*` for anything; empty for all
+    # Most mutants of a rubric, spread over the operators, with a quarter as many variants; None for all
     sample: int | None = None
+    # Seed of the sample and of all drawn values; None derives the values from the reference solution
     seed: int | None = None
     clock: str = "auto"
     isolation: str = "auto"
@@ -204,10 +189,10 @@ def _tested(path: Path, bench: TrialRunner, explained: Explained, options: Selft
     started = time.perf_counter()
     exercise = bench.exercise
     bench.progress(f"{exercise.id}: reference and template")
-    reference = bench.measure_reference()
+    reference, bench.traces = bench.grade(bench.reference)
     template = None
     if explained.template is not None:
-        template = bench.grade(_staged(explained.template, exercise, bench.session, "template"))
+        template, _ = bench.grade(_staged(explained.template, exercise, bench.session, "template"))
     # Without a correct program, results of wrong ones are meaningless.
     tried = tuple(_mutants(bench, explained, options)) if reference.full else ()
     correct = tuple(_variants(bench, explained, options)) if reference.full else ()
@@ -233,9 +218,8 @@ def _mutants(bench: TrialRunner, explained: Explained, options: SelftestOptions)
     """Run the selected mutants."""
     made = (mutant for name in bench.exercise.files for mutant in mutants_of(bench.sources[name], name))
     for trial in _trials(bench, made, "mutant", options, options.sample):
-        because = _first(explained.survivors, trial.id) if trial.fate is Fate.SURVIVED else None
-        expected = _first(explained.expected, trial.id)
-        yield replace(trial, because=because.because if because else "", expected=expected.criteria if expected else ())
+        because = _first(explained.survivors, trial.id).because if trial.fate is Fate.SURVIVED else ""
+        yield replace(trial, because=because, expected=_first(explained.expected, trial.id).criteria)
 
 
 def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions) -> Iterator[Trial]:
@@ -243,8 +227,8 @@ def _variants(bench: TrialRunner, explained: Explained, options: SelftestOptions
     made = (variant for name in bench.exercise.files for variant in variants_of(bench.sources[name], name))
     most = None if options.sample is None else -(-options.sample // _MUTANTS_A_VARIANT)
     for trial in _trials(bench, made, "variant", options, most):
-        because = _first(explained.variants, trial.id) if trial.fate is Fate.KILLED else None
-        yield replace(trial, because=because.because if because else "")
+        because = _first(explained.variants, trial.id).because if trial.fate is Fate.KILLED else ""
+        yield replace(trial, because=because)
 
 
 def _trials(
@@ -272,19 +256,21 @@ def _sampled(candidates: Sequence[Candidate], most: int | None, seed: int) -> li
     return [candidate for candidate in candidates if candidate.id in kept]
 
 
-def _first(explanations: Iterable[Explanation], id_: str) -> Explanation | None:
-    return next((explanation for explanation in explanations if explanation.fits(id_)), None)
+def _first(explanations: Iterable[Explanation], id_: str) -> Explanation:
+    """Return the first note that fits; an empty one if none does."""
+    return next((explanation for explanation in explanations if explanation.fits(id_)), Explanation(""))
 
 
 def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Trial]) -> tuple[str, ...]:
     """Return the explanations in the notes that nothing needs."""
-    survived = [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]
-    lost = [trial.id for trial in variants if trial.fate is Fate.KILLED]
-    every = [trial.id for trial in mutants]
+    concerned = (
+        (explained.survivors, [trial.id for trial in mutants if trial.fate is Fate.SURVIVED]),
+        (explained.expected, [trial.id for trial in mutants]),
+        (explained.variants, [trial.id for trial in variants if trial.fate is Fate.KILLED]),
+    )
+    unused = (note for notes, ids in concerned for note in notes if not any(map(note.fits, ids)))
     turned = {id_ for trial in mutants for id_ in trial.result.turned}
     return (
-        *idle(explained.survivors, lambda e: any(map(e.fits, survived))),
-        *idle(explained.expected, lambda e: any(map(e.fits, every))),
-        *idle(explained.variants, lambda e: any(map(e.fits, lost))),
+        *(f"{note.where}: `{shown(note.pattern)}` explains nothing" for note in unused),
         *(f"{id_}: the notes say why no mutant turns it, but some do" for id_ in explained.criteria if id_ in turned),
     )

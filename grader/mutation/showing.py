@@ -54,9 +54,8 @@ def _result(console: Console, result: SelftestResult) -> None:
         return
     console.print(f"  mutants    {_count(result)}")
     lost = len(result.marked_down)
-    console.print(
-        f"  variants   {len(result.variants)} correct ones, {lost or 'none'} marked down", style=_BAD if lost else ""
-    )
+    variants = f"{len(result.variants)} correct ones, {lost or 'none'} marked down"
+    console.print(f"  variants   {variants}", style=_BAD if lost else "")
     console.print(f"  recorded   {result.recordings} scenarios in {result.duration_s:.0f} s")
     console.print()
     console.print(_operators(result))
@@ -80,9 +79,8 @@ def _count(result: SelftestResult) -> str:
     explained = sum(bool(trial.because) for trial in result.mutants)
     counts = f"{len(fates)} tried, {fates.count(Fate.KILLED)} killed, {len(result.survivors)} survived"
     undecided = f", {fates.count(Fate.UNDECIDED)} undecided" if Fate.UNDECIDED in fates else ""
-    return f"{counts}, {explained} survived for a reason{undecided}" + (
-        "" if result.whole else " (not all that there are)"
-    )
+    partial = "" if result.whole else " (not all that there are)"
+    return f"{counts}, {explained} survived for a reason{undecided}{partial}"
 
 
 def _operators(result: SelftestResult) -> Table:
@@ -94,15 +92,9 @@ def _operators(result: SelftestResult) -> Table:
         predicted = [trial for trial in killed if trial.expected]
         right = sum(trial.as_expected for trial in predicted)
         survived = sum(trial.fate is Fate.SURVIVED and not trial.because for trial in own)
-        row = [
-            len(own),
-            len(killed),
-            right,
-            len(predicted) - right,
-            sum(bool(t.because) for t in own),
-            _undecided(own),
-            survived,
-        ]
+        excused = sum(bool(trial.because) for trial in own)
+        undecided = sum(trial.fate is Fate.UNDECIDED for trial in own)
+        row = (len(own), len(killed), right, len(predicted) - right, excused, undecided, survived)
         table.add_row(name, *(str(number or "") for number in row), style=_BAD if survived else "")
     return table
 
@@ -161,10 +153,6 @@ def _score(result: TrialResult) -> str:
 
 def _points(points: Fraction) -> str:
     return f"{round(float(points), 3):g}"
-
-
-def _undecided(trials: Sequence[Trial]) -> int:
-    return sum(trial.fate is Fate.UNDECIDED for trial in trials)
 
 
 def results_to_json(results: Sequence[SelftestResult]) -> str:

@@ -92,7 +92,8 @@ _BY_KIND: Mapping[str, object] = {
     "fields": Fields,
 }
 
-_PARAMETER = re.compile(r"^ {4}(?P<name>\w+): (?P<meaning>.*)$")
+#: A name, and its meaning on the same line and the lines below that are indented further.
+_PARAMETER = re.compile(r"^ {4}(\w+): (.*(?:\n(?: {8}.*| *$))*)", re.MULTILINE)
 _HEADING = "Attributes:"
 
 
@@ -132,12 +133,8 @@ def _parameters(cls: type) -> type[Shape]:
 def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:
     """Return the model of a dataclass that is part of a scenario; rubrics omit the units in field names.
 
-    Args:
-        cls: The dataclass.
-        name: Name of the model in the JSON Schema.
-        aliases: Rubric names of fields, where they differ.
-        usual: Defaults shown in the JSON Schema, where they differ from those of the dataclass; a required field gets
-            this default.
+    `aliases` holds rubric names of fields, where they differ, and `usual` the defaults that the JSON Schema shows,
+    where they differ from those of the dataclass; a required field gets this default.
     """
     hints = get_type_hints(cls, include_extras=True)
     fields: dict[str, Any] = {}
@@ -221,19 +218,5 @@ def manual_of(kind: type) -> Manual:
     known = "" if written.startswith(f"{kind.__name__}(") else written
     text, _, attributes = inspect.cleandoc(known).partition(_HEADING)
     paragraphs = [" ".join(p.split()) for p in text.split("\n\n") if p.strip()]
-    return Manual(paragraphs[0] if paragraphs else "", "\n".join(paragraphs[1:]), _parameter_meanings(attributes))
-
-
-def _parameter_meanings(text: str) -> dict[str, str]:
-    found: dict[str, str] = {}
-    name = ""
-    for line in text.split("\n"):
-        start = _PARAMETER.match(line)
-        if start is not None:
-            name = start["name"]
-            found[name] = start["meaning"].strip()
-        elif name and line.startswith(" " * 8):
-            found[name] += f" {line.strip()}"
-        elif line.strip():
-            name = ""
-    return found
+    meanings = {name: " ".join(meaning.split()) for name, meaning in _PARAMETER.findall(attributes)}
+    return Manual(paragraphs[0] if paragraphs else "", "\n".join(paragraphs[1:]), meanings)

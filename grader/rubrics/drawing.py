@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from types import GenericAlias
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, Union
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import Self, TypeAliasType
@@ -120,14 +120,22 @@ _TWO = "two of them, the lower one first"
 _TWO_COUNTS = f"two whole numbers from 0 to {CASES:,}, the lower one first"
 
 
-class DrawnTimeShape(Shape):
+class _Drawn(Shape):
+    """Two limits between which the seed draws a value, as a class of the core holds them."""
+
+    made: ClassVar[type]
+    between: tuple[Any, Any]
+
+    def built(self) -> Any:
+        """Return the draw as a scenario holds it."""
+        return self.made(*self.between)
+
+
+class DrawnTimeShape(_Drawn):
     """A time that is drawn from the seed."""
 
+    made = TimeBetween
     between: Annotated[tuple[Duration, Duration], must(_rising, _TWO)]
-
-    def built(self) -> TimeBetween:
-        """Return the time as a scenario holds it."""
-        return TimeBetween(*self.between)
 
 
 class DrawnLongTimeShape(DrawnTimeShape):
@@ -136,14 +144,11 @@ class DrawnLongTimeShape(DrawnTimeShape):
     between: Annotated[tuple[LongDuration, LongDuration], must(_rising, _TWO)]
 
 
-class DrawnCountShape(Shape):
+class DrawnCountShape(_Drawn):
     """A count that is drawn from the seed."""
 
+    made = CountBetween
     between: Annotated[tuple[Whole, Whole], must(lambda pair: 0 <= pair[0] < pair[1] <= CASES, _TWO_COUNTS)]
-
-    def built(self) -> CountBetween:
-        """Return the count as a scenario holds it."""
-        return CountBetween(*self.between)
 
 
 def drawn_or_not(value: object) -> str:
@@ -152,16 +157,15 @@ def drawn_or_not(value: object) -> str:
 
 
 _Count = Annotated[Whole, must(lambda n: 0 <= n <= CASES, f"a whole number from 0 to {CASES:,}")]
-SomeTime = Annotated[
-    Annotated[Duration, Tag("<fixed>")] | Annotated[DrawnTimeShape, Tag("<drawn>")], Discriminator(drawn_or_not)
+_Fixed = TypeVar("_Fixed")
+_Varying = TypeVar("_Varying")
+#: A fixed value, or a mapping that says how it is drawn.
+_Either = Annotated[
+    Annotated[_Fixed, Tag("<fixed>")] | Annotated[_Varying, Tag("<drawn>")], Discriminator(drawn_or_not)
 ]
-SomeLongTime = Annotated[
-    Annotated[LongDuration, Tag("<fixed>")] | Annotated[DrawnLongTimeShape, Tag("<drawn>")],
-    Discriminator(drawn_or_not),
-]
-SomeCount = Annotated[
-    Annotated[_Count, Tag("<fixed>")] | Annotated[DrawnCountShape, Tag("<drawn>")], Discriminator(drawn_or_not)
-]
+SomeTime = _Either[Duration, DrawnTimeShape]
+SomeLongTime = _Either[LongDuration, DrawnLongTimeShape]
+SomeCount = _Either[_Count, DrawnCountShape]
 
 
 class _CasesShape(Shape):
@@ -258,9 +262,7 @@ class DrawnShape(Choice):
         return JustAbove(value) if kind == "just_above" else JustBelow(value)
 
 
-NumberShape = Annotated[
-    Annotated[Real, Tag("<fixed>")] | Annotated[DrawnShape, Tag("<drawn>")], Discriminator(drawn_or_not)
-]
+NumberShape = _Either[Real, DrawnShape]
 
 
 def _count_to(most: int) -> AfterValidator:
@@ -271,10 +273,7 @@ _DRAWN_CALLS = must(
     lambda drawn: 1 <= drawn.between[0] < drawn.between[1] <= CALLS,
     f"two whole numbers from 1 to {CALLS:,}, the lower one first",
 )
-Calls = Annotated[
-    Annotated[Whole, _count_to(CALLS), Tag("<fixed>")] | Annotated[DrawnCountShape, _DRAWN_CALLS, Tag("<drawn>")],
-    Discriminator(drawn_or_not),
-]
+Calls = _Either[Annotated[Whole, _count_to(CALLS)], Annotated[DrawnCountShape, _DRAWN_CALLS]]
 Clients = Annotated[Whole, _count_to(CLIENTS)]
 _NEVER = AfterValidator(lambda value: value or 0)
 TimeOrNever = Annotated[LongDuration | None, _NEVER]

@@ -12,7 +12,7 @@ from typing import NoReturn, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from grader.core.errors import RubricError
-from grader.core.exercise import Check, Criterion, Exercise, Feedback, Variant
+from grader.core.exercise import Check, Criterion, Exercise, Variant
 from grader.core.limits import Limits
 from grader.core.quantities import duration
 from grader.core.scenario import (
@@ -63,32 +63,29 @@ def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
 def _repeated(names: Sequence[str], path: TreePath, tree: YamlTree, key: str = "") -> Iterator[Mistake]:
     for index, name in enumerate(names):
         if name in names[:index]:
-            where = tree.values.get((*path, index, key) if key else (*path, index), TOP)
-            what = f"each {key or 'name'} in `{path[-1]}` once"
-            yield where.mistake(f"expected {what}, found `{shown(name)}` again")
+            text = f"expected each {key or 'name'} in `{path[-1]}` once, found `{shown(name)}` again"
+            yield tree.at((*path, index, key) if key else (*path, index)).mistake(text)
 
 
-def _unknown(
-    name: str, known: Iterable[str], what: str, path: TreePath, places: Mapping[TreePath, Position]
-) -> Iterator[Mistake]:
+def _unknown(name: str, known: Iterable[str], what: str, where: Position) -> Iterator[Mistake]:
     known = list(dict.fromkeys(known))
     if name not in known:
         text = f"expected {what} ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
-        yield places.get(path, TOP).mistake(text, nearest(name, known))
+        yield where.mistake(text, nearest(name, known))
 
 
 def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("scenarios", index)
     yield from _repeated(scenario.processes, (*path, "processes"), tree)
     for number, process in enumerate(scenario.processes):
-        yield from _unknown(process, files, "one of `files`", (*path, "processes", number), tree.values)
+        yield from _unknown(process, files, "one of `files`", tree.at((*path, "processes", number)))
     yield from _repeated(scenario.may_exit, (*path, "may_exit"), tree)
     known, what = scenario.processes, "one of `processes`"
     for number, process in enumerate(scenario.may_exit):
-        yield from _unknown(process, known, what, (*path, "may_exit", number), tree.values)
+        yield from _unknown(process, known, what, tree.at((*path, "may_exit", number)))
     observed: Span = build(scenario.observe)
     for process, start in scenario.start.items():
-        yield from _unknown(process, known, what, (*path, "start", process), tree.keys)
+        yield from _unknown(process, known, what, tree.at_key((*path, "start", process)))
         yield from _too_late(build(start), observed, (*path, "start", process), tree)
     for number, shape in enumerate(scenario.stimuli):
         stimulus = build(shape)
@@ -98,16 +95,16 @@ def _in_scenario(scenario: ScenarioShape, index: int, files: Sequence[str], tree
 
 def _too_late(start: Time, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     if longest(start) >= shortest(observed.duration_ns) and observed.after_first_message_on is None:
-        yield tree.values.get(path, TOP).mistake("expected a start before the end of `observe`")
+        yield tree.at(path).mistake("expected a start before the end of `observe`")
 
 
 def _in_stimulus(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
     yield from _too_late(stimulus.start_ns, observed, (*path, "start"), tree)
     if isinstance(stimulus, NumberStream) and shortest(stimulus.hold_ns) < stimulus.period_ns:
         text = "expected each number to be held for at least one period, found a shorter `hold`"
-        yield tree.values.get((*path, "hold"), TOP).mistake(text)
+        yield tree.at((*path, "hold")).mistake(text)
     if 0 < getattr(stimulus, "stop_ns", 0) <= longest(stimulus.start_ns):
-        yield tree.values.get((*path, "stop"), TOP).mistake("expected a stop after the start")
+        yield tree.at((*path, "stop")).mistake("expected a stop after the start")
 
 
 def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -116,20 +113,20 @@ def _cut_off(stimulus: Stimulus, observed: Span, path: TreePath, tree: YamlTree)
     if (isinstance(time, TimeBetween) or is_open(stimulus)) and needed_ns > shortest(time):
         text = f"expected at least {duration(needed_ns)}, so that every case comes whatever is drawn, found "
         text += f"{'as little as ' if isinstance(time, TimeBetween) else ''}{duration(shortest(time))}"
-        yield tree.values.get(path, TOP).mistake(text)
+        yield tree.at(path).mistake(text)
 
 
 def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("criteria", index)
     scenarios = {scenario.id: scenario for scenario in rubric.scenarios}
-    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", (*path, "scenario"), tree.values)
+    yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", tree.at((*path, "scenario")))
     yield from _needs(criterion, index, rubric, tree)
     name, parameters = criterion.check.chosen
     process = parameters.model_dump(by_alias=True).get("process")
     if isinstance(process, str) and criterion.scenario in scenarios:
         known = scenarios[criterion.scenario].processes
         what = f"a process of the scenario {criterion.scenario}"
-        yield from _unknown(process, known, what, (*path, "check", name, "process"), tree.values)
+        yield from _unknown(process, known, what, tree.at((*path, "check", name, "process")))
 
 
 def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
@@ -138,7 +135,7 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
     earlier = [other.id for other in rubric.criteria[:index]]
     yield from _repeated(criterion.needs, path, tree)
     for number, need in enumerate(criterion.needs):
-        where = tree.values.get((*path, number), TOP)
+        where = tree.at((*path, number))
         if need == criterion.id:
             yield where.mistake(f"expected an earlier criterion, found `{need}` itself")
         elif need in (other.id for other in rubric.criteria[index:]):
@@ -146,7 +143,7 @@ def _needs(criterion: CriterionShape, index: int, rubric: RubricShape, tree: Yam
         elif not earlier:
             yield where.mistake(f"expected no needs in the first criterion, found `{need}`")
         else:
-            yield from _unknown(need, earlier, "the id of an earlier criterion", (*path, number), tree.values)
+            yield from _unknown(need, earlier, "the id of an earlier criterion", tree.at((*path, number)))
 
 
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -189,9 +186,6 @@ def read_rubric(
         checks: Checks that the rubric may use, besides its own.
         submissions: Folders that students write to: checks are never loaded from there.
         draw: Chooses the values of variants; without it, a rubric with variants is rejected.
-
-    Returns:
-        The exercise.
 
     Raises:
         RubricError: The file cannot be read, or has mistakes; one line each, in the order of the file.
@@ -274,7 +268,7 @@ def _own_names(path: Path, tree: YamlTree) -> tuple[str, ...]:
     wrong = [(n, name) for n, name in enumerate(names) if re.fullmatch(CHECK_FILE, name) is None]
     if wrong:
         text = "expected a Python file in the rubric's folder such as my_checks.py, found"
-        _refuse(path, [tree.values.get(("checks", n), TOP).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
+        _refuse(path, [tree.at(("checks", n)).mistake(f"{text} `{shown(name)}`") for n, name in wrong])
     return names
 
 
@@ -330,22 +324,18 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
             where = tree.keys[("criteria", index, "check", name)]
             mistakes.append(where.mistake(f"`{name}` cannot be asked like this: {shown(str(error), 200)}"))
             continue
-        yield _criterion(shape, check, feedback_of(shape.feedback, feedback_of(rubric.feedback)))
-
-
-def _criterion(shape: CriterionShape, check: Check, feedback: Feedback) -> Criterion:
-    return Criterion(
-        id=shape.id,
-        title=shape.title,
-        points=shape.points,
-        scenario=shape.scenario,
-        check=check,
-        needs=shape.needs,
-        hint=" ".join((shape.hint or "").split()),
-        chapter=" ".join((shape.chapter or "").split()),
-        feedback=feedback,
-        check_name=shape.check.chosen[0],
-    )
+        yield Criterion(
+            id=shape.id,
+            title=shape.title,
+            points=shape.points,
+            scenario=shape.scenario,
+            check=check,
+            needs=shape.needs,
+            hint=" ".join((shape.hint or "").split()),
+            chapter=" ".join((shape.chapter or "").split()),
+            feedback=feedback_of(shape.feedback, feedback_of(rubric.feedback)),
+            check_name=name,
+        )
 
 
 def _scenario(shape: ScenarioShape, limits: Limits) -> Scenario:

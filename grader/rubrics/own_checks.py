@@ -40,13 +40,9 @@ class OwnFile:
 def own_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
     """Return the check files that a rubric names, without running them.
 
-    Args:
-        rubric: The rubric; the files must be in its folder or below.
-        names: As written in the rubric.
-        never_in: Folders that students write to: files there are never run as checks.
-
     Raises:
-        RubricError: A file is missing, too large, outside the rubric's folder, or where students write.
+        RubricError: A file is missing, too large, neither in the rubric's folder nor below, or in one of the folders
+            `never_in`, which students write to.
     """
     return tuple(_own_file(rubric, name, never_in) for name in dict.fromkeys(names))
 
@@ -173,11 +169,8 @@ def _problems(file: OwnFile, table: Mapping[str, object], taken: Mapping[str, ty
         elif name in taken:
             yield f"{where}:{line}: expected a name of its own, found `{name}`, which is taken"
         elif wrong := _no_check(kind):
-            yield f"{where}:{lines.get(f'class {_class_name(kind)}', line)}: `{name}`: {wrong}"
-
-
-def _class_name(kind: object) -> str:
-    return kind.__name__ if isinstance(kind, type) else ""
+            class_line = lines.get(f"class {kind.__name__}", line) if isinstance(kind, type) else line
+            yield f"{where}:{class_line}: `{name}`: {wrong}"
 
 
 def _no_check(kind: object) -> str:

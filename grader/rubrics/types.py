@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
 
+from annotated_types import GroupedMetadata
 from pydantic import (
     AfterValidator,
     AllowInfNan,
     BaseModel,
     BeforeValidator,
     ConfigDict,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
     PlainValidator,
     Strict,
     WithJsonSchema,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import PydanticCustomError
 from typing_extensions import Self
 
 from grader.core.quantities import Unit
@@ -90,41 +88,30 @@ def build(value: object) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class MatchingText:
+class MatchingText(GroupedMetadata):
     """Marks a text that must match a pattern, which means the same in Python and in JavaScript, as a whole."""
 
     pattern: str
     expected: str
     example: str
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check the text after its type."""
-        return core_schema.no_info_after_validator_function(self._check, core_schema.str_schema(strict=True))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the text to editors."""
-        return {"type": "string", "pattern": f"^(?:{self.pattern})$", "examples": [self.example]}
-
-    def _check(self, text: str) -> str:
-        if re.fullmatch(self.pattern, text) is None:
-            raise wrong(self.expected)
-        return text
+    def __iter__(self) -> Iterator[object]:
+        yield Strict()
+        yield must(lambda text: re.fullmatch(self.pattern, text) is not None, self.expected)
+        yield WithJsonSchema({"type": "string", "pattern": f"^(?:{self.pattern})$", "examples": [self.example]})
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class Quantity(GroupedMetadata):
     """Marks a number that is written with its unit; `above_zero` excludes 0."""
 
     unit: Unit
     above_zero: bool = False
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Parse the text instead of pydantic's own validation."""
-        return core_schema.no_info_plain_validator_function(self._read)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the text to editors."""
-        return {"type": "string", "pattern": quantity_pattern(self.unit), "examples": [quantity_example(self.unit)]}
+    def __iter__(self) -> Iterator[object]:
+        pattern, example = quantity_pattern(self.unit), quantity_example(self.unit)
+        yield PlainValidator(self._read)
+        yield WithJsonSchema({"type": "string", "pattern": pattern, "examples": [example]})
 
     def _read(self, value: object) -> int | float:
         try:

@@ -28,7 +28,7 @@ class _Kind:
 
     noun: str
     example: str
-    units: Mapping[str, Fraction]
+    units: Mapping[str, int]
     spellings: Mapping[str, str]
     usual: tuple[str, ...]
     whole: str = ""
@@ -38,14 +38,7 @@ _KINDS: Mapping[str, _Kind] = {
     "s": _Kind(
         noun="a duration",
         example="10 s",
-        units={
-            "h": Fraction(3600 * NS_PER_S),
-            "min": Fraction(60 * NS_PER_S),
-            "s": Fraction(NS_PER_S),
-            "ms": Fraction(NS_PER_MS),
-            "us": Fraction(1000),
-            "ns": Fraction(1),
-        },
+        units={"h": 3600 * NS_PER_S, "min": 60 * NS_PER_S, "s": NS_PER_S, "ms": NS_PER_MS, "us": 1000, "ns": 1},
         spellings={
             **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
             **dict.fromkeys(("m", "mins", "minute", "minutes"), "min"),
@@ -59,14 +52,14 @@ _KINDS: Mapping[str, _Kind] = {
     "Hz": _Kind(
         noun="a frequency",
         example="20 Hz",
-        units={"kHz": Fraction(1000), "Hz": Fraction(1)},
+        units={"kHz": 1000, "Hz": 1},
         spellings={"hertz": "Hz", "kilohertz": "kHz"},
         usual=("Hz",),
     ),
     "B": _Kind(
         noun="a size",
         example="512 MiB",
-        units={"GiB": Fraction(GIB), "MiB": Fraction(MIB), "KiB": Fraction(KIB), "B": Fraction(1)},
+        units={"GiB": GIB, "MiB": MIB, "KiB": KIB, "B": 1},
         spellings={
             **dict.fromkeys(("byte", "bytes"), "B"),
             **dict.fromkeys(("k", "kb", "kilobytes"), "KiB"),
@@ -84,11 +77,7 @@ _QUANTITY = re.compile(rf"(?P<sign>[-+\N{{MINUS SIGN}}]?)(?P<number>{_NUMBER})\s
 
 
 def parse_quantity(text: str, unit: Unit) -> int | float:
-    """Parse a quantity with its unit.
-
-    Args:
-        text: Number and unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
-        unit: The expected dimension, named by its base unit.
+    """Parse a quantity with its unit, e.g. `200 ms`; no exponent, blanks around and between them are allowed.
 
     Returns:
         Whole nanoseconds for `Unit("s")`, whole bytes for `Unit("B")`, a float in hertz for `Unit("Hz")`; at least 0.
@@ -102,8 +91,11 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         raise QuantityError(f"{kind.noun} such as `{kind.example}`")
     if found["sign"] not in ("", "+"):
         raise QuantityError(f"{kind.noun} of at least 0")
-    factor = _factor(found["number"], found["unit"], unit.symbol)
-    value = Fraction(found["number"].rstrip(".")) * factor
+    if not found["unit"]:
+        raise missing_unit(found["number"], unit.symbol)
+    if found["unit"] not in kind.units:
+        raise _unknown_unit(found["number"], found["unit"], kind)
+    value = Fraction(found["number"].rstrip(".")) * kind.units[found["unit"]]
     if kind.whole and value.denominator != 1:
         raise QuantityError(f"a whole number of {kind.whole}")
     try:
@@ -112,16 +104,11 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
         raise QuantityError(f"{kind.noun} that a float can hold") from None
 
 
-def _factor(number: str, written: str, symbol: str) -> Fraction:
-    kind = _KINDS[symbol]
-    if not written:
-        raise missing_unit(number, symbol)
-    if written in kind.units:
-        return kind.units[written]
+def _unknown_unit(number: str, written: str, kind: _Kind) -> QuantityError:
     known = {name.casefold(): name for name in kind.units} | dict(kind.spellings)
     nearest = known.get(written.casefold())
     hint = f"write `{shown(number, 30)} {nearest}`" if nearest else ""
-    raise QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
+    return QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
 
 
 def missing_unit(number: str, symbol: str) -> QuantityError:
@@ -142,7 +129,7 @@ def format_quantity(value: int | float, unit: Unit) -> str:
         return f"{digits.removesuffix('.0')} {unit.symbol}"
     if value == 0:
         return f"0 {unit.symbol}"
-    name, count = next((n, int(value / f)) for n, f in kind.units.items() if int(value) % f == 0)
+    name, count = next((n, int(value) // f) for n, f in kind.units.items() if int(value) % f == 0)
     return f"{count} {name}"
 
 

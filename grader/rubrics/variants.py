@@ -17,7 +17,7 @@ from typing_extensions import Self
 from grader.core.exercise import Drawn, Value, Variant
 from grader.rubrics.mistakes import nearest
 from grader.rubrics.types import Id, Shape, must, wrong
-from grader.rubrics.yaml_tree import TOP, Mistake, TreePath, YamlTree
+from grader.rubrics.yaml_tree import Mistake, TreePath, YamlTree
 from grader.submissions.collected import listed, shown
 
 #: Key of a placeholder for a value: `{variant: rate}`.
@@ -222,13 +222,13 @@ def with_values(tree: YamlTree, values: Mapping[str, Value]) -> YamlTree:
     data = replaced(tree.data, ())
     for name in values:
         if name not in used:
-            where = tree.keys.get(("variants", name), TOP)
-            mistakes.append(where.mistake(f"expected `{{variant: {name}}}` somewhere in the rubric, found none"))
+            text = f"expected `{{variant: {name}}}` somewhere in the rubric, found none"
+            mistakes.append(tree.at_key(("variants", name)).mistake(text))
     return replace(tree, data=data, mistakes=mistakes)
 
 
 def _misuse(name: str, path: TreePath, known: Mapping[str, Value], tree: YamlTree) -> Iterator[Mistake]:
-    where = tree.values.get(path, TOP)
+    where = tree.at(path)
     if name not in known:
         names = listed([f"`{one}`" for one in known])
         yield where.mistake(f"expected one of `variants` ({names}), found `{shown(name)}`", nearest(name, known))

@@ -54,18 +54,21 @@ def end_of(text: str) -> Position:
 
 @dataclass(slots=True)
 class YamlTree:
-    """A parsed document.
-
-    Attributes:
-        values: Position of each value.
-        keys: Position of the key of each value in a mapping.
-        mistakes: Invalid parts: duplicate keys, keys that are not text, unknown tags.
-    """
+    """A parsed document."""
 
     data: object = None
-    values: dict[TreePath, Position] = field(default_factory=dict)
-    keys: dict[TreePath, Position] = field(default_factory=dict)
+    values: dict[TreePath, Position] = field(default_factory=dict)  # position of each value
+    keys: dict[TreePath, Position] = field(default_factory=dict)  # position of the key of each value in a mapping
+    # Invalid parts: duplicate keys, keys that are not text, unknown tags
     mistakes: list[Mistake] = field(default_factory=list)
+
+    def at(self, path: TreePath) -> Position:
+        """Return the position of a value; the top of the file if it is not there."""
+        return self.values.get(path, TOP)
+
+    def at_key(self, path: TreePath) -> Position:
+        """Return the position of the key of a value; the top of the file if it is not there."""
+        return self.keys.get(path, TOP)
 
 
 class YamlSyntaxError(Exception):
@@ -78,9 +81,6 @@ class YamlSyntaxError(Exception):
 
 def read_yaml(text: str) -> YamlTree:
     """Parse one YAML 1.2 document, whose size the caller limits; the data of an empty document is None.
-
-    Returns:
-        The tree; `data` is None for an empty document.
 
     Raises:
         YamlSyntaxError: Not valid YAML, several documents, or nested or expanded beyond the limits.

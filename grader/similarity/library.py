@@ -26,35 +26,25 @@ class ComparedProgram:
 
 @dataclass(frozen=True, slots=True)
 class Handed:
-    """The programs of one submission.
-
-    Attributes:
-        programs: Its Python files that can be compared.
-        passed_over: Files that cannot be compared, and why; one sentence each.
-        own: Names of other submissions by the same person, which are not compared with it.
-    """
+    """The programs of one submission."""
 
     name: str
     label: str
-    programs: tuple[ComparedProgram, ...]
-    passed_over: tuple[str, ...] = ()
-    own: tuple[str, ...] = ()
+    programs: tuple[ComparedProgram, ...]  # its Python files that can be compared
+    passed_over: tuple[str, ...] = ()  # files that cannot be compared, and why; one sentence each
+    own: tuple[str, ...] = ()  # names of other submissions by the same person, which are not compared with it
     reported: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One file of a pair.
-
-    Attributes:
-        share: How much of its own code is in the other file too, 0 to 1; own is what is left without the given code and
-            the common code.
-        alike: Lines whose code is also in the other file.
-    """
+    """One file of a pair."""
 
     program: ComparedProgram
+    # How much of its own code is in the other file too, 0 to 1; own is what is left without the given code and the
+    # common code
     share: float
-    alike: Lines
+    alike: Lines  # lines whose code is also in the other file
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,20 +91,13 @@ class SameText:
 
 @dataclass(frozen=True, slots=True)
 class Similar:
-    """The similar submissions of a class.
-
-    Attributes:
-        pairs: Similar pairs, the most similar first.
-        same: Files handed in more than once, the most frequent first.
-        given: Submission and name of each unchanged handed-out file.
-        common_from: Code in more submissions than this is ignored as common.
-    """
+    """The similar submissions of a class."""
 
     handed: Sequence[Handed]
-    pairs: tuple[Pair, ...]
-    same: tuple[SameText, ...] = ()
-    given: tuple[tuple[Handed, str], ...] = ()
-    common_from: int = 0
+    pairs: tuple[Pair, ...]  # similar pairs, the most similar first
+    same: tuple[SameText, ...] = ()  # files handed in more than once, the most frequent first
+    given: tuple[tuple[Handed, str], ...] = ()  # submission and name of each unchanged handed-out file
+    common_from: int = 0  # code in more submissions than this is ignored as common
     threshold: float = 0.0
     least_share: float = 0.0
     given_files: tuple[str, ...] = ()
@@ -132,16 +115,11 @@ class TooSlow(Exception):  # noqa: N818  reads well in except clauses
 
 @dataclass(slots=True)
 class Print:
-    """The fingerprint of one file.
+    """The fingerprint of one file."""
 
-    Attributes:
-        pieces: Hash of the piece that begins at each character; comparable only within this process.
-        skipped: Number of leading empty lines, which the library skips.
-    """
-
-    pieces: list[int]
+    pieces: list[int]  # hash of the piece that begins at each character; comparable only within this process
     fingerprint: Any
-    skipped: int
+    skipped: int  # number of leading empty lines, which the library skips
 
     def keep(self, shared: Collection[int], own: Collection[int]) -> None:
         """Count only the pieces in `own` as the file's own code, and compare only those of them in `shared`."""

@@ -42,15 +42,10 @@ FEWER = "pack only your own .py files"
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A member of an archive, not yet unpacked.
+    """A member of an archive, not yet unpacked."""
 
-    Attributes:
-        name: Name in the archive, with `/` between the parts and none at the end; may be hostile.
-        kind: `FILE`, `FOLDER`, or words for anything else, such as `a link`.
-    """
-
-    name: str
-    kind: str
+    name: str  # name in the archive, with `/` between the parts and none at the end; may be hostile
+    kind: str  # `FILE`, `FOLDER`, or words for anything else, such as `a link`
     size: int
     read: Callable[[int], bytes]
 
@@ -110,10 +105,9 @@ def is_tar(head: bytes) -> bool:
 
 
 def unpacked(data: bytes, compression: str, *, most: int, limit: str) -> bytes:
-    """Return the decompressed data; nothing is decompressed beyond `most` bytes, which is `limit` in words.
+    """Return the decompressed data; raises UnusableArchiveError if it is damaged, cut off or too large.
 
-    Raises:
-        UnusableArchiveError: The data is damaged or cut off, or its content is larger than `most`.
+    Nothing is decompressed beyond `most` bytes, which is `limit` in words.
     """
     whole = bytearray()
     for _ in range(MAX_STREAMS):
@@ -171,9 +165,10 @@ def _places(data: bytes, most: int) -> set[tuple[int, int]]:
         size = _size(block)
         if at + size > len(data):
             raise _damaged("tar")
-        if block[156:157] in _EXTENDED:
-            _check_extended(data[at : at + size], pax=block[156:157] in _PAX)
-        else:
+        kind = block[156:157]
+        if kind in _PAX:
+            _check_pax(data[at : at + size])
+        elif kind not in _EXTENDED:
             places.add((at, size))
         at += -(-size // BLOCK) * BLOCK
 
@@ -191,10 +186,8 @@ def _size(block: bytes) -> int:
     return info.size if carries else 0
 
 
-def _check_extended(header: bytes, *, pax: bool) -> None:
+def _check_pax(header: bytes) -> None:
     """Reject records that are not exactly `LENGTH KEY=VALUE` and a line break, and those about sparse files."""
-    if not pax:
-        return
     if b"GNU.sparse" in header or _MANY_DIGITS.search(header):
         raise _unusual()
     at = 0
@@ -307,15 +300,12 @@ _MAGIC = {
     b"\x28\xb5\x2f\xfd": "zstd",
     b"LZIP": "lzip",
 }
+#: The kinds that can be read.
 _READABLE = ("zip", "tar", "gzip", "bzip2", "xz")
 
 
 def archive_kind(head: bytes) -> str | None:
-    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None.
-
-    Returns:
-        `zip`, `tar`, `gzip`, `bzip2` or `xz`, which can be read, or the name of another kind, which cannot.
-    """
+    """Return the kind of archive or compressed file that begins with these bytes, at most `HEAD_BYTES`, or None."""
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
             return kind
@@ -323,9 +313,7 @@ def archive_kind(head: bytes) -> str | None:
 
 
 def collect_archive(data: bytes, *, where: str) -> Collected:
-    """Return the files of an archive.
-
-    The same files are skipped as in a folder, so a submission gives the same result packed or not.
+    """Return the files of an archive; the same files are skipped as in a folder, so packing changes no result.
 
     Raises:
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could

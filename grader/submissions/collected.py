@@ -159,15 +159,11 @@ MAX_ENTRIES = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Collected:
-    """Files that were read, not yet written.
+    """Files that were read, not yet written."""
 
-    Attributes:
-        files: Relative POSIX path and content; every path stays inside, and paths are unique.
-        notes: Sentences about skipped files.
-    """
-
+    # Relative POSIX path and content; every path stays inside, and paths are unique
     files: tuple[tuple[str, bytes], ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # sentences about skipped files
 
 
 @dataclass(slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from grader.core.submission import Submission
@@ -92,8 +92,7 @@ def reaching(text: str) -> tuple[str, ...]:
     source = read("", text)
     if source.tree is None:
         return (LONG,) if len(text) > LONGEST_SOURCE or _can_run(text) else ()
-    found = (*_imports(source.nodes), *_named(source.nodes, source), *_computed(source.nodes, source))
-    return tuple(dict.fromkeys((*found, *_timing(source.nodes, source))))
+    return tuple(dict.fromkeys((*_imports(source), *_named(source), *_computed(source), *_timing(source))))
 
 
 def _can_run(text: str) -> bool:
@@ -104,8 +103,8 @@ def _can_run(text: str) -> bool:
     return True
 
 
-def _imports(nodes: Sequence[ast.AST]) -> Iterator[str]:
-    for node in nodes:
+def _imports(source: Source) -> Iterator[str]:
+    for node in source.nodes:
         if isinstance(node, ast.Import):
             names = [name.name for name in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -118,8 +117,8 @@ def _imports(nodes: Sequence[ast.AST]) -> Iterator[str]:
             yield from (part for part in _TEXTS if part in name)
 
 
-def _named(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
-    for node in nodes:
+def _named(source: Source) -> Iterator[str]:
+    for node in source.nodes:
         if isinstance(node, ast.Attribute):
             name = source.resolved(node)
             if node.attr in _ATTRIBUTES or name in _NAMES:
@@ -142,10 +141,10 @@ def _is_private(name: str) -> bool:
     return name.startswith("_") and not name.endswith("__")
 
 
-def _computed(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
+def _computed(source: Source) -> Iterator[str]:
     """Yield names looked up by computed text, and functions whose type is asked for."""
-    spelt = _loops_over_texts(nodes)
-    for call in (node for node in nodes if isinstance(node, ast.Call)):
+    spelt = _loops_over_texts(source)
+    for call in source.all(ast.Call):
         name = chain(call.func)
         if name in ("getattr", "setattr", "delattr") and not _shows_attribute(call, spelt):
             yield f"{name} of a name that is worked out"
@@ -157,11 +156,11 @@ def _computed(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
             yield "os.environ"
 
 
-def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
+def _loops_over_texts(source: Source) -> frozenset[str]:
     """Return the loop variables that only take string literals of the file."""
-    inner = [n.generators for n in nodes if isinstance(n, (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp))]
-    loops: list[ast.For | ast.comprehension] = [n for n in nodes if isinstance(n, ast.For)]
-    loops += [loop for generators in inner for loop in generators]
+    inner = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+    loops: list[ast.For | ast.comprehension] = [*source.all(ast.For)]
+    loops += [loop for node in source.nodes if isinstance(node, inner) for loop in node.generators]
     named = [
         loop.target.id
         for loop in loops
@@ -169,7 +168,7 @@ def _loops_over_texts(nodes: Sequence[ast.AST]) -> frozenset[str]:
         and isinstance(loop.iter, (ast.Tuple, ast.List, ast.Set))
         and not any(_may_name_internals(text) for text in loop.iter.elts)
     ]
-    given = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    given = [name.id for name in source.all(ast.Name) if isinstance(name.ctx, ast.Store)]
     return frozenset(name for name in named if given.count(name) == named.count(name))
 
 
@@ -206,15 +205,14 @@ def _takes_environ(call: ast.Call) -> bool:
     return any(chain(argument).endswith("environ") for argument in call.args)
 
 
-def _timing(nodes: Sequence[ast.AST], source: Source) -> Iterator[str]:
+def _timing(source: Source) -> Iterator[str]:
     """Yield two clocks in one file, and loops that count how often they read one."""
-    names = [node for node in nodes if isinstance(node, (ast.Attribute, ast.Name))]
-    clocks = {clock for node in names if (clock := _CLOCKS.get(source.resolved(node)))}
+    clocks = {clock for node in source.names() if (clock := _CLOCKS.get(source.resolved(node)))}
     if len(clocks) > 1:
         yield "two clocks"
-    if any(_compares(node, source) for node in nodes):
+    if any(_compares(node, source) for node in source.nodes):
         yield "a clock that is compared"
-    for loop in (node for node in nodes if isinstance(node, ast.While)):
+    for loop in source.all(ast.While):
         inside = list(ast.walk(loop))
         looks = any(isinstance(n, (ast.Attribute, ast.Name)) and source.resolved(n) in _CLOCKS for n in inside)
         waits = any(isinstance(n, ast.Call) and chain(n.func).rpartition(".")[2] in _WAITING for n in inside)

@@ -8,6 +8,7 @@ import os
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from grader.core.errors import HarnessError, SubmissionError
@@ -29,17 +30,13 @@ _OPEN_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 def collect_folder(folder: Path, *, into: Path, where: str) -> Collected:
-    """Read the files of a student's folder; `into`, the destination of the copy, is not part of the submission.
+    """Read the files of a student's folder, in the order of their names' bytes.
 
-    Returns:
-        The files, in the order of their names' bytes. Links, devices, sockets, pipes and unreadable files are left out
-        with a note.
-
-    Raises:
-        SubmissionError: The folder cannot be listed, or a limit is exceeded.
+    Links, devices, sockets, pipes and unreadable files are left out with a note. `into`, the destination of the copy,
+    is not part of the submission. Raises SubmissionError if the folder cannot be listed, or a limit is exceeded.
     """
     left = LeftOut()
-    walk = _Walk(where=where, left=left, own=_identity(into.stat()))
+    walk = _Walk(where=where, left=left, own=into.stat())
     try:
         top = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
@@ -73,11 +70,7 @@ def read_start(file: Path, most: int, *, where: str) -> bytes:
 def write_files(collected: Collected, into: Path) -> str:
     """Write the files that were read into an empty folder, readable by everybody, in the same layout.
 
-    Returns:
-        The digest: `sha256:` and 64 hex digits over names and contents.
-
-    Raises:
-        HarnessError: A file cannot be written.
+    Returns their digest: `sha256:` and 64 hex digits over names and contents. Raises HarnessError.
     """
     digest = hashlib.sha256()
     for relative, content in sorted(collected.files, key=lambda file: os.fsencode(file[0])):
@@ -95,7 +88,7 @@ class _Walk:
 
     where: str
     left: LeftOut
-    own: tuple[int, int]
+    own: os.stat_result
     entries: int = 0
     found: int = 0
 
@@ -117,12 +110,10 @@ class _Walk:
 
     def _names(self, descriptor: int) -> list[str]:
         with os.scandir(descriptor) as entries:
-            names = []
-            for entry in entries:
-                self.entries += 1
-                if self.entries > MAX_ENTRIES:
-                    raise _too_much(self.where, f"{MAX_ENTRIES} entries")
-                names.append(entry.name)
+            names = [entry.name for entry in islice(entries, MAX_ENTRIES + 1 - self.entries)]
+        self.entries += len(names)
+        if self.entries > MAX_ENTRIES:
+            raise _too_much(self.where, f"{MAX_ENTRIES} entries")
         return names
 
     def _file(self, relative: str, name: str) -> Iterator[str]:
@@ -137,7 +128,7 @@ class _Walk:
         yield relative
 
     def _folder(self, parent: int, name: str, relative: str, depth: int, info: os.stat_result) -> Iterator[str]:
-        if is_skipped_folder(name) or _identity(info) == self.own:
+        if is_skipped_folder(name) or os.path.samestat(info, self.own):
             return
         if depth > MAX_DEPTH:
             raise _too_much(self.where, f"{MAX_DEPTH} folders inside each other")
@@ -147,7 +138,7 @@ class _Walk:
             self.left.add(f"the folder cannot be read: {error.strerror}", relative)
             return
         try:
-            marker = next((m for m in GENERATED_MARKERS if _exists(m, descriptor)), None)
+            marker = next((m for m in GENERATED_MARKERS if os.access(m, os.F_OK, dir_fd=descriptor)), None)
             if marker is None:
                 yield from self.files(descriptor, f"{relative}/", depth)
             else:
@@ -159,18 +150,6 @@ class _Walk:
 def _too_much(where: str, limit: str) -> SubmissionError:
     hint = "name the folder that holds only your work"
     return SubmissionError(f"{where}: expected at most {limit}, found more", hint)
-
-
-def _identity(info: os.stat_result) -> tuple[int, int]:
-    return info.st_dev, info.st_ino
-
-
-def _exists(name: str, descriptor: int) -> bool:
-    try:
-        os.stat(name, dir_fd=descriptor, follow_symlinks=False)
-    except OSError:
-        return False
-    return True
 
 
 def _kind(mode: int) -> str:

@@ -35,11 +35,8 @@ def stage_submission(path: str, wanted: Sequence[str], into: Path) -> Submission
     Args:
         path: A folder, an archive or one .py file, as the user typed it. If a folder or archive holds no .py file but
             one archive, that archive is used: learning platforms deliver uploads this way.
-        wanted: File names of all exercises being graded.
+        wanted: File names of all exercises being graded; a missing one has the names that look like it.
         into: Empty folder that receives the copy.
-
-    Returns:
-        The submission; a missing file has `found` None and the names that look like it.
 
     Raises:
         SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit

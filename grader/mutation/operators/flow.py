@@ -7,19 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import libcst as cst
 from libcst import matchers as m
 
-from grader.mutation.operators.program import (
-    CREATORS,
-    LEVELS,
-    Edit,
-    Mutation,
-    Program,
-    argument,
-    called,
-    expression,
-    into,
-    short,
-    statement,
-)
+from grader.mutation.operators.program import CREATORS, LEVELS, Edit, Mutation, Program, called, short, without_comma
 
 
 def lines_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
@@ -30,10 +18,10 @@ def lines_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
     return body[1:] if function.get_docstring() is not None else body
 
 
-def at_top(function: cst.FunctionDef, text: str) -> tuple[Edit, ...]:
-    """Return the edit that inserts a statement at the start of a function; none if its body is on the same line."""
+def at_top(function: cst.FunctionDef, *texts: str) -> tuple[Edit, ...]:
+    """Return the edit that inserts statements at the start of a function; none if its body is on the same line."""
     lines = lines_of(function)
-    return ((lines[0], cst.FlattenSentinel([statement(text), lines[0]])),) if lines else ()
+    return ((lines[0], cst.FlattenSentinel([*map(cst.parse_statement, texts), lines[0]])),) if lines else ()
 
 
 def parameters(function: cst.FunctionDef) -> list[str]:
@@ -62,35 +50,35 @@ def missing_call(program: Program) -> Iterator[Mutation]:
     """A call that is forgotten: publish, spin, init, super().__init__, create_timer, a log."""
     for node in program.all(cst.Expr):
         if isinstance(node.value, cst.Call) and alone(program, node):
-            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield program.without(node)
 
 
 def missing_assignment(program: Program) -> Iterator[Mutation]:
     """A value that is never set, a counter that never counts, a publisher that is never made."""
     for node in [*program.all(cst.Assign), *program.all(cst.AugAssign), *program.all(cst.AnnAssign)]:
         if alone(program, node) and not (isinstance(node, cst.AnnAssign) and node.value is None):
-            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield program.without(node)
 
 
 def missing_import(program: Program) -> Iterator[Mutation]:
     """An import that is forgotten."""
     for node in [*program.all(cst.Import), *program.all(cst.ImportFrom)]:
         if alone(program, node):
-            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield program.without(node)
 
 
 def missing_return(program: Program) -> Iterator[Mutation]:
     """A callback that does not return its response, a function that returns nothing."""
     for node in program.all(cst.Return):
         if node.value is not None:
-            yield Mutation(node, f"no {short(program.code(node))}", ((node, cst.Pass()),))
+            yield program.without(node)
 
 
 def missing_early_return(program: Program) -> Iterator[Mutation]:
     """A `return`, `break` or `continue` that is forgotten: the function goes on."""
     bare = [node for node in program.all(cst.Return) if node.value is None]
     for node in [*bare, *program.all(cst.Break), *program.all(cst.Continue)]:
-        yield Mutation(node, f"no {program.code(node)}", ((node, cst.Pass()),))
+        yield program.without(node)
 
 
 def missing_parameter(program: Program) -> Iterator[Mutation]:
@@ -98,27 +86,23 @@ def missing_parameter(program: Program) -> Iterator[Mutation]:
     for function in program.callbacks:
         params = function.params.params
         if params:
-            kept = function.params.with_changes(params=_without_comma(params[:-1]))
+            kept = function.params.with_changes(params=without_comma(params[:-1]))
             detail = f"{function.name.value} without {params[-1].name.value}"
             yield Mutation(function, detail, ((function.params, kept),))
 
 
 def callback_called(program: Program) -> Iterator[Mutation]:
     """A callback that is called instead of passed: `self.tick()` for `self.tick`."""
-    for call in program.calls(*CREATORS):
-        arg = argument(call, "callback")
-        if arg is not None and not isinstance(arg.value, (cst.Lambda, cst.Call)):
-            after = cst.Call(arg.value)
-            yield Mutation(call, into(program.code(arg.value), program.code(after)), ((arg.value, after),))
+    for call, callback in program.arguments("callback", *CREATORS):
+        if not isinstance(callback, (cst.Lambda, cst.Call)):
+            yield program.replacing(callback, cst.Call(callback), at=call)
 
 
 def timer_once(program: Program) -> Iterator[Mutation]:
     """A callback that is called once instead of by a timer."""
-    for node in program.all(cst.Call):
-        callback = argument(node, "callback") if called(node) == "create_timer" else None
-        if callback is not None and isinstance(callback.value, (cst.Name, cst.Attribute)):
-            after = cst.Call(callback.value)
-            yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
+    for call, callback in program.arguments("callback", "create_timer"):
+        if isinstance(callback, (cst.Name, cst.Attribute)):
+            yield program.replacing(call, cst.Call(callback))
 
 
 def spins_once(program: Program) -> Iterator[Mutation]:
@@ -134,8 +118,7 @@ def repeated_call(program: Program) -> Iterator[Mutation]:
         if m.matches(line, m.SimpleStatementLine(body=[m.Expr(m.Call())])):
             call = program.all(cst.Call, line)[0]
             if called(call) in _REPEATED:
-                twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
-                yield Mutation(line, f"twice {short(program.code(call))}", ((line, twice),))
+                yield Mutation(line, f"twice {short(program.code(call))}", _twice(line))
 
 
 def repeated_entity(program: Program) -> Iterator[Mutation]:
@@ -143,8 +126,11 @@ def repeated_entity(program: Program) -> Iterator[Mutation]:
     for line in program.all(cst.SimpleStatementLine):
         calls = [call for call in program.all(cst.Call, line) if called(call) in _ENTITIES]
         if calls:
-            twice = cst.FlattenSentinel([line, line.with_changes(leading_lines=())])
-            yield Mutation(line, f"two of {short(program.code(calls[0]))}", ((line, twice),))
+            yield Mutation(line, f"two of {short(program.code(calls[0]))}", _twice(line))
+
+
+def _twice(line: cst.SimpleStatementLine) -> tuple[Edit, ...]:
+    return ((line, cst.FlattenSentinel([line, line.with_changes(leading_lines=())])),)
 
 
 def wrong_order(program: Program) -> Iterator[Mutation]:
@@ -169,12 +155,7 @@ def _leads_to(program: Program, one: cst.SimpleStatementLine, other: cst.CSTNode
     return starts or bool(made & used) or bool((filled - {"self"}) & given)
 
 
-def _without_comma(params: object) -> tuple[cst.Param, ...]:
-    kept = tuple(params) if isinstance(params, (tuple, list)) else ()
-    return (*kept[:-1], kept[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)) if kept else ()
-
-
-_COUNT = "{owner}.calls_so_far = getattr({owner}, 'calls_so_far', 0) + 1"
+#: Calls after which a callback fails that works at first.
 LATER = 10
 
 
@@ -230,13 +211,9 @@ def _hearing(program: Program, detail: str, text: str) -> Iterator[Mutation]:
 
 def _after(function: cst.FunctionDef, calls: int, then: str, word: str) -> Mutation:
     own = owner(function)
-    counted = statement(_COUNT.format(owner=own))
-    stop = statement(f"if {own}.calls_so_far > {calls}:\n    {then}\n")
-    edits: tuple[Edit, ...] = ()
-    for line, new in at_top(function, "pass"):
-        first = list(new)[-1] if isinstance(new, cst.FlattenSentinel) else line
-        edits = ((line, cst.FlattenSentinel([counted, stop, first])),)
-    return Mutation(function, f"{function.name.value} {word} after {calls} calls", edits)
+    counted = f"{own}.calls_so_far = getattr({own}, 'calls_so_far', 0) + 1"
+    stop = f"if {own}.calls_so_far > {calls}:\n    {then}\n"
+    return Mutation(function, f"{function.name.value} {word} after {calls} calls", at_top(function, counted, stop))
 
 
 def _kept(program: Program, function: cst.FunctionDef, value: cst.BaseExpression) -> tuple[Edit, ...]:
@@ -261,29 +238,20 @@ _BOUNDARIES: Mapping[type[cst.BaseCompOp], tuple[type[cst.BaseCompOp], ...]] = {
 def comparison(program: Program) -> Iterator[Mutation]:
     """A limit on the wrong side, a reversed comparison, or equality instead of an inequality."""
     for node in program.all(cst.Comparison):
-        for target in node.comparisons:
-            if _is_guard(program, node):
-                continue
-            for other in _BOUNDARIES.get(type(target.operator), ()):
-                after = node.deep_replace(target.operator, other())
-                yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
+        if not _is_guard(program, node):
+            for target in node.comparisons:
+                for other in _BOUNDARIES.get(type(target.operator), ()):
+                    yield program.replacing(node, node.deep_replace(target.operator, other()))
 
 
 def swapped_branches(program: Program) -> Iterator[Mutation]:
     """The branches of a condition swapped."""
     for node in program.all(cst.IfExp):
-        yield Mutation(
-            node,
-            f"{program.code(node.body)} <-> {program.code(node.orelse)}",
-            ((node.body, node.orelse), (node.orelse, node.body)),
-        )
+        yield program.swapping(node, node.body, node.orelse)
     for branch in program.all(cst.If):
         if isinstance(branch.orelse, cst.Else):
-            yield Mutation(
-                branch,
-                f"if {program.code(branch.test)}: branches swapped",
-                ((branch.body, branch.orelse.body), (branch.orelse.body, branch.body)),
-            )
+            edits = ((branch.body, branch.orelse.body), (branch.orelse.body, branch.body))
+            yield Mutation(branch, f"if {program.code(branch.test)}: branches swapped", edits)
 
 
 def constant_condition(program: Program) -> Iterator[Mutation]:
@@ -294,23 +262,20 @@ def constant_condition(program: Program) -> Iterator[Mutation]:
     for test in tests:
         if not _is_guard(program, test):
             for value in ("True", "False"):
-                yield Mutation(test, into(program.code(test), value), ((test, expression(value)),))
+                yield program.replacing(test, value)
 
 
 def boolean(program: Program) -> Iterator[Mutation]:
     """True for False, `and` for `or`, a missing `not`."""
     for name in program.all(cst.Name):
         if name.value in ("True", "False"):
-            other = "False" if name.value == "True" else "True"
-            yield Mutation(name, into(name.value, other), ((name, cst.Name(other)),))
+            yield program.replacing(name, "False" if name.value == "True" else "True")
     for node in program.all(cst.BooleanOperation):
         operator = cst.Or() if isinstance(node.operator, cst.And) else cst.And()
-        after = node.with_changes(operator=operator)
-        yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
+        yield program.replacing(node, node.with_changes(operator=operator))
     for negated in program.all(cst.UnaryOperation):
         if isinstance(negated.operator, cst.Not):
-            inner = negated.expression
-            yield Mutation(negated, into(program.code(negated), program.code(inner)), ((negated, inner),))
+            yield program.replacing(negated, negated.expression)
 
 
 def loop_once(program: Program) -> Iterator[Mutation]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar, cast
@@ -25,8 +25,6 @@ CREATORS: Mapping[str, tuple[str, ...]] = {
     "create_timer": ("timer_period_sec", "callback"),
     "create_rate": ("frequency",),
 }
-#: Functions that sleep; the period is the first argument.
-SLEEPS = ("sleep",)
 #: Methods of an rclpy logger.
 LEVELS = ("debug", "info", "warn", "warning", "error", "fatal")
 
@@ -42,21 +40,13 @@ class Mutation:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A changed program: a mutant or a correct variant.
+    """A changed program: a mutant or a correct variant."""
 
-    Attributes:
-        id: Stays the same as long as the reference solution does.
-        file: Name of the file.
-        operator: Key of `OPERATORS` or of `VARIANTS`.
-        source: The whole program.
-        detail: The change of a mutant, in one line.
-    """
-
-    id: str
-    file: str
-    operator: str
-    source: str
-    detail: str = ""
+    id: str  # stays the same as long as the reference solution does
+    file: str  # name of the file
+    operator: str  # key of `OPERATORS` or of `VARIANTS`
+    source: str  # the whole program
+    detail: str = ""  # the change of a mutant, in one line
 
 
 class Program:
@@ -71,6 +61,11 @@ class Program:
     def code(self, node: cst.CSTNode) -> str:
         """Return the text of a node."""
         return self.module.code_for_node(node)
+
+    def specification(self, part: cst.BaseFormattedStringContent) -> str:
+        """Return how an f-string formats a value, such as `.2f`; empty if it does not say, and for text."""
+        pieces = part.format_spec if isinstance(part, cst.FormattedStringExpression) else None
+        return "".join(map(self.code, pieces or ()))
 
     def line(self, node: cst.CSTNode) -> int:
         """Return the first line of a node, starting at 1."""
@@ -96,8 +91,13 @@ class Program:
         return next((above for above in self.above(node) if isinstance(above, kind)), None)
 
     def calls(self, *names: str) -> list[cst.Call]:
-        """Return the calls of functions or methods with these names; all calls if no names are given."""
-        return [call for call in self.all(cst.Call) if not names or called(call) in names]
+        """Return the calls of functions or methods with these names."""
+        return [call for call in self.all(cst.Call) if called(call) in names]
+
+    def arguments(self, name: str, *creators: str) -> list[tuple[cst.Call, cst.BaseExpression]]:
+        """Return the calls of these creating methods that pass a parameter, each with what it passes."""
+        given = ((call, argument(call, name)) for call in self.calls(*creators))
+        return [(call, value) for call, value in given if value is not None]
 
     def constant(self, expression: cst.BaseExpression | None) -> cst.BaseExpression | None:
         """Return the expression that defines a value: itself, or the only assignment to its name."""
@@ -117,16 +117,16 @@ class Program:
     @cached_property
     def callbacks(self) -> list[cst.FunctionDef]:
         """The callbacks of timers, subscriptions, services and futures."""
-        handed = [argument(call, "callback") for call in self.calls(*CREATORS)]
-        handed += [call.args[0] for call in self.calls("add_done_callback") if call.args]
-        names = {last_name(arg.value) for arg in handed if arg is not None}
-        return [function for function in self.all(cst.FunctionDef) if function.name.value in names]
+        done = [call.args[0].value for call in self.calls("add_done_callback") if call.args]
+        return self._functions([*done, *(callback for _, callback in self.arguments("callback", *CREATORS))])
 
     def handed_to(self, creator: str) -> list[cst.FunctionDef]:
         """Return the callbacks passed to the methods that create a kind of entity."""
-        handed = (argument(call, "callback") for call in self.calls(creator))
-        names = {last_name(arg.value) for arg in handed if arg is not None}
-        return [function for function in self.callbacks if function.name.value in names]
+        return self._functions(callback for _, callback in self.arguments("callback", creator))
+
+    def _functions(self, handed: Iterable[cst.BaseExpression]) -> list[cst.FunctionDef]:
+        names = {last_name(expression) for expression in handed}
+        return [function for function in self.all(cst.FunctionDef) if function.name.value in names]
 
     def importing(self, line: str) -> tuple[Edit, ...]:
         """Return the edits that add an import; none if the program already has it."""
@@ -145,6 +145,19 @@ class Program:
             before = replacements.get(old)
             replacements[old] = new if before is None else _joined(before, new)
         return self.module.visit(_Replacing(replacements)).code
+
+    def replacing(self, node: cst.CSTNode, after: cst.CSTNode | str, *, at: cst.CSTNode | None = None) -> Mutation:
+        """Return the mutation with another node, or the expression in a text, in the place of a node."""
+        new = cst.parse_expression(after) if isinstance(after, str) else after
+        return Mutation(at or node, into(self.code(node), self.code(new)), ((node, new),))
+
+    def swapping(self, at: cst.CSTNode, one: cst.CSTNode, other: cst.CSTNode) -> Mutation:
+        """Return the mutation with two nodes in each other's place."""
+        return Mutation(at, f"{self.code(one)} <-> {self.code(other)}", ((one, other), (other, one)))
+
+    def without(self, node: cst.CSTNode) -> Mutation:
+        """Return the mutation without a statement."""
+        return Mutation(node, f"no {short(self.code(node))}", ((node, cst.Pass()),))
 
 
 class _Replacing(cst.CSTTransformer):
@@ -175,25 +188,20 @@ def last_name(expression: cst.BaseExpression) -> str:
     return expression.value if isinstance(expression, cst.Name) else ""
 
 
-def argument(call: cst.Call, name: str) -> cst.Arg | None:
-    """Return the argument for a parameter of a creating method, by name or position; None if it is not passed."""
+def argument(call: cst.Call, name: str) -> cst.BaseExpression | None:
+    """Return what is passed for a parameter of a creating method, by name or position; None if nothing is."""
     for arg in call.args:
         if arg.keyword is not None and arg.keyword.value == name:
-            return arg
+            return arg.value
     names = CREATORS.get(called(call), ())
     place = names.index(name) if name in names else len(call.args)
-    plain = [arg for arg in call.args if arg.keyword is None and not arg.star]
+    plain = [arg.value for arg in call.args if arg.keyword is None and not arg.star]
     return plain[place] if place < len(plain) else None
 
 
-def expression(text: str) -> cst.BaseExpression:
-    """Parse an expression."""
-    return cst.parse_expression(text)
-
-
-def statement(text: str) -> cst.BaseStatement:
-    """Parse a statement."""
-    return cst.parse_statement(text)
+def without_comma(items: Sequence[Node]) -> list[Node]:
+    """Return arguments or parameters without a comma after the last one."""
+    return [*items[:-1], items[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)] if items else []
 
 
 def text_of(node: cst.CSTNode | None) -> str | None:
@@ -222,7 +230,7 @@ def number_of(node: cst.CSTNode | None) -> float | int | None:
 def number(value: float) -> cst.BaseExpression:
     """Return a number literal without floating-point noise."""
     text = repr(value) if isinstance(value, int) else repr(float(f"{value:.12g}"))
-    return expression(text)
+    return cst.parse_expression(text)
 
 
 def into(before: str, after: str) -> str:

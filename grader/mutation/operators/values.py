@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import libcst as cst
 
-from grader.mutation.operators.program import Mutation, Program, argument, called, expression, into, number, number_of
+from grader.mutation.operators.program import Mutation, Program, called, into, number, number_of, without_comma
 
 _SIBLINGS: Mapping[str, str] = {
     "x": "y",
@@ -38,17 +38,15 @@ def wrong_part(program: Program) -> Iterator[Mutation]:
         text = program.code(node)
         for ending, other in _LONGER.items():
             if text.endswith(ending):
-                after = text.removesuffix(ending) + other
-                yield Mutation(node, into(text, after), ((node, expression(after)),))
+                yield program.replacing(node, text.removesuffix(ending) + other)
 
 
 def swapped_arguments(program: Program) -> Iterator[Mutation]:
     """Two neighbouring arguments swapped."""
     for call in program.all(cst.Call):
-        for one, other in zip(call.args, call.args[1:], strict=False):
+        for one, other in pairwise(call.args):
             if one.keyword is None and other.keyword is None and not one.star + other.star:
-                texts = program.code(one.value), program.code(other.value)
-                yield Mutation(call, f"{texts[0]} <-> {texts[1]}", ((one.value, other.value), (other.value, one.value)))
+                yield program.swapping(call, one.value, other.value)
 
 
 def swapped_values(program: Program) -> Iterator[Mutation]:
@@ -56,8 +54,7 @@ def swapped_values(program: Program) -> Iterator[Mutation]:
     for text in program.all(cst.FormattedString):
         values = [part for part in text.parts if isinstance(part, cst.FormattedStringExpression)]
         for one, other in pairwise(values):
-            a, b = one.expression, other.expression
-            yield Mutation(text, f"{program.code(a)} <-> {program.code(b)}", ((a, b), (b, a)))
+            yield program.swapping(text, one.expression, other.expression)
 
 
 def missing_keyword(program: Program) -> Iterator[Mutation]:
@@ -65,9 +62,8 @@ def missing_keyword(program: Program) -> Iterator[Mutation]:
     for call in program.all(cst.Call):
         for arg in call.args:
             if arg.keyword is not None:
-                kept = tuple(other for other in call.args if other is not arg)
-                after = call.with_changes(args=tuple(_last(kept)))
-                yield Mutation(call, into(program.code(call), program.code(after)), ((call, after),))
+                kept = [other for other in call.args if other is not arg]
+                yield program.replacing(call, call.with_changes(args=without_comma(kept)))
 
 
 def stale_field(program: Program) -> Iterator[Mutation]:
@@ -78,11 +74,6 @@ def stale_field(program: Program) -> Iterator[Mutation]:
             other = cst.Name(f"{target.attr.value}_value")
             after = cst.Assign([cst.AssignTarget(other)], assign.value)
             yield Mutation(assign, into(program.code(target), other.value), ((assign, after),))
-
-
-def _last(args: tuple[cst.Arg, ...]) -> list[cst.Arg]:
-    """Remove the comma after the last argument."""
-    return [*args[:-1], args[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)] if args else []
 
 
 def _is_own(node: cst.Attribute) -> bool:
@@ -111,7 +102,7 @@ def constant_less(program: Program) -> Iterator[Mutation]:
 def _off(program: Program, side: int) -> Iterator[Mutation]:
     for node, value in _numbers(program):
         off = value + side if isinstance(value, int) else value * (1 + 0.1 * side) or 0.1 * side
-        yield Mutation(node, into(program.code(node), program.code(number(off))), ((node, number(off)),))
+        yield program.replacing(node, number(off))
 
 
 def sign(program: Program) -> Iterator[Mutation]:
@@ -119,7 +110,7 @@ def sign(program: Program) -> Iterator[Mutation]:
     for node, value in _numbers(program):
         above = next(program.above(node), None)
         if isinstance(above, cst.UnaryOperation) and isinstance(above.operator, cst.Minus):
-            yield Mutation(node, into(program.code(above), program.code(node)), ((above, node),))
+            yield program.replacing(above, node, at=node)
         elif value:
             yield Mutation(node, into(program.code(node), f"-{program.code(node)}"), ((node, number(-value)),))
 
@@ -128,7 +119,7 @@ def whole_number(program: Program) -> Iterator[Mutation]:
     """An integer where a message needs a float: `0` for `0.0`."""
     for node, value in _numbers(program):
         if isinstance(value, float) and value.is_integer():
-            yield Mutation(node, into(program.code(node), str(int(value))), ((node, number(int(value))),))
+            yield program.replacing(node, str(int(value)))
 
 
 def arithmetic(program: Program) -> Iterator[Mutation]:
@@ -136,24 +127,22 @@ def arithmetic(program: Program) -> Iterator[Mutation]:
     for node in program.all(cst.BinaryOperation):
         other = _OPERATORS.get(type(node.operator))
         if other is not None and not _of_texts(node):
-            after = node.with_changes(operator=other())
-            yield Mutation(node, into(program.code(node), program.code(after)), ((node, after),))
+            yield program.replacing(node, node.with_changes(operator=other()))
 
 
 def missing_operand(program: Program) -> Iterator[Mutation]:
     """A forgotten factor, shift or conversion: one side of an operation is missing."""
     for node in program.all(cst.BinaryOperation):
         if not _of_texts(node):
-            for side in (node.left, node.right):
-                yield Mutation(node, into(program.code(node), program.code(side)), ((node, side),))
+            yield program.replacing(node, node.left)
+            yield program.replacing(node, node.right)
 
 
 def missing_conversion(program: Program) -> Iterator[Mutation]:
     """A forgotten conversion or function: `degrees(x)` becomes `x`; or the inverse function."""
     for call in program.calls("degrees", "radians", "sin", "cos", "round", "abs", "float", "int", "str", "max", "min"):
         if call.args:
-            inner = call.args[0].value
-            yield Mutation(call, into(program.code(call), program.code(inner)), ((call, inner),))
+            yield program.replacing(call, call.args[0].value)
     opposites = {"degrees": "radians", "radians": "degrees", "sin": "cos", "cos": "sin", "max": "min", "min": "max"}
     for call in program.calls(*opposites):
         name = call.func.attr if isinstance(call.func, cst.Attribute) else call.func
@@ -161,17 +150,16 @@ def missing_conversion(program: Program) -> Iterator[Mutation]:
         yield Mutation(call, into(called(call), after), ((name, cst.Name(after)),))
 
 
+_INEQUALITIES = (cst.GreaterThan, cst.LessThan, cst.GreaterThanEqual, cst.LessThanEqual)
+
+
 def cut_to_whole(program: Program) -> Iterator[Mutation]:
     """Numbers truncated to integers before they are compared or sent."""
     for comparison in program.all(cst.Comparison):
-        text = program.code(comparison.left)
-        if isinstance(
-            comparison.comparisons[0].operator, (cst.GreaterThan, cst.LessThan, cst.GreaterThanEqual, cst.LessThanEqual)
-        ):
-            yield Mutation(comparison, into(text, f"int({text})"), ((comparison.left, expression(f"int({text})")),))
-    for keyword in _sent(program):
-        text = program.code(keyword)
-        yield Mutation(keyword, into(text, f"float(int({text}))"), ((keyword, expression(f"float(int({text}))")),))
+        if isinstance(comparison.comparisons[0].operator, _INEQUALITIES):
+            yield program.replacing(comparison.left, f"int({program.code(comparison.left)})", at=comparison)
+    for value in _sent(program):
+        yield program.replacing(value, f"float(int({program.code(value)}))")
 
 
 def counter_step(program: Program) -> Iterator[Mutation]:
@@ -179,7 +167,7 @@ def counter_step(program: Program) -> Iterator[Mutation]:
     for node in program.all(cst.AugAssign):
         if isinstance(node.operator, (cst.AddAssign, cst.SubtractAssign)):
             text = program.code(node.value)
-            doubled = expression(f"2 * ({text})")
+            doubled = cst.parse_expression(f"2 * ({text})")
             yield Mutation(node, f"step {into(text, f'2 * {text}')}", ((node.value, doubled),))
             other = cst.SubtractAssign() if isinstance(node.operator, cst.AddAssign) else cst.AddAssign()
             yield Mutation(node, f"step {into(text, f'-{text}')}", ((node.operator, other),))
@@ -187,11 +175,7 @@ def counter_step(program: Program) -> Iterator[Mutation]:
 
 def _numbers(program: Program) -> Iterator[tuple[cst.CSTNode, float | int]]:
     """Yield the numbers of a program, without queue depths, which affect no mark."""
-    depths = {
-        arg.value
-        for call in program.calls("create_publisher", "create_subscription")
-        if (arg := argument(call, "qos_profile"))
-    }
+    depths = {profile for _, profile in program.arguments("qos_profile", "create_publisher", "create_subscription")}
     depths |= {arg.value for call in program.calls("QoSProfile") for arg in call.args}
     for node in [*program.all(cst.Integer), *program.all(cst.Float)]:
         value = number_of(node)
@@ -224,27 +208,18 @@ def _sent(program: Program) -> list[cst.BaseExpression]:
     ]
 
 
-_SENSOR = ("qos_profile_sensor_data", "from rclpy.qos import qos_profile_sensor_data")
-_LATCHED = (
-    "QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)",
-    "from rclpy.qos import DurabilityPolicy, QoSProfile",
-)
-
-
 def best_effort(program: Program) -> Iterator[Mutation]:
     """A publisher or subscription with the sensor data profile, which may lose messages."""
-    yield from _with_profile(program, "best effort", _SENSOR)
+    return _with_profile(program, "best effort", "qos_profile_sensor_data", "qos_profile_sensor_data")
 
 
 def transient_local(program: Program) -> Iterator[Mutation]:
     """A publisher or subscription with transient local durability."""
-    yield from _with_profile(program, "transient local", _LATCHED)
+    profile = "QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)"
+    return _with_profile(program, "transient local", profile, "DurabilityPolicy, QoSProfile")
 
 
-def _with_profile(program: Program, word: str, profile: tuple[str, str]) -> Iterator[Mutation]:
-    text, line = profile
-    for call in program.calls("create_publisher", "create_subscription"):
-        arg = argument(call, "qos_profile")
-        if arg is not None:
-            edits = ((arg.value, expression(text)), *program.importing(line))
-            yield Mutation(call, f"{called(call).removeprefix('create_')} {word}", edits)
+def _with_profile(program: Program, word: str, profile: str, imported: str) -> Iterator[Mutation]:
+    for call, given in program.arguments("qos_profile", "create_publisher", "create_subscription"):
+        edits = ((given, cst.parse_expression(profile)), *program.importing(f"from rclpy.qos import {imported}"))
+        yield Mutation(call, f"{called(call).removeprefix('create_')} {word}", edits)

@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import libcst as cst
 
 from grader.mutation.operators.mutants import meaning
-from grader.mutation.operators.program import (
-    CREATORS,
-    Candidate,
-    Edit,
-    Program,
-    argument,
-    called,
-    expression,
-    statement,
-    string,
-    text_of,
-)
+from grader.mutation.operators.program import CREATORS, Candidate, Edit, Program, argument, called, string, text_of
 from grader.mutation.operators.words import names
 
 
@@ -146,44 +134,43 @@ def other_topic_form(program: Program) -> str:
 def keyword_arguments(program: Program) -> str:
     """Publishers, timers and so on are created with keyword arguments."""
     edits: list[Edit] = []
+    equal = cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
     for call in program.calls(*CREATORS):
         args = []
         for arg, name in zip(call.args, CREATORS[called(call)], strict=False):
             named = arg.keyword is not None or arg.star
-            args.append(arg if named else arg.with_changes(keyword=cst.Name(name), equal=_equal()))
+            args.append(arg if named else arg.with_changes(keyword=cst.Name(name), equal=equal))
         edits.append((call, call.with_changes(args=[*args, *call.args[len(args) :]])))
     return program.changed(edits)
 
 
 def percent_format(program: Program) -> str:
     """Texts are formatted with `%` instead of f-strings."""
-    return _formatted(program, _Style(lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)".format))
+    return _formatted(program, lambda spec: f"%{spec or 's'}", _percent_text, "{} % ({},)")
 
 
 def format_method(program: Program) -> str:
     """Texts are formatted with `.format` instead of f-strings."""
-    return _formatted(program, _Style(lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})".format))
+    return _formatted(program, lambda spec: f"{{:{spec}}}" if spec else "{}", str, "{}.format({})")
 
 
 def qos_object(program: Program) -> str:
     """The queue depth is given in a QoSProfile."""
     edits: list[Edit] = []
-    for call in program.calls("create_publisher", "create_subscription"):
-        arg = argument(call, "qos_profile")
-        if arg is not None and isinstance(arg.value, cst.Integer):
-            edits.append((arg.value, expression(f"QoSProfile(depth={arg.value.value})")))
-    imported = program.importing("from rclpy.qos import QoSProfile")
-    return program.changed([*edits, *imported]) if edits else _same(program)
+    for _, depth in program.arguments("qos_profile", "create_publisher", "create_subscription"):
+        if isinstance(depth, cst.Integer):
+            edits.append((depth, cst.parse_expression(f"QoSProfile(depth={depth.value})")))
+    return _with_import(program, edits, "from rclpy.qos import QoSProfile")
 
 
 def lambda_callbacks(program: Program) -> str:
     """Callbacks of timers and subscriptions are lambdas."""
     edits: list[Edit] = []
-    for call in program.calls("create_timer", "create_subscription"):
-        arg = argument(call, "callback")
-        if arg is not None and isinstance(arg.value, (cst.Name, cst.Attribute)):
-            given = "msg" if called(call) == "create_subscription" else ""
-            edits.append((arg.value, expression(f"lambda{given and ' '}{given}: {program.code(arg.value)}({given})")))
+    for call, callback in program.arguments("callback", "create_timer", "create_subscription"):
+        if isinstance(callback, (cst.Name, cst.Attribute)):
+            given = " msg" if called(call) == "create_subscription" else ""
+            after = f"lambda{given}: {program.code(callback)}({given.strip()})"
+            edits.append((callback, cst.parse_expression(after)))
     return program.changed(edits)
 
 
@@ -195,29 +182,28 @@ def executor(program: Program) -> str:
         if node:
             text = f"executor = SingleThreadedExecutor()\nexecutor.add_node({node})\nexecutor.spin()\n"
             edits.append((line, cst.FlattenSentinel(cst.parse_module(text).body)))
-    imported = program.importing("from rclpy.executors import SingleThreadedExecutor")
-    return program.changed([*edits, *imported]) if edits else _same(program)
+    return _with_import(program, edits, "from rclpy.executors import SingleThreadedExecutor")
 
 
 def loop_in_thread(program: Program) -> str:
     """A loop with a sleep replaces the timer; a thread spins the node."""
     timers = program.calls("create_timer")
-    timer = timers[0] if len(timers) == 1 else None
     lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
-    callback = argument(timer, "callback") if timer is not None else None
-    pause = argument(timer, "timer_period_sec") if timer is not None else None
-    if timer is None or callback is None or pause is None or len(lines) != 1 or "self" in program.code(pause.value):
+    if len(timers) != 1 or len(lines) != 1:
+        return _same(program)
+    timer, callback, pause = timers[0], argument(timers[0], "callback"), argument(timers[0], "timer_period_sec")
+    if callback is None or pause is None or "self" in program.code(pause):
         return _same(program)
     made = program.enclosing(timer, cst.SimpleStatementLine)
-    name = program.code(callback.value)
+    name = program.code(callback)
     if made is None or not name.startswith("self.") or program.code(made).strip() != program.code(timer):
         return _same(program)
     node = _spun(program, lines[0])
     thread = f"threading.Thread(target=rclpy.spin, args=({node},), daemon=True).start()"
-    body = f"    {node}{name.removeprefix('self')}()\n    time.sleep({program.code(pause.value)})\n"
-    loop = cst.FlattenSentinel([statement(thread), statement(f"while rclpy.ok():\n{body}")])
+    body = f"    {node}{name.removeprefix('self')}()\n    time.sleep({program.code(pause)})\n"
+    loop = cst.FlattenSentinel([cst.parse_statement(thread), cst.parse_statement(f"while rclpy.ok():\n{body}")])
     imports = (*program.importing("import threading"), *program.importing("import time"))
-    return program.changed([(made, statement("pass")), (lines[0], loop), *imports])
+    return program.changed([(made, cst.parse_statement("pass")), (lines[0], loop), *imports])
 
 
 def without_guard(program: Program) -> str:
@@ -237,49 +223,34 @@ def _spun(program: Program, line: cst.SimpleStatementLine) -> str:
     return program.code(call.args[0].value) if plain else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Style:
-    """How a style formats a field with its specification, the text between fields, and the complete expression."""
-
-    field: Callable[[str], str]
-    text: Callable[[str], str]
-    whole: Callable[[str, str], str]
-
-
-def _formatted(program: Program, style: _Style) -> str:
-    """Rewrite f-strings in another style where possible."""
+def _formatted(program: Program, field: Callable[[str], str], text: Callable[[str], str], whole: str) -> str:
+    """Rewrite f-strings where possible: `field` writes a specification, `text` what is between, `whole` everything."""
     edits: list[Edit] = []
     for node in program.all(cst.FormattedString):
         values = [part for part in node.parts if isinstance(part, cst.FormattedStringExpression)]
         if values and len(node.start) == 2 and all(_is_plain(program, part) for part in values):
-            text = "".join(
-                style.text(part.value)
-                if isinstance(part, cst.FormattedStringText)
-                else style.field(_specification(program, part))
+            written = "".join(
+                text(part.value) if isinstance(part, cst.FormattedStringText) else field(program.specification(part))
                 for part in node.parts
             )
             given = ", ".join(program.code(part.expression) for part in values)
-            edits.append((node, expression(style.whole(f"{node.end}{text}{node.end}", given))))
+            edits.append((node, cst.parse_expression(whole.format(f"{node.end}{written}{node.end}", given))))
     return program.changed(edits)
 
 
 def _is_plain(program: Program, part: cst.FormattedStringExpression) -> bool:
     """Whether every style can format a field."""
     bare = part.conversion is None and part.equal is None
-    return bare and _PLAIN.fullmatch(_specification(program, part)) is not None
-
-
-def _specification(program: Program, part: cst.BaseFormattedStringContent) -> str:
-    pieces = part.format_spec if isinstance(part, cst.FormattedStringExpression) else None
-    return "".join(program.code(piece) for piece in pieces or ())
+    return bare and _PLAIN.fullmatch(program.specification(part)) is not None
 
 
 def _percent_text(text: str) -> str:
     return text.replace("%", "%%").replace("{{", "{").replace("}}", "}")
 
 
-def _equal() -> cst.AssignEqual:
-    return cst.AssignEqual(cst.SimpleWhitespace(""), cst.SimpleWhitespace(""))
+def _with_import(program: Program, edits: Sequence[Edit], line: str) -> str:
+    """Return the source after edits that need an import; the unchanged source if there are none."""
+    return program.changed([*edits, *program.importing(line)]) if edits else _same(program)
 
 
 def _same(program: Program) -> str:
@@ -292,33 +263,18 @@ Rewriter = Callable[[Program], str]
 VARIANTS: Mapping[str, Rewriter] = {
     rewriter.__name__: rewriter
     for rewriter in (
-        renamed_classes,
-        renamed_functions,
-        renamed_methods,
-        renamed_attributes,
-        renamed_variables,
-        renamed_nodes,
-        reordered_methods,
-        reordered_constants,
-        single_quotes,
-        windows_lines,
-        other_topic_form,
-        keyword_arguments,
-        percent_format,
-        format_method,
-        qos_object,
-        lambda_callbacks,
-        executor,
-        loop_in_thread,
-        without_guard,
+        *(renamed_classes, renamed_functions, renamed_methods, renamed_attributes, renamed_variables, renamed_nodes),
+        *(reordered_methods, reordered_constants),
+        *(single_quotes, windows_lines, other_topic_form, keyword_arguments, percent_format, format_method),
+        *(qos_object, lambda_callbacks, executor, loop_in_thread, without_guard),
     )
 }
 
 
-def variants_of(source: str, file: str, rewriters: Mapping[str, Rewriter] = VARIANTS) -> tuple[Candidate, ...]:
+def variants_of(source: str, file: str) -> tuple[Candidate, ...]:
     """Return the variants that differ from a program, in the order of the table."""
     program = Program(source)
-    written = ((name, rewriter(program)) for name, rewriter in rewriters.items())
+    written = ((name, rewriter(program)) for name, rewriter in VARIANTS.items())
     return tuple(
         Candidate(f"{file}:{name}", file, name, text)
         for name, text in written

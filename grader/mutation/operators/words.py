@@ -12,17 +12,14 @@ from grader.mutation.operators.flow import at_top, lines_of, parameters
 from grader.mutation.operators.program import (
     CREATORS,
     LEVELS,
-    SLEEPS,
     Edit,
     Mutation,
     Program,
     argument,
     called,
-    expression,
     into,
     is_docstring,
     short,
-    statement,
     string,
     text_of,
 )
@@ -33,9 +30,10 @@ _QUIET, _LOUD = "debug", "error"
 
 def print_instead(program: Program) -> Iterator[Mutation]:
     """`print` instead of the logger."""
+    default = cst.MaybeSentinel.DEFAULT
     for call in _logs(program):
-        after = cst.Call(cst.Name("print"), [_plain(arg) for arg in call.args[:1]])
-        yield Mutation(call, into(program.code(call), program.code(after)), ((call, after),))
+        said = [arg.with_changes(comma=default, keyword=None, equal=default) for arg in call.args[:1]]
+        yield program.replacing(call, cst.Call(cst.Name("print"), said))
 
 
 def log_level(program: Program) -> Iterator[Mutation]:
@@ -43,7 +41,7 @@ def log_level(program: Program) -> Iterator[Mutation]:
     for call in _logs(program):
         for level in (_QUIET, _LOUD):
             if isinstance(call.func, cst.Attribute) and call.func.attr.value != level:
-                yield Mutation(call, into(call.func.attr.value, level), ((call.func.attr, cst.Name(level)),))
+                yield program.replacing(call.func.attr, level, at=call)
 
 
 def log_every_message(program: Program) -> Iterator[Mutation]:
@@ -53,7 +51,7 @@ def log_every_message(program: Program) -> Iterator[Mutation]:
             lines = lines_of(callback)
             if lines and parameters(timer) == ["self"] and parameters(callback)[:1] == ["self"]:
                 last = lines[-1]
-                added = cst.FlattenSentinel([last, statement(f"self.{timer.name.value}()")])
+                added = cst.FlattenSentinel([last, cst.parse_statement(f"self.{timer.name.value}()")])
                 yield Mutation(callback, f"{callback.name.value} calls {timer.name.value}", ((last, added),))
 
 
@@ -63,27 +61,30 @@ def text(program: Program) -> Iterator[Mutation]:
         old = text_of(node)
         # names of topics, nodes and files have no spaces
         prose = old is not None and " " in old.strip() and not is_docstring(program, node)
-        if old is not None and prose and (word := _WORD.search(old)):
-            after = old[: word.start()] + word[0][:-1] + old[word.end() :]
+        if old is not None and prose and (after := _misspelt(old)):
             yield Mutation(node, into(old, after), ((node, string(after)),))
     for part in program.all(cst.FormattedStringText):
-        if word := _WORD.search(part.value):
-            after = part.value[: word.start()] + word[0][:-1] + part.value[word.end() :]
+        if after := _misspelt(part.value):
             yield Mutation(part, into(part.value, after), ((part, part.with_changes(value=after)),))
+
+
+def _misspelt(old: str) -> str:
+    """Return a text without the last letter of its first word; empty if it has no word."""
+    word = _WORD.search(old)
+    return old[: word.end() - 1] + old[word.end() :] if word else ""
 
 
 def rounding(program: Program) -> Iterator[Mutation]:
     """Too few digits in a text: `.0f` for `.3f`."""
     for part in program.all(cst.FormattedStringExpression):
-        spec = "".join(program.code(piece) for piece in part.format_spec or ())
+        spec = program.specification(part)
         if spec.endswith("f") and spec != ".0f":
-            after = part.with_changes(format_spec=[cst.FormattedStringText(".0f")])
-            yield Mutation(part, into(program.code(part), program.code(after)), ((part, after),))
+            yield program.replacing(part, part.with_changes(format_spec=[cst.FormattedStringText(".0f")]))
     for node in program.all(cst.SimpleString):
         old = text_of(node)
         if old is not None and (match := re.search(r"%\.[1-9]f", old)):
-            after_text = old[: match.start()] + "%.0f" + old[match.end() :]
-            yield Mutation(node, into(old, after_text), ((node, string(after_text)),))
+            after = old[: match.start()] + "%.0f" + old[match.end() :]
+            yield Mutation(node, into(old, after), ((node, string(after)),))
 
 
 def missing_value(program: Program) -> Iterator[Mutation]:
@@ -96,10 +97,6 @@ def _logs(program: Program) -> list[cst.Call]:
     """Return the calls of a logger: methods with these names whose first argument is a text."""
     found = [call for call in program.calls(*LEVELS) if isinstance(call.func, cst.Attribute) and call.args]
     return [call for call in found if "log" in program.code(call.func).lower()]
-
-
-def _plain(arg: cst.Arg) -> cst.Arg:
-    return arg.with_changes(comma=cst.MaybeSentinel.DEFAULT, keyword=None, equal=cst.MaybeSentinel.DEFAULT)
 
 
 _NAMED = {
@@ -159,10 +156,8 @@ def message_type(program: Program) -> Iterator[Mutation]:
     """Another message or service type with the same fields, imported and used in the whole file."""
     for imported, alias in _imported_types(program, _TWINS):
         package, twin = _TWINS[alias]
-        edits: list[Edit] = [(name, cst.Name(twin)) for name in _uses(program, alias) if not _is_import(program, name)]
-        line = f"from {package} import {twin}"
-        edits += program.importing(line)
-        yield Mutation(imported, into(alias, f"{package}.{twin}"), tuple(edits))
+        edits = (*_renamed_uses(program, alias, twin), *program.importing(f"from {package} import {twin}"))
+        yield Mutation(imported, into(alias, f"{package}.{twin}"), edits)
 
 
 def stamped_type(program: Program) -> Iterator[Mutation]:
@@ -170,33 +165,31 @@ def stamped_type(program: Program) -> Iterator[Mutation]:
     for imported, alias in _imported_types(program, _STAMPED):
         member, parts = _STAMPED[alias]
         stamped = f"{alias}Stamped"
-        edits: list[Edit] = [
-            (name, cst.Name(stamped)) for name in _uses(program, alias) if not _is_import(program, name)
-        ]
-        fields = [node for node in program.all(cst.Attribute) if node.attr.value in parts]
-        edits += [(node.value, cst.Attribute(node.value, cst.Name(member))) for node in fields]
+        fields = [node.value for node in program.all(cst.Attribute) if node.attr.value in parts]
         package = program.code(imported.module) if imported.module is not None else ""
-        edits += program.importing(f"from {package} import {stamped}")
-        yield Mutation(imported, into(alias, stamped), tuple(edits))
+        edits = (
+            *_renamed_uses(program, alias, stamped),
+            *((holder, cst.Attribute(holder, cst.Name(member))) for holder in fields),
+            *program.importing(f"from {package} import {stamped}"),
+        )
+        yield Mutation(imported, into(alias, stamped), edits)
 
 
 def message_type_once(program: Program) -> Iterator[Mutation]:
     """A wrong type at only one publisher or subscription of a topic."""
     for call in program.calls(*CREATORS):
-        arg = argument(call, CREATORS[called(call)][0])
-        if arg is None or not isinstance(arg.value, cst.Name) or arg.value.value not in _TWINS:
-            continue
-        package, twin = _TWINS[arg.value.value]
-        edits = ((arg.value, cst.Name(twin)), *program.importing(f"from {package} import {twin}"))
-        yield Mutation(call, f"{called(call)} {into(arg.value.value, twin)}", edits)
+        given = argument(call, CREATORS[called(call)][0])
+        if isinstance(given, cst.Name) and given.value in _TWINS:
+            package, twin = _TWINS[given.value]
+            edits = ((given, cst.Name(twin)), *program.importing(f"from {package} import {twin}"))
+            yield Mutation(call, f"{called(call)} {into(given.value, twin)}", edits)
 
 
 def names(program: Program) -> list[tuple[cst.SimpleString, str]]:
     """Return the places that name topics and services, without duplicates."""
     found: dict[cst.SimpleString, str] = {}
     for call in program.calls(*_NAMED):
-        arg = argument(call, _NAMED[called(call)])
-        node = program.constant(arg.value) if arg is not None else None
+        node = program.constant(argument(call, _NAMED[called(call)]))
         name = text_of(node)
         if isinstance(node, cst.SimpleString) and name:
             found[node] = name
@@ -216,8 +209,10 @@ def _imported_types(program: Program, known: Collection[str]) -> Iterator[tuple[
                     yield imported, alias.name.value
 
 
-def _uses(program: Program, name: str) -> list[cst.Name]:
-    return [node for node in program.all(cst.Name) if node.value == name and not _is_attribute(program, node)]
+def _renamed_uses(program: Program, name: str, other: str) -> list[Edit]:
+    """Return the edits that put another name wherever a name is used; attributes and imports keep theirs."""
+    uses = [node for node in program.all(cst.Name) if node.value == name and not _is_attribute(program, node)]
+    return [(node, cst.Name(other)) for node in uses if not _is_import(program, node)]
 
 
 def _is_attribute(program: Program, node: cst.Name) -> bool:
@@ -239,16 +234,16 @@ def period(program: Program) -> Iterator[Mutation]:
         before = program.code(given)
         inside = before if isinstance(given, (cst.Name, cst.Attribute, cst.BaseNumber)) else f"({before})"
         for factor in _FACTORS:
-            yield Mutation(given, into(before, f"{inside} {factor}"), ((given, expression(f"{inside} {factor}")),))
+            yield program.replacing(given, f"{inside} {factor}")
 
 
 def rate_as_period(program: Program) -> Iterator[Mutation]:
     """The rate instead of the period, or the other way round."""
     for given in _periods(program):
-        before = program.code(given)
-        quotient = isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide)
-        after = program.code(given.right) if quotient else f"1 / ({before})"  # type: ignore[attr-defined]
-        yield Mutation(given, into(before, after), ((given, expression(after)),))
+        if isinstance(given, cst.BinaryOperation) and isinstance(given.operator, cst.Divide):
+            yield program.replacing(given, given.right)
+        else:
+            yield program.replacing(given, f"1 / ({program.code(given)})")
 
 
 def sleeping_callback(program: Program) -> Iterator[Mutation]:
@@ -266,7 +261,6 @@ def busy_callback(program: Program) -> Iterator[Mutation]:
 
 def _periods(program: Program) -> list[cst.BaseExpression]:
     """Return the expressions that define the periods of timers, rates and sleeps."""
-    given = [arg.value for call in program.calls("create_timer") if (arg := argument(call, "timer_period_sec"))]
-    given += [arg.value for call in program.calls("create_rate") if (arg := argument(call, "frequency"))]
-    given += [call.args[0].value for call in program.calls(*SLEEPS) if len(call.args) == 1]
-    return given
+    given = [*program.arguments("timer_period_sec", "create_timer"), *program.arguments("frequency", "create_rate")]
+    slept = [call.args[0].value for call in program.calls("sleep") if len(call.args) == 1]
+    return [*(period for _, period in given), *slept]
