@@ -125,4 +125,4 @@ def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json:
     results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
     render = render_changes if wanted.changes else render_results
     print_result(lambda: results_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
-    return next(rejudge.codes(results))
+    return rejudge.class_code(results)
