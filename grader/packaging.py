@@ -28,7 +28,8 @@ _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 _PROGRAM, _FILE, _PRIVATE = 0o100755, 0o100644, 0o100600
 #: Packages that every environment brings for its own Python.
 _WITH_PYTHON = ("pip", "setuptools", "wheel")
-_NOT_PACKED = ("__pycache__", "shipped")
+#: Folder of an installed package with what a checkout has outside of the package.
+_SHIPPED = "shipped"
 
 
 def integration(name: str) -> bytes:
@@ -114,20 +115,19 @@ def _refuse_stale(installed: importlib.metadata.Distribution) -> None:
 
 def _code() -> dict[str, bytes]:
     package = Path(grader.__file__).resolve().parent
-    files = {f"grader/{name}": content for name, content in _below(package, but=_NOT_PACKED).items()}
+    files = {f"grader/{name}": content for name, content in _below(package).items()}
     for folder in ("rubrics", "integrations"):
         for name, content in _below(shipped(folder)).items():
-            files[f"grader/shipped/{folder}/{name}"] = content
+            files[f"grader/{_SHIPPED}/{folder}/{name}"] = content
     return files
 
 
-def _below(folder: Path, but: tuple[str, ...] = ("__pycache__",)) -> dict[str, bytes]:
-    paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
-    relative = ((path, path.relative_to(folder)) for path in paths)
+def _below(folder: Path) -> dict[str, bytes]:
+    paths = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
     return {
         name.as_posix(): path.read_bytes()
-        for path, name in relative
-        if name.parts[0] not in but and "__pycache__" not in name.parts
+        for name, path in paths.items()
+        if name.parts[0] != _SHIPPED and "__pycache__" not in name.parts
     }
 
 
@@ -157,8 +157,7 @@ SEED_KEY = "seed.key"
 #: Largest autograder that Classroom 50 fetches.
 CLASSROOM50_BYTES = 10 * 1024 * 1024
 _OWNER, _COMMIT = "__OWNER__/rclpy-grader", "__COMMIT__"
-_HEX_DIGITS = 40
-_NAME_SIGNS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+_ACTION = re.compile(r"([A-Za-z0-9._-]+/[A-Za-z0-9._-]+)@([0-9a-f]{40})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,27 +195,22 @@ def workflow(action: str) -> str:
 
     The action is `OWNER/NAME@COMMIT`, with all 40 digits of the commit; raises GraderError for another form.
     """
-    repository, _, commit = action.partition("@")
-    parts = repository.split("/")
-    whole = len(commit) == _HEX_DIGITS and set(commit) <= set("0123456789abcdef")
-    if len(parts) != 2 or not all(part and set(part) <= _NAME_SIGNS for part in parts) or not whole:
-        text = f"{action}: expected OWNER/NAME@COMMIT with a commit of {_HEX_DIGITS} digits, found something else"
+    match = _ACTION.fullmatch(action)
+    if match is None:
+        text = f"{action}: expected OWNER/NAME@COMMIT with a commit of 40 digits, found something else"
         raise GraderError(text, "git rev-parse HEAD in the repository of the grader says the commit")
     text = integration("github/workflow.yml").decode()
-    return text.replace(_OWNER, repository).replace(_COMMIT, commit)
+    return text.replace(_OWNER, match[1]).replace(_COMMIT, match[2])
 
 
 def _common(chosen: Chosen) -> dict[str, bytes]:
     _check(chosen)
     name, content = wheel()
     # Numbered, because rubrics in different folders may share a name, and file names may be arbitrary.
-    rubrics = {f"rubrics/{n}/rubric.yaml": path.read_bytes() for n, path in enumerate(chosen.rubrics, start=1)}
+    folders = {f"rubrics/{n}": path for n, path in enumerate(chosen.rubrics, start=1)}
+    rubrics = {f"{folder}/rubric.yaml": path.read_bytes() for folder, path in folders.items()}
+    checks = {f"{folder}/{f.name}": f.content for folder, path in folders.items() for f in own_check_files(path)}
     settings = {"exercises": chosen.exercises, "rubrics": list(rubrics), "isolation": chosen.isolation}
-    checks = {
-        f"rubrics/{n}/{file.name}": file.content
-        for n, path in enumerate(chosen.rubrics, start=1)
-        for file in own_check_files(path)
-    }
     return {
         "prepare": integration("prepare"),
         "settings.json": (json.dumps(settings, indent=2) + "\n").encode(),

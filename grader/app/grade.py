@@ -130,10 +130,7 @@ def grade(
             environment=_environment(session),
             seed=seed,
             duration_s=time.perf_counter() - started,
-            notes=(
-                *submission.notes,
-                *_notes(request, session),
-            ),
+            notes=(*submission.notes, *_notes(request, session)),
             reproduce=reproduction(request, exercises, odometry, seed),
         )
         take = EarlyReports(exercises, jobs, run, on_partial_report).take if on_partial_report is not None else None

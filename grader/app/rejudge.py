@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import cast
 
-from grader.app.exit_codes import UNUSABLE, exit_code
+from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNDECIDED, UNUSABLE, exit_code
 from grader.app.grade import read_exercises
 from grader.app.request import GradeRequest, command_words, request_of
 from grader.core.errors import EvidenceError, GraderError
@@ -203,7 +203,6 @@ def _name(folder: Path, root: Path) -> str:
     return "/".join(parts)
 
 
-def codes(results: Sequence[RejudgedResult]) -> Iterator[int]:
-    """Yield the exit codes of all submissions, the most serious first."""
-    order = (UNUSABLE, 3, 1, 0)
-    yield from sorted((r.code for r in results), key=order.index)
+def class_code(results: Sequence[RejudgedResult]) -> int:
+    """Return the most serious exit code of all submissions."""
+    return min((r.code for r in results), key=(UNUSABLE, UNDECIDED, NOT_ALL_MET, ALL_MET).index)

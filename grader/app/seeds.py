@@ -14,7 +14,6 @@ from pathlib import Path
 
 from grader.core.errors import KeyFileError, VariantError
 from grader.core.exercise import Drawn, Exercise, Value
-from grader.rubrics.loader import read_rubric
 from grader.rubrics.variants import VariantOptions
 from grader.submissions.collected import shown
 
@@ -146,11 +145,6 @@ def checked(student: str) -> str:
         text = f"expected the id of a student, up to {MOST_ID} signs on one line, found `{shown(student)}`"
         raise VariantError(f"--student: {text}")
     return plain
-
-
-def sheet(path: Path, key: Path, student: str) -> Exercise:
-    """Read a rubric with one student's variant; raises GraderError if rubric, key or id cannot be used."""
-    return read_rubric(path, draw=by_key(key, student))
 
 
 def drawn(exercises: list[Exercise], student: str) -> Drawn | None:

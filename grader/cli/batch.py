@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,8 +14,7 @@ from grader.cli.options import (
     complain,
     drawn_with,
     parse_share,
-    print_for_people,
-    print_for_programs,
+    print_result,
     require,
     time_budget_option,
 )
@@ -85,16 +84,8 @@ def command(  # noqa: PLR0913  one parameter an option
     scheduler: str | None,
     rerun: str,
     exercises: tuple[str, ...],
-    every: bool,
-    rubrics: tuple[Path, ...],
     seed: int | None,
     seed_key: Path | None,
-    odom_bag: Path | None,
-    clock: str,
-    isolation: str,
-    time_budget_s: float,
-    spot_checks: float,
-    variant_key: Path | None,
     standalone: bool,
     canvas: str | None,
     canvas_gradebook: Path | None,
@@ -104,6 +95,7 @@ def command(  # noqa: PLR0913  one parameter an option
     templates: tuple[Path, ...],
     as_json: bool,
     no_progress: bool,
+    **as_given: Any,  # options that are fields of a request for one submission
 ) -> int:
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
@@ -136,19 +128,7 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
-        grading=GradeRequest(
-            "",
-            exercises=tuple(dict.fromkeys(exercises)),
-            every=every,
-            rubrics=rubrics,
-            seed=seed,
-            odom_bag=odom_bag,
-            clock=clock,
-            isolation=isolation,
-            time_budget_s=time_budget_s,
-            spot_checks=spot_checks,
-            variant_key=variant_key,
-        ),
+        grading=GradeRequest("", exercises=tuple(dict.fromkeys(exercises)), seed=seed, **as_given),
         jobs=jobs,
         rerun=rerun,
         seed_key=drawn_with(seed, seed_key),
@@ -162,10 +142,7 @@ def command(  # noqa: PLR0913  one parameter an option
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept, the same command goes on where it was", err=True)
         return INTERRUPTED
-    if as_json:
-        print_for_programs(summary_json(graded))
-    else:
-        print_for_people(lambda _: render_summary(graded))
+    print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
     return _code(graded)
 
 

@@ -22,8 +22,7 @@ from grader.cli.options import (
     parse_outputs,
     parse_percent,
     parse_share,
-    print_for_people,
-    print_for_programs,
+    print_result,
     readers,
     shown_progress,
     time_budget_option,
@@ -131,23 +130,17 @@ def _grade(  # noqa: PLR0913  one parameter an option
     *,
     submission: str,
     exercises: tuple[str, ...],
-    every: bool,
     seed: int | None,
     seed_key: Path | None,
-    odom_bag: Path | None,
     as_json: bool,
     outputs: tuple[Output, ...],
-    rubrics: tuple[Path, ...],
     min_score: Fraction | None,
-    clock: str,
-    isolation: str,
-    time_budget_s: float,
-    spot_checks: float,
     student: str,
     variant_key: Path | None,
     audience: str | None,
     as_of: str,
     no_progress: bool,
+    **as_given: Any,  # options that are fields of a request
 ) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
 
@@ -169,18 +162,12 @@ def _grade(  # noqa: PLR0913  one parameter an option
     request = GradeRequest(
         submission=submission,
         exercises=tuple(dict.fromkeys(exercises)),
-        every=every,
-        rubrics=rubrics,
         seed=seed,
         seed_key=key or PRACTICE,
-        odom_bag=odom_bag,
-        clock=clock,
-        isolation=isolation,
-        time_budget_s=time_budget_s,
-        spot_checks=spot_checks,
         student=student.strip(),
         variant_key=variant_key,
         draw=drawn_by(student, variant_key),
+        **as_given,
     )
     folders = [output.path for output in outputs if output.format == EVIDENCE and output.path is not None]
     writer = grade.EvidenceWriter(folders, request)
@@ -220,10 +207,7 @@ def _observe(  # noqa: PLR0913  one parameter an option
     request = observe.ObserveRequest(files, round(duration * 1e9), odom_bag, clock, isolation)
     with shown_progress(wanted=True) as progress:
         summary = observe.observe(request, progress)
-    if as_json:
-        print_for_programs(summary_to_json(summary))
-    else:
-        print_for_people(lambda _: render_summary(summary))
+    print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
     return ALL_MET
 
 
@@ -239,10 +223,11 @@ def _doctor(*, as_json: bool) -> int:
 
     with shown_progress(wanted=True) as progress:
         checkup = examine(progress)
-    if as_json:
-        print_for_programs(checkup_to_json(checkup))
-    else:
-        print_for_people(lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour))
+    print_result(
+        lambda: checkup_to_json(checkup),
+        lambda layout: render_checkup(checkup, width=layout.width, colour=layout.colour),
+        as_json=as_json,
+    )
     return ALL_MET if checkup.safe else UNUSABLE
 
 
@@ -260,10 +245,9 @@ def _explain(*, name: str, rubrics: tuple[Path, ...], as_json: bool) -> int:
     from grader.reporting.explained import explanations_to_json, render_explanations
 
     found = explain(name, rubrics)
-    if as_json:
-        print_for_programs(explanations_to_json(found))
-    else:
-        print_for_people(lambda layout: render_explanations(found, width=layout.width))
+    print_result(
+        lambda: explanations_to_json(found), lambda page: render_explanations(found, width=page.width), as_json=as_json
+    )
     return ALL_MET
 
 

@@ -166,11 +166,11 @@ def print_for_programs(text: str) -> None:
     show(lambda _: text, for_people=False)
 
 
-def print_for_people(render: Callable[[PageLayout], str]) -> None:
-    """Print text on standard output, rendered for its width and colour."""
+def print_result(to_json: Callable[[], str], render: Callable[[PageLayout], str], *, as_json: bool) -> None:
+    """Print a result on standard output: as JSON, or as text rendered for its width and colour."""
     from grader.reporting.delivery import show
 
-    show(render, for_people=True)
+    show((lambda _: to_json()) if as_json else render, for_people=not as_json)
 
 
 def complain(*lines: str, kind: str = "warning") -> None:

@@ -14,8 +14,7 @@ from grader.cli.options import (
     audience_options,
     parse_outputs,
     parse_percent,
-    print_for_people,
-    print_for_programs,
+    print_result,
     readers,
 )
 from grader.reporting.formats import FORMATS
@@ -124,8 +123,6 @@ def _class(evidence: Sequence[Path], how: Judgement, wanted: Wanted, *, as_json:
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
     results = rejudge.rejudge_class(rejudge.named_evidence(evidence), how, wanted, jobs=jobs)
-    if as_json:
-        print_for_programs(results_to_json(results, changes=wanted.changes))
-    else:
-        print_for_people(lambda _: render_changes(results) if wanted.changes else render_results(results))
-    return next(rejudge.codes(results))
+    render = render_changes if wanted.changes else render_results
+    print_result(lambda: results_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
+    return rejudge.class_code(results)

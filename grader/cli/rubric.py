@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from grader.app.exit_codes import ALL_MET, NOT_ALL_MET, UNUSABLE
-from grader.cli.options import PATH, complain, print_for_people, print_for_programs, require, shown_progress, write_file
+from grader.cli.options import PATH, complain, print_for_programs, print_result, require, shown_progress, write_file
 from grader.core.checkup import TIERS
 from grader.core.errors import GraderError, RubricError
 
@@ -64,10 +64,11 @@ def _schema(*, rubric: Path | None) -> int:
 @click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="How to print.")
 def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
-    from grader.app.seeds import sheet
+    from grader.app.seeds import by_key
     from grader.reporting.explained import render_sheet, sheet_to_json
+    from grader.rubrics.loader import read_rubric
 
-    exercise = sheet(rubric, key, student)
+    exercise = read_rubric(rubric, draw=by_key(key, student))
     print_for_programs(sheet_to_json(exercise) if format_ == "json" else render_sheet(exercise))
     return ALL_MET
 
@@ -85,12 +86,8 @@ def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:
     from grader.reporting.explained import explanations_to_json, list_checks, render_explanations
 
     found = explain_checks(files) if checks else explain_rubrics(files)
-    if as_json:
-        print_for_programs(explanations_to_json(found))
-    elif checks:
-        print_for_people(lambda layout: list_checks(found, width=layout.width))
-    else:
-        print_for_people(lambda layout: render_explanations(found, width=layout.width))
+    render = list_checks if checks else render_explanations
+    print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
     return ALL_MET
 
 
@@ -185,8 +182,9 @@ def selftest_command(  # noqa: PLR0913  one parameter an option
     options = SelftestOptions(reference, template, jobs, only, sample, seed, clock, isolation)
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
-    if as_json:
-        print_for_programs(results_to_json(results))
-    else:
-        print_for_people(lambda page: render_results(results, width=page.width, colour=page.colour))
+    print_result(
+        lambda: results_to_json(results),
+        lambda page: render_results(results, width=page.width, colour=page.colour),
+        as_json=as_json,
+    )
     return ALL_MET if all(result.passed for result in results) else NOT_ALL_MET

@@ -76,15 +76,11 @@ def _word(word: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Readers:
-    """Who reads the reports of a run, and on which day.
+    """Who reads the reports of a run, and on which day."""
 
-    Attributes:
-        audience: Who reads all of them. None: students if a platform shows the format to them, else instructors.
-        day: The day, as `2026-12-01`, with which dates in a rubric are compared; empty means before all dates.
-    """
-
+    # Who reads all of them; None for students if a platform shows the format to them, else instructors
     audience: Audience | None = None
-    day: str = ""
+    day: str = ""  # day, as `2026-12-01`, that dates in a rubric are compared with; empty for before all dates
 
     def of(self, usual: Audience) -> Audience:
         """Return who reads a format, given its usual audience."""
@@ -102,9 +98,8 @@ ANYBODY = Readers()
 
 _WHEN = {DUE_DATE: " before the due date", PUBLISHED: " before grades are published"}
 _HIDDEN = "a criterion that is not shown"
-_OUTCOME_ONLY = "the reason is not shown"
+_NO_REASON = "the reason is not shown"
 _LEFT_OUT = "pictures, the graph and whatever else would show more than the criteria do are left out"
-_CLOCK = "the reason is not shown"
 
 
 def told(report: Report, readers: Readers) -> Report:
@@ -162,7 +157,7 @@ def _exercise(exercise: ExerciseReport, day: str) -> ExerciseReport:
     faults = _faults(exercise, shown)
     return replace(
         exercise,
-        clock_reason=_said(exercise.clock_reason, worst, otherwise=_CLOCK),
+        clock_reason=_clock_reason(exercise, worst),
         verdicts=verdicts,
         faults=faults,
         notes=(*variant_notes(exercise.variant), *_unshown(exercise, day), *_notes(exercise, worst), _LEFT_OUT),
@@ -178,7 +173,7 @@ def _verdict(verdict: Verdict, shown: Mapping[str, Shows]) -> Verdict:
     if shown[verdict.id] is Shows.OUTCOME:
         return replace(
             verdict,
-            reason=_OUTCOME_ONLY,
+            reason=_NO_REASON,
             hint="",
             location=None,
             evidence={},
@@ -209,11 +204,11 @@ def _hint(hint: str) -> str:
     return "; ".join(part for part in hint.split("; ") if without_numbers(part) == part)
 
 
-def _said(text: str, worst: Shows, *, otherwise: str) -> str:
-    """Return text about a whole exercise, as visible as its most restricted criterion."""
-    if not text:
-        return ""
-    return without_numbers(text) if worst is Shows.WITHOUT_NUMBERS else otherwise
+def _clock_reason(exercise: ExerciseReport, worst: Shows) -> str:
+    """Return why the wall clock was used, as visible as the exercise's most restricted criterion."""
+    if worst is Shows.WITHOUT_NUMBERS or not exercise.clock_reason:
+        return without_numbers(exercise.clock_reason)
+    return _NO_REASON
 
 
 def _notes(exercise: ExerciseReport, worst: Shows) -> list[str]:

@@ -15,17 +15,11 @@ from grader.reporting.json_report import ReportData
 
 @dataclass(frozen=True, order=True, slots=True)
 class CauseKind:
-    """The kind of a cause: values of a report, never its sentences.
+    """The kind of a cause: values of a report, never its sentences."""
 
-    Attributes:
-        source: Where it is known from: `diagnosis`, `missing`, `fault`, `problem`, or `criterion` if nothing else is.
-        key: Id of the diagnosis, name of the file, or kind of the fault or problem.
-        parts: The type of the exception, or topics and detail of the problem.
-    """
-
-    source: str
-    key: str = ""
-    parts: tuple[str, ...] = ()
+    source: str  # `diagnosis`, `missing`, `fault` or `problem`, or `criterion` if none of them is known
+    key: str = ""  # id of the diagnosis, name of the file, or kind of the fault or problem
+    parts: tuple[str, ...] = ()  # type of the exception, or topics and detail of the problem
 
     @property
     def label(self) -> str:
@@ -39,9 +33,6 @@ def kind_of(criterion: Mapping[str, Any]) -> CauseKind:
     """Return the kind of cause for which a criterion lost points.
 
     A diagnosis is the most reliable source; then a missing file, a fault, and the problem that the check found.
-
-    Args:
-        criterion: A criterion of a JSON report.
     """
     evidence = _mapping(criterion.get("evidence"))
     for source in ("diagnosis", "missing"):
@@ -74,42 +65,25 @@ MOST_FORMS = 3
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One form in which a cause appears.
+    """One form in which a cause appears, as the report of one student has it."""
 
-    Attributes:
-        student: Index of a student whose report has this form.
-        reason: The reason in that report.
-        hint: The hint in that report; may be empty.
-        count: Number of students whose check found the same problem.
-    """
-
-    student: int
+    student: int  # index of that student
     reason: str
     hint: str
-    count: int
+    count: int  # number of students whose check found the same problem
 
 
 @dataclass(frozen=True, slots=True)
 class CommonCause:
-    """A cause for which students of a class lost points.
-
-    Attributes:
-        exercise: Id of the exercise.
-        criterion: Id of the criterion that names it.
-        title: Title of that criterion.
-        kind: Kind of the cause.
-        students: Indices of the students, in order and without duplicates.
-        points: Points lost to it in total, including those of blocked criteria.
-        forms: Forms in which it appears, the commonest first.
-    """
+    """A cause for which students of a class lost points."""
 
     exercise: str
-    criterion: str
-    title: str
+    criterion: str  # id of the criterion that names it
+    title: str  # title of that criterion
     kind: CauseKind
-    students: tuple[int, ...]
-    points: Fraction
-    forms: tuple[Form, ...]
+    students: tuple[int, ...]  # indices of the students, in order and without duplicates
+    points: Fraction  # points lost to it in total, including those of blocked criteria
+    forms: tuple[Form, ...]  # the commonest first
 
 
 @dataclass(slots=True)
@@ -120,12 +94,9 @@ class _Cluster:
 
 
 def causes(reports: Sequence[tuple[int, ReportData]]) -> tuple[CommonCause, ...]:
-    """Return all causes, by number of students and then by points lost.
+    """Return all causes in reports, given with the index of the student, by number of students, then by points lost.
 
     A criterion that is blocked, or has the same cause as another, is counted with the one that names the cause.
-
-    Args:
-        reports: Student index and report, in the order of the students.
     """
     clusters: dict[tuple[str, str, CauseKind], _Cluster] = {}
     for student, report in reports:

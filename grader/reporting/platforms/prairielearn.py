@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TypedDict
 
-from grader.core.json_values import JsonValue
+from grader.core.json_values import JsonObject, JsonValue
 from grader.core.report import ExerciseReport, Report, Verdict
 from grader.reporting import wording
 from grader.reporting.escape import json_value, shown
@@ -13,23 +12,7 @@ from grader.reporting.json_report import json_text
 
 #: PrairieLearn refuses a longer file; bytes.
 MOST_BYTES = 1_000_000
-
-
-class _Test(TypedDict):
-    name: str
-    description: str
-    points: JsonValue
-    max_points: JsonValue
-    message: str
-    output: str
-
-
-class _Results(TypedDict):
-    gradable: bool
-    score: JsonValue
-    message: str
-    output: str
-    tests: list[_Test]
+_LEFT_OUT = "left out: the results would be too long"
 
 
 def render_prairielearn(report: Report, *, limit: int = MOST_BYTES) -> str:
@@ -38,28 +21,29 @@ def render_prairielearn(report: Report, *, limit: int = MOST_BYTES) -> str:
     A report that is not final is marked as not gradable, so that the attempt does not count, and its message explains
     why. Near the limit, explanations are dropped first, then the rest of the output, then the tests.
     """
-    whole = _results(report)
-    text = json_text(whole)
-    for give_way in (_explanations, _output, _tests):
-        if len(text.encode()) <= limit:
-            break
-        give_way(whole)
-        text = json_text(whole)
-    return text
-
-
-def _results(report: Report) -> _Results:
     share = report.score / report.max_score if report.max_score else Fraction(0)
-    return {
+    output = "\n".join(wording.overview(report))
+    tests = [_test(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts]
+    results: dict[str, JsonValue] = {
         "gradable": report.final,
         "score": json_value(share),
         "message": " ".join([wording.headline(report), *wording.warnings(report)]),
-        "output": "\n".join(wording.overview(report)),
-        "tests": [_test(exercise, verdict) for exercise in report.exercises for verdict in exercise.verdicts],
+        "output": output,
+        "tests": tests,
     }
+    short_tests: JsonValue = [{**test, "message": _LEFT_OUT, "output": ""} for test in tests]
+    cuts: list[dict[str, JsonValue]] = [{"tests": short_tests}, {"output": output.splitlines()[-1]}, {"tests": []}]
+    text = json_text(results)
+    # A zero-point row would hide all other rows, so all of them are dropped.
+    for cut in cuts:
+        if len(text.encode()) <= limit:
+            break
+        results |= cut
+        text = json_text(results)
+    return text
 
 
-def _test(exercise: ExerciseReport, verdict: Verdict) -> _Test:
+def _test(exercise: ExerciseReport, verdict: Verdict) -> JsonObject:
     return {
         "name": f"{shown(exercise.number, limit=wording.NAME_LIMIT)}: {shown(verdict.title)}",
         "description": f"{wording.OUTCOME_WORDS[verdict.outcome]} ({shown(verdict.id)})",
@@ -68,17 +52,3 @@ def _test(exercise: ExerciseReport, verdict: Verdict) -> _Test:
         "message": shown(wording.reason(verdict)),
         "output": "\n".join(wording.explanation(verdict)[1:]),
     }
-
-
-def _explanations(whole: _Results) -> None:
-    for test in whole["tests"]:
-        test["message"], test["output"] = "left out: the results would be too long", ""
-
-
-def _output(whole: _Results) -> None:
-    whole["output"] = whole["output"].splitlines()[-1]
-
-
-def _tests(whole: _Results) -> None:
-    # A zero-point row would hide all other rows, so all of them are dropped.
-    whole["tests"] = []
