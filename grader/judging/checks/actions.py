@@ -69,7 +69,6 @@ class ActionResult:
         return f"every goal for {self.action} {self.status}{result}{within}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all goals end as expected; the reason names the first that does not."""
         goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
         if not goals:
             return explain_no_action(trace, self.action)
@@ -146,7 +145,6 @@ class ActionFeedback:
         return f"feedback of {self.action}, at least {self.at_least} for each goal{grows}{each}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the feedback on every accepted goal is right; the reason names the first mistake."""
         goals = calls_of(trace, f"{self.action}/_action/send_goal", "grader")
         if not goals:
             return explain_no_action(trace, self.action)
@@ -300,7 +298,6 @@ class LifecycleStates:
         return f"every transition made{states}{topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of this holds; the reason names the first violation."""
         changes, asked = (
             sorted(calls_of_node(trace, self.node, service), key=lambda call: call.request.t_ns)
             for service in ("change_state", "get_state")

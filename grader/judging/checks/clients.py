@@ -70,7 +70,6 @@ class CallsOfClient:
         return f"{text}, {number(seconds(self.period))} ± {number(seconds(self.tolerance))} s apart"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if number and gaps are right; the reason names the first wrong gap."""
         calls = calls_of(trace, self.service, "student")
         if not calls:
             return explain_no_client(trace, self.service)
@@ -150,7 +149,6 @@ class WaitsForService:
         return f"{self.process} waits for {self.service}, logs that it does, and asks once it is there"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for a record before the server appeared and a request after it."""
         starts = trace.marks("server_starts", self.service)
         appears_ns = starts[0].t_ns if starts else trace.stop_ns + 1
         gave_up = self._gave_up(trace, appears_ns)
@@ -258,7 +256,6 @@ class ReactsToResponses:
         return f"{self.process} {text}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the reaction to every response on this side is right."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)
@@ -370,7 +367,6 @@ class NoGoWithoutAnswer:
         return f"{self.process} does not go on where {self.service} gives no answer, no success or no number"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no output that signals continuing follows a useless response."""
         episodes = _episodes(self, trace)
         if not episodes:
             return _not_asked(trace, self.process, self.service)

@@ -85,7 +85,6 @@ class ThresholdResponse:
         return f"{number(answer)} on {self.output} for every {self.input} {side} {limit}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input on this side has the right answer."""
         inputs = held(trace, self.input, heard_from_ns=heard_from_ns(trace, self.input))
         messages = published(trace, self.output)
         if not messages:

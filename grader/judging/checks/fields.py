@@ -51,7 +51,6 @@ class FieldEqual:
         return f"{rules_text(self.fields)} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no message differs; the reason names the first that does."""
         messages = published(trace, self.topic)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
@@ -91,7 +90,6 @@ class FieldInRange:
         return f"{self.field} {FieldRule(low=self.low, high=self.high).wanted} in every message on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside; the reason names the first that is."""
         messages = published(trace, self.topic)
         if len(messages) < max(1, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), self.at_least)
@@ -134,7 +132,6 @@ class FieldMonotone:
         return f"{self.field} on {self.topic} only {self.direction}{', never equal' if self.strictly else ''}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no step goes the other way; the reason names the first that does."""
         messages = published(trace, self.topic)
         if len(messages) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(messages), max(2, self.at_least))
@@ -212,7 +209,6 @@ class FieldFunction:
         return f"{self.field} = {self.formula} in every message on {self.topic}, n being 0 in the first one"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no message differs; the reason names the first that does."""
         messages = published(trace, self.topic)
         if not messages:
             return explain_no_message(trace, self.topic)
@@ -313,7 +309,6 @@ class RandomInRange:
         return f"every value on {self.topic} within {span_}, and drawn at random"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no value is outside and the values may be random."""
         messages = published(trace, self.topic)
         if not messages:
             silent = explain_no_message(trace, self.topic)

@@ -73,7 +73,6 @@ class UsesLogger:
         return f"a record of {self.process} through its logger; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for a record, half for printed lines only."""
         records = student_records(trace, self.process)
         lines = printed_lines(trace, self.process)
         evidence = {"process": self.process, "records": len(records), "printed_lines": len(lines)}
@@ -134,7 +133,6 @@ class LogsMatching:
         return f"at least {self.at_least}{most} log records of {self.process}{level}{text}{every}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for records, half for printed lines."""
         records = student_records(trace, self.process)
         mine = [r for r in records if self._of_level(r) and self._matches(r)]
         flaw = self._flaw(mine)
@@ -233,7 +231,6 @@ class LogsEvery:
         )
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for records with that spacing, half for printed lines."""
         messages = published(trace, self.topic)
         if not messages:
             return waiting_for("publishes", explain_no_message(trace, self.topic))

@@ -84,7 +84,6 @@ class LogsPosition:
         return f"{self.process} logs the x and y that {self.topic} had at that moment; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for right records, half for right printed lines; the reason names what is wrong."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
             return track
@@ -183,7 +182,6 @@ class LogPeriod:
         return f"one log every {number(seconds(self.period))} s ± {share} % on average while {self.topic} is played"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the average is right and there is no long gap."""
         track = _track(trace, self.process, self.topic)
         if isinstance(track, Finding):
             return not_met(track.reason, track.evidence, blocked_by="logs_position", problem=track.problem)
@@ -301,7 +299,6 @@ class WaitsGracefully:
         return f"{self.process} lives through {silence} s without {self.topic}, without an error, and works afterwards"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if nothing failed and something was written after the first message."""
         fault = first_fault(trace, self.process)
         if fault is not None:
             return self._faulted(trace, fault)

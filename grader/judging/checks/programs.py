@@ -65,7 +65,6 @@ class ParameterDeclared:
         return f"the parameter {self.name}{kind}{value}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the first response for the parameter fits."""
         calls = asked_for(trace, self.name, self.node)
         answers = [found for call in calls if (found := reported_parameter(call, self.name)) is not None]
         if not answers:
@@ -143,7 +142,6 @@ class ParameterTakesEffect:
         return f"within {span(self.within)} of setting {self.name}, {what} of {self.topic} has its value"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every value took effect; the reason names the first that did not."""
         tries = settings(trace, self.name, self.node)
         if not any(s.answered for s in tries):
             return _unanswered(trace, self.name, self.node, asked=bool(tries))
@@ -227,7 +225,6 @@ class NoFault:
         return f"{self.process or 'every process'} runs to the end without an exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit without faults; the reason names the first."""
         faults = faults_before_stop(trace, self.process)
         if not faults:
             return met(f"{self.process or 'every process'}: no fault in {span(trace.stop_ns)}", {"faults": 0})
@@ -256,7 +253,6 @@ class CleanShutdown:
         return f"{self.process} ends within {number(seconds(self.within))} s of Ctrl-C, without another exception"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if it ended in time; the reason tells what happened instead."""
         signals = trace.marks("stop_signal", self.process)
         faults = trace.faults(self.process)
         if not signals:
@@ -325,7 +321,6 @@ class SourceUses(_OfSource):
         return f"in {self.process} {' and '.join([*parts, *(f'a call of {name}' for name in self.calls)])}"
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if everything is there; the reason names what is missing."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source
@@ -373,7 +368,6 @@ class SourceAvoids(_OfSource):
         return " and ".join([f"no call of {name}" for name in self.calls] + ["no global"] * self.globals)
 
     def judge_sources(self, trace: Trace, sources: Mapping[str, str]) -> Finding:
-        """Return full credit if nothing forbidden is there; the reason names the first place."""
         source = _source(trace, sources, self.process)
         if isinstance(source, Finding):
             return source

@@ -84,7 +84,6 @@ class TopicRate:
         return text
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full, half or no credit, depending on the difference of the rate."""
         times = [m.t_ns for m in published(trace, self.topic)]
         if not times:
             return explain_no_message(trace, self.topic)

@@ -95,7 +95,6 @@ class LogsValues:
         return f"{self.process} logs {products} for each message on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if enough messages are in log records, half if printed lines are needed."""
         fault = first_fault(trace, self.process)
         subscribed = student_endpoints(trace, "subscription", self.topic)
         if not subscribed and fault is None:
@@ -260,7 +259,6 @@ class LogsReceived:
         return f"{self.process} logs every value that it receives on {self.topic}; printing alone is half of it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every value is in a log record, half if printed lines are needed."""
         fault = first_fault(trace, self.process)
         values = held(trace, self.topic, heard_from_ns=heard_from_ns(trace, self.topic))
         subscriptions = student_endpoints(trace, "subscription", self.topic)

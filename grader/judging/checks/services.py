@@ -36,7 +36,6 @@ class ServiceAvailable:
         return f"the service {self.service} with type {self.type}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit for at least one matching server."""
         answers = [r for r in trace.responses(self.service, "student") if r.type == self.type]
         ends = [e for e in trace.service_ends("service", self.service) if e.type == self.type]
         if not answers and not ends:
@@ -67,7 +66,6 @@ class ServiceAnswersAll:
         return f"a response to every request on {self.service} within {number(seconds(self.within))} s"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no response is missing or late; the reason names the first that is."""
         late_ns = self.within + LATENESS_NS[trace.clock]
         fault = first_fault(trace)
         calls = [c for c in calls_of(trace, self.service, "grader") if _due(c, trace, late_ns) or fault is not None]
@@ -122,7 +120,6 @@ class ServiceResponse:
         return f"in every response of {self.service}: {rules_text(self.fields)}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no response differs; the reason names the first that does."""
         found = [r for r in trace.responses(self.service, "student") if r.t_ns < trace.stop_ns]
         if len(found) < max(1, self.at_least):
             return too_few_responses(trace, self.service, len(found), self.at_least)
@@ -224,7 +221,6 @@ class ServiceSequence:
         return text + (f", not beyond {number(self.floor)}{again}" if self.floor is not None else "")
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every number is the expected one; the reason names the first that is not."""
         calls = calls_of(trace, self.service, "grader")
         answered = sorted((c for c in calls if c.response is not None), key=_answered_ns)
         if len(answered) < max(1, self.at_least):

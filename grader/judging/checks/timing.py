@@ -77,7 +77,6 @@ class Period:
         return f"gaps of {' and '.join(parts) or 'any length'} between the messages on {self.topic}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if no gap is out of bounds; the reason names the first that is."""
         times = [m.t_ns for m in published(trace, self.topic)]
         if len(times) < max(2, self.at_least):
             return too_few_messages(trace, self.topic, len(times), max(2, self.at_least))
@@ -134,7 +133,6 @@ class Latency:
         return f"a message on {self.output} within {_ms(self.within)} of each one on {self.input}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if enough inputs are followed in time; the reason names the first that is not."""
         outputs = [m.t_ns for m in published(trace, self.output)]
         if not outputs:
             return explain_no_message(trace, self.output)
@@ -201,7 +199,6 @@ class Silence:
         return f"no message on {self.topic} {' and '.join(parts).replace('_', ' ')}{grace}".replace("  ", " ")
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if the window has no message; the reason names the first one."""
         fault = first_fault(trace)
         start_ns = self._moment(trace, self.after, 0)
         stop_ns = self._moment(trace, self.before, trace.stop_ns)
@@ -312,7 +309,6 @@ class Reaction:
         return f"within {span(self.within)} of each {self.input} a message on {self.output} that fits it"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if every input has the right output; the reason names the first that has not."""
         asked = self._asked(trace)
         outputs = published(trace, self.output)
         missing = [case for case in self.cases if not any(a.case is case for a in asked)]

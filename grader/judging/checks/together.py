@@ -86,7 +86,6 @@ class AnswersTogether:
         return f"every {self.input} of the one node answered by the other on {self.output}: {answers}"
 
     def judge(self, trace: Trace) -> Finding:
-        """Return full credit if all of this holds; the reason names the first violation."""
         sent, answered = published(trace, self.input), published(trace, self.output)
         for topic, messages in ((self.input, sent), (self.output, answered)):
             if not messages:
