@@ -137,7 +137,8 @@ class Latency:
         if not outputs:
             return explain_no_message(trace, self.output)
         jitter = JITTER_NS[trace.clock]
-        inputs = self._inputs(trace, jitter)
+        sent = (given.t_ns for given in _inputs(trace, self.input))
+        inputs = [t for t in sent if t + self.within + jitter < trace.stop_ns]
         if not inputs:
             return _no_input(trace, self.input)
         delays = [self._delay(t_ns, outputs, jitter) for t_ns in inputs]
@@ -158,15 +159,15 @@ class Latency:
         problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
         return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
 
-    def _inputs(self, trace: Trace, jitter: int) -> list[int]:
-        from_ns = heard_from_ns(trace, self.input)
-        sent = [d.t_ns for d in trace.deliveries(self.input) if d.t_ns >= from_ns]
-        sent = sent or [m.t_ns for m in published(trace, self.input)]
-        return [t for t in sent if t + self.within + jitter < trace.stop_ns]
-
     def _delay(self, t_ns: int, outputs: Sequence[int], jitter: int) -> int | None:
         place = bisect_left(outputs, t_ns - jitter)
         return max(0, outputs[place] - t_ns) if place < len(outputs) else None
+
+
+def _inputs(trace: Trace, topic: str) -> list[Delivery | Message]:
+    """Return the grader's messages on a topic that had a subscriber; without any, those of the student's nodes."""
+    from_ns = heard_from_ns(trace, topic)
+    return [d for d in trace.deliveries(topic) if d.t_ns >= from_ns] or [*published(trace, topic)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +279,6 @@ class _Asked:
 
     given: Delivery | Message
     case: ReactionCase
-    stop_ns: int
     outputs: tuple[Message, ...]
 
 
@@ -324,9 +324,7 @@ class Reaction:
 
     def _asked(self, trace: Trace) -> list[_Asked]:
         jitter_ns = JITTER_NS[trace.clock]
-        from_ns = heard_from_ns(trace, self.input)
-        given: list[Delivery | Message] = [d for d in trace.deliveries(self.input) if d.t_ns >= from_ns]
-        given = [g for g in given or published(trace, self.input) if g.t_ns < trace.stop_ns]
+        given = [g for g in _inputs(trace, self.input) if g.t_ns < trace.stop_ns]
         stops = [*(g.t_ns for g in given), trace.stop_ns + jitter_ns][1:]
         outputs = published(trace, self.output)
         found = []
@@ -336,7 +334,7 @@ class Reaction:
             if case is None or last_chance:
                 continue
             during = tuple(o for o in outputs if one.t_ns - jitter_ns <= o.t_ns < stop_ns - jitter_ns)
-            found.append(_Asked(one, case, stop_ns, during))
+            found.append(_Asked(one, case, during))
         return found
 
     def _wrong(self, trace: Trace, asked: _Asked) -> str:
