@@ -215,12 +215,8 @@ class LogPeriod:
             return met(f"{average}; {wanted}", evidence)
         fault = first_fault(trace, self.process)
         ended = f"; {fault_sentence(fault)}" if fault else ""
-        return not_met(
-            f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}",
-            evidence,
-            fault=fault,
-            problem=ProblemKind.STOPPED,
-        )
+        reason = f"{average}, but none from {span(gap[0])} to {span(gap[1])}{ended}; {wanted}"
+        return not_met(reason, evidence, fault=fault, problem=ProblemKind.STOPPED)
 
     def _off(
         self, track: Track, times: Sequence[int], reason: str, wanted: str, evidence: dict[str, object]
@@ -331,11 +327,8 @@ class WaitsGracefully:
         after = min((o.t_ns for o in outputs if o.t_ns >= first_ns and o.text not in before), default=None)
         alive = f"{self.process}: alive through {span(first_ns)} without a message"
         if after is None:
-            return not_met(
-                f"{alive}, but no sign that the data arrived",
-                blocked_by="logs_position",
-                problem=ProblemKind.NOT_LOGGED,
-            )
+            reason = f"{alive}, but no sign that the data arrived"
+            return not_met(reason, blocked_by="logs_position", problem=ProblemKind.NOT_LOGGED)
         evidence = {"silence_s": seconds(first_ns), "first_output_s": seconds(after)}
         return met(f"{alive}, first output with data at {moment(after)}", evidence)
 

@@ -102,11 +102,8 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
-        return not_met(
-            f"{who}: no answer to the question for {name}",
-            hint="spin the node: rclpy.spin(node)",
-            problem=ProblemKind.NO_ANSWER,
-        )
+        reason, hint = f"{who}: no answer to the question for {name}", "spin the node: rclpy.spin(node)"
+        return not_met(reason, hint=hint, problem=ProblemKind.NO_ANSWER)
     raise HarnessError(f"the recording does not ask for the parameter {name}")
 
 
@@ -262,10 +259,8 @@ class CleanShutdown:
                 return not_met(reason, hint=fault_hint(first), fault=first)
             ended = trace.marks("exited", self.process)
             if ended:
-                return not_met(
-                    f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped",
-                    problem=ProblemKind.ENDED,
-                )
+                reason = f"{self.process} ended by itself at {moment(ended[0].t_ns)}, before it was stopped"
+                return not_met(reason, problem=ProblemKind.ENDED)
             raise HarnessError(f"{self.process}: the scenario has no `shutdown`, so nobody stopped it")
         asked_ns = signals[0].t_ns
         stopped = [m for m in trace.marks("stopped", self.process) if m.t_ns >= asked_ns]
@@ -275,11 +270,8 @@ class CleanShutdown:
             reason = f"{self.process}: ended {seconds(took):.3f} s after Ctrl-C"
             if took <= self.within + LATENESS_NS[trace.clock]:
                 return met(reason, {"took_s": seconds(took)})
-            return not_met(
-                f"{reason}, expected within {number(seconds(self.within))} s",
-                {"took_s": seconds(took)},
-                problem=ProblemKind.TOO_LATE,
-            )
+            reason += f", expected within {number(seconds(self.within))} s"
+            return not_met(reason, {"took_s": seconds(took)}, problem=ProblemKind.TOO_LATE)
         if after:
             reason = f"{moment(after[0].t_ns)}, after Ctrl-C: {fault_sentence(after[0])}"
             hint = "" if after[0].kind is FaultKind.EXCEPTION else _SHUTDOWN_HINT

@@ -295,12 +295,8 @@ class LogsReceived:
         types = [e.type for e in subscriptions]
         if types and not any(carries_number(t) for t in types):
             reason = f"{self.topic}: the subscription takes {quote(types[0])}, which carries no number"
-            return not_met(
-                reason,
-                {"type": types[0]},
-                hint="use a numeric message type, e.g. std_msgs/msg/Float32",
-                problem=ProblemKind.NO_NUMBER,
-            )
+            hint = "use a numeric message type, e.g. std_msgs/msg/Float32"
+            return not_met(reason, {"type": types[0]}, hint=hint, problem=ProblemKind.NO_NUMBER)
         return _nothing(trace, self.process, f"{self.topic}: no number was published on it")
 
     def _sought(self, values: Sequence[Held], trace: Trace) -> list[Sought]:
@@ -371,7 +367,6 @@ def _nothing(trace: Trace, process: str, problem: str) -> Finding:
     Raises:
         HarnessError: The process was running: `problem`.
     """
-    found = explain_fault(trace, "nothing was logged after it", process=process)
-    if found is None:
-        raise HarnessError(problem)
-    return found
+    if crashed := explain_fault(trace, "nothing was logged after it", process=process):
+        return crashed
+    raise HarnessError(problem)

@@ -10,7 +10,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_S, DurationNs, Pattern, ServiceType, seconds, within
 from grader.core.trace import Response, Trace
-from grader.judging.findings import explain_fault, explain_no_server, faulted, first_fault, met, not_met, waiting_for
+from grader.judging.findings import explain_fault, explain_no_server, first_fault, met, not_met, waiting_for
 from grader.judging.output import number_in
 from grader.judging.service_calls import LATENESS_NS, Call, calls_of
 from grader.judging.values import FieldRule, breach, broken_rules, number_at, rules_text, text_at
@@ -131,12 +131,8 @@ class ServiceResponse:
         path = broken_rules(first.value, self.fields)[0]
         reason = f"{moment(first.t_ns)}, {self.service}: {breach(first.value, path, self.fields[path])} in response "
         reason += f"{place}; wrong in {len(wrong)} of {counted(len(found), 'response')}"
-        return not_met(
-            reason,
-            evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)},
-            hint=_hint(first, path),
-            problem=ProblemKind.WRONG_VALUE,
-        )
+        known = evidence | {"field": path, "first_wrong_s": seconds(first.t_ns)}
+        return not_met(reason, known, hint=_hint(first, path), problem=ProblemKind.WRONG_VALUE)
 
 
 def _hint(response: Response, path: str) -> str:
@@ -161,12 +157,11 @@ def never_asked(trace: Trace, service: str) -> Finding:
     Raises:
         HarnessError: The server existed and was running.
     """
-    fault = first_fault(trace)
     if not trace.service_ends("service", service):
         return waiting_for("service_available", explain_no_server(trace, service))
-    if fault is None:
-        raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
-    return faulted(fault, f"{service} could not be asked")
+    if crashed := explain_fault(trace, f"{service} could not be asked"):
+        return crashed
+    raise HarnessError(f"{service}: nothing was asked of it, or too late to be answered")
 
 
 _MOST_IN_EVIDENCE = 250

@@ -76,12 +76,8 @@ class Subscribes:
         reason = (
             f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}: no message arrives"
         )
-        return not_met(
-            reason,
-            evidence,
-            hint="subscribe with the default durability: pass the queue depth 10 as QoS",
-            problem=ProblemKind.KEPT_APART,
-        )
+        hint = "subscribe with the default durability: pass the queue depth 10 as QoS"
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
 def _demand(subscription: Endpoint) -> str:
