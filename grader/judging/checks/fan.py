@@ -13,12 +13,7 @@ from grader.core.errors import HarnessError
 from grader.core.exercise import Finding, ProblemKind
 from grader.core.quantities import NS_PER_MS, seconds, within
 from grader.core.trace import ClockKind, Endpoint, Trace
-from grader.judging.charts import (
-    answer_panel,
-    input_panel,
-    time_chart,
-    which_answers,
-)
+from grader.judging.charts import answer_panel, input_panel, time_chart, which_answers
 from grader.judging.findings import explain_fault, explain_no_message, faulted, first_fault, met, not_met
 from grader.judging.series import lag_ns
 from grader.judging.values import (

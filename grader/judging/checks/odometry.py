@@ -14,15 +14,7 @@ from grader.core.quantities import NS_PER_S, DurationNs, seconds, within
 from grader.core.trace import Fault, Trace
 from grader.judging.charts import series, time_chart
 from grader.judging.checks.logs import complained
-from grader.judging.findings import (
-    fault_hint,
-    fault_sentence,
-    faulted,
-    first_fault,
-    met,
-    not_met,
-    only_printed,
-)
+from grader.judging.findings import fault_hint, fault_sentence, faulted, first_fault, met, not_met, only_printed
 from grader.judging.output import printed_lines, student_records, written
 from grader.judging.position_causes import cause_of
 from grader.judging.position_logs import (

@@ -73,11 +73,9 @@ class Subscribes:
         }
         if fitting:
             return met(f"{self.topic}: {quote(chosen.node)} subscribes with type {self.type}", evidence)
-        reason = (
-            f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}: no message arrives"
-        )
+        reason = f"{self.topic}: the subscription of {quote(chosen.node)} asks for {_demand(chosen)}"
         hint = "subscribe with the default durability: pass the queue depth 10 as QoS"
-        return not_met(reason, evidence, hint=hint, problem=ProblemKind.KEPT_APART)
+        return not_met(f"{reason}: no message arrives", evidence, hint=hint, problem=ProblemKind.KEPT_APART)
 
 
 def _demand(subscription: Endpoint) -> str:
@@ -155,9 +153,8 @@ class FieldValues:
         }
         where = f"{moment(first.t_ns)}, {self.topic}"
         if missing:
-            return not_met(
-                f"{where}: {quote(first.type)} has no field {missing[0]}", evidence, problem=ProblemKind.NO_FIELD
-            )
+            reason = f"{where}: {quote(first.type)} has no field {missing[0]}"
+            return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
         found = ", ".join(f"{p} is {number(g)}" for p, g in fields.items() if g is not None)
         wanted = ", ".join(number(self.values[p]) for p in fields)
         share = f"in all {total} messages" if len(wrong) == total else f"in {len(wrong)} of {total} messages"
